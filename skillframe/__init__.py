@@ -1,0 +1,46 @@
+"""skillframe: teach robots compliant assembly from human demonstration, and prove the skill.
+
+The story in five files: `skillframe.demonstration.record`, the LMC plug-in's learner, `skillframe.skill`,
+`skillframe.world` and `skillframe.executor`. Importing the package loads none of the scientific libraries.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+_PUBLIC = {
+    "Command": "skillframe.skill",
+    "Demonstration": "skillframe.demonstration.record",
+    "Impedance": "skillframe.skill",
+    "Observation": "skillframe.skill",
+    "Pose": "skillframe.skill",
+    "Skill": "skillframe.skill",
+    "SkillframeError": "skillframe.errors",
+    "Status": "skillframe.skill",
+    "hookimpl": "skillframe.hookspecs",
+    "per_trial": "skillframe.skill",
+}
+__all__ = ["__version__", *sorted(_PUBLIC)]
+
+if TYPE_CHECKING:
+    from skillframe.demonstration.record import Demonstration as Demonstration
+    from skillframe.errors import SkillframeError as SkillframeError
+    from skillframe.hookspecs import hookimpl as hookimpl
+    from skillframe.skill import (
+        Command as Command,
+        Impedance as Impedance,
+        Observation as Observation,
+        Pose as Pose,
+        Skill as Skill,
+        Status as Status,
+        per_trial as per_trial,
+    )
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name on first use, so that `import skillframe` stays instant."""
+    if name not in _PUBLIC:
+        raise AttributeError(f"module 'skillframe' has no attribute {name!r}")
+    from importlib import import_module
+
+    return getattr(import_module(_PUBLIC[name]), name)

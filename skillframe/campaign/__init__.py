@@ -1,0 +1,1 @@
+"""Campaigns: many trials over declared uncertainty, stored so that nothing is lost."""

@@ -1,0 +1,105 @@
+"""`skillframe`: lazily loaded commands, one module each, and the exit codes of the contract.
+
+0 fine; 1 the work ran and the answer is no; 2 usage or input error; 3 internal error. A command module is imported when
+its command is used, so that `skillframe --help` loads no scientific library.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+import click
+
+from skillframe import __version__
+from skillframe.errors import SkillframeError
+
+COMMANDS = {
+    "quickstart": "The whole way in minutes: demonstrate, learn, run, prove, report.",
+    "demonstration": "Record, check and convert demonstrations.",
+    "condition": "Filter a demonstration's wrench; remove bias and tool weight.",
+    "learn": "Learn a skill from demonstrations.",
+    "skill": "Show and explain a learned skill.",
+    "run": "Run a skill in a simulated world.",
+    "campaign": "Run a skill many times over declared uncertainty.",
+    "report": "Make a self-contained HTML report from results.",
+    "robots": "List, check and show robots.",
+    "plugins": "List, check and start plug-ins.",
+    "doctor": "What is installed, what is missing, what to type.",
+}
+
+
+class LazyGroup(click.Group):
+    """A group whose commands live in `skillframe.cli.<name>`, imported on use; absent modules are not listed."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return [name for name in COMMANDS if find_spec(f"skillframe.cli.{name}") is not None]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in self.list_commands(ctx):
+            return None
+        command: click.Command = import_module(f"skillframe.cli.{cmd_name}").command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, COMMANDS[name]) for name in self.list_commands(ctx)])
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        if args and not args[0].startswith("-") and args[0] not in self.list_commands(ctx):
+            from skillframe.errors import UnknownName
+
+            raise UnknownName("command", args[0], self.list_commands(ctx))
+        return super().resolve_command(ctx, args)
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(__version__, prog_name="skillframe")
+@click.option("--debug", is_flag=True, help="Show the traceback of an error.")
+def cli(debug: bool) -> None:
+    """Teach robots compliant assembly from human demonstration, and prove the skill.
+
+    \b
+    Example:
+      skillframe quickstart --out demo
+    """
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Entry point: run a command and exit with the contract's code."""
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    debug = "--debug" in arguments
+    arguments = [a for a in arguments if a != "--debug"]
+    sys.exit(run(arguments, debug))
+
+
+def run(arguments: Sequence[str], debug: bool = False) -> int:
+    """Run a command line and return its exit code; messages go to stderr."""
+    try:
+        result = cli.main(list(arguments), prog_name="skillframe", standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        return 2
+    except SkillframeError as error:
+        if debug:
+            raise
+        click.echo(f"error: {error}", err=True)
+        return 2
+    except (KeyboardInterrupt, click.Abort):
+        click.echo("interrupted; what was finished is kept", err=True)
+        return 130
+    except BrokenPipeError:
+        return 0
+    except Exception as error:
+        if debug:
+            raise
+        click.echo(f"internal error: {type(error).__name__}: {error} (run again with --debug for the traceback)", err=True)
+        return 3
+    return result if isinstance(result, int) else 0
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Kalman filtering and smoothing of wrenches, and identification of bias and tool weight."""

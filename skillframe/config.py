@@ -1,0 +1,132 @@
+"""Strict TOML into frozen dataclasses: unknown keys are errors with a suggestion, wrong types say what was expected."""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+import types
+import typing
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from skillframe.errors import InputError, UnknownName
+
+T = TypeVar("T")
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The content of a TOML file.
+
+    Raises:
+        InputError: missing, not text, or not TOML (with the line).
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(path, "no such file", "check the path") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(path, f"cannot be read as text ({error})", "give a TOML file") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(path, f"is not valid TOML: {error}", "mend that line") from None
+
+
+def build(cls: type[T], values: Mapping[str, Any], where: str) -> T:
+    """An instance of a dataclass from plain values, checked key by key.
+
+    Args:
+        cls: the dataclass; its annotations say what is allowed.
+        values: as read from TOML or `--set`.
+        where: for messages, "file: section".
+
+    Raises:
+        InputError: an unknown or missing key, or a value of the wrong type.
+    """
+    hints = typing.get_type_hints(cls)
+    fields = {f.name: f for f in dataclasses.fields(cls) if f.init}  # type: ignore[arg-type]
+    for key in values:
+        if key not in fields:
+            raise InputError(where, str(UnknownName("key", str(key), fields)))
+    ready = {key: coerce(value, hints[key], f"{where}.{key}") for key, value in values.items()}
+    missing = [n for n, f in fields.items() if n not in ready and _required(f)]
+    if missing:
+        raise InputError(where, f"missing {', '.join(missing)}", "add it")
+    return cls(**ready)
+
+
+def _required(field: dataclasses.Field[Any]) -> bool:
+    return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
+
+
+def coerce(value: Any, hint: Any, where: str) -> Any:
+    """A plain value as the annotated type, or `InputError` that says what was expected."""
+    origin, args = typing.get_origin(hint), typing.get_args(hint)
+    if hint is Any:
+        return value
+    if origin in (typing.Union, types.UnionType):
+        return _coerce_union(value, args, where)
+    if origin is typing.Literal:
+        if value not in args:
+            raise InputError(where, str(UnknownName("value", str(value), map(str, args))))
+        return value
+    if origin in (tuple, list):
+        return _coerce_sequence(value, origin, args, where)
+    if origin is dict:
+        if not isinstance(value, Mapping):
+            raise InputError(where, f"expected a table, got {value!r}")
+        return {str(k): coerce(v, args[1], f"{where}.{k}") for k, v in value.items()}
+    if dataclasses.is_dataclass(hint):
+        if not isinstance(value, Mapping):
+            raise InputError(where, f"expected a table, got {value!r}")
+        return build(hint, value, where)  # type: ignore[type-var]
+    return _coerce_scalar(value, hint, where)
+
+
+def _coerce_union(value: Any, args: tuple[Any, ...], where: str) -> Any:
+    if value is None and type(None) in args:
+        return None
+    problem: InputError | None = None
+    for option in (a for a in args if a is not type(None)):
+        try:
+            return coerce(value, option, where)
+        except InputError as error:
+            problem = error
+    raise problem or InputError(where, f"unexpected value {value!r}")
+
+
+def _coerce_sequence(value: Any, origin: type, args: tuple[Any, ...], where: str) -> Any:
+    if not isinstance(value, list | tuple):
+        raise InputError(where, f"expected a list, got {value!r}")
+    if origin is list or (len(args) == 2 and args[1] is Ellipsis):
+        return origin(coerce(v, args[0], f"{where}[{i}]") for i, v in enumerate(value))
+    if len(value) != len(args):
+        raise InputError(where, f"expected {len(args)} values, got {len(value)}")
+    return tuple(coerce(v, a, f"{where}[{i}]") for i, (v, a) in enumerate(zip(value, args, strict=True)))
+
+
+def _coerce_scalar(value: Any, hint: Any, where: str) -> Any:
+    if hint is float and isinstance(value, int | float) and not isinstance(value, bool):
+        number = float(value)
+        if number != number:
+            raise InputError(where, "is not a number (NaN)", "give a finite number")
+        return number
+    if hint is Path and isinstance(value, str):
+        return Path(value)
+    if hint in (int, str, bool) and type(value) is hint:
+        return value
+    raise InputError(where, f"expected {getattr(hint, '__name__', hint)}, got {value!r}")
+
+
+def parse_setting(text: str) -> tuple[str, Any]:
+    """`KEY=VALUE` from the command line; the value is read as TOML, or kept as text where it is none.
+
+    Raises:
+        InputError: there is no "=".
+    """
+    key, separator, value = text.partition("=")
+    if not separator or not key.strip():
+        raise InputError(f"--set {text}", "is not KEY=VALUE", "write for example --set world.friction=0.3")
+    try:
+        return key.strip(), tomllib.loads(f"x = {value}")["x"]
+    except tomllib.TOMLDecodeError:
+        return key.strip(), value.strip()

@@ -1,0 +1,1 @@
+"""Control laws: impedance (equation 1), damping design, safety limits."""

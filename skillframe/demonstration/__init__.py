@@ -1,0 +1,1 @@
+"""Demonstrations: the record, its audit, and the readers and writers of files."""

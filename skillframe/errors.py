@@ -1,0 +1,60 @@
+"""Exceptions: one base class, and leaves that carry facts and format one sentence a person can act on.
+
+`SkillframeError` is everything a user can mend (exit code 2); `RunStopped` and its kind are answers, not errors, and
+live with the executor. An error's text says what is wrong, where, and what to do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class SkillframeError(Exception):
+    """Base class of every error that skillframe raises on purpose: bad usage or bad input."""
+
+
+class InputError(SkillframeError):
+    """A file, or something in it, cannot be used.
+
+    Attributes:
+        where: file, with row, channel or key if known.
+        problem: what is wrong.
+        fix: what to do about it.
+    """
+
+    def __init__(self, where: object, problem: str, fix: str = "") -> None:
+        self.where, self.problem, self.fix = str(where), problem, fix
+        super().__init__(f"{self.where}: {problem}" + (f"; {fix}" if fix else ""))
+
+
+class UnknownName(SkillframeError):
+    """A name that nothing is registered under; lists what there is and suggests the nearest.
+
+    Attributes:
+        kind: what was looked for ("world", "skill", "key" ...).
+        name: the name that was asked for.
+        known: the names that exist.
+    """
+
+    def __init__(self, kind: str, name: str, known: Iterable[str], note: str = "") -> None:
+        self.kind, self.name, self.known = kind, name, sorted(known)
+        near = suggest(name, self.known)
+        text = f"unknown {kind} {name!r}"
+        text += f"; did you mean {near!r}?" if near else ""
+        text += f" (there are: {', '.join(self.known) or 'none'})"
+        super().__init__(text + (f"; {note}" if note else ""))
+
+
+class MissingDependency(SkillframeError):
+    """An optional library is needed for this; says the command that installs it."""
+
+    def __init__(self, library: str, purpose: str, command: str) -> None:
+        self.library, self.purpose, self.command = library, purpose, command
+        super().__init__(f"{purpose} needs {library}, which is not installed; type: {command}")
+
+
+def suggest(name: str, known: Iterable[str]) -> str | None:
+    """Nearest of the known names, or None if none is near."""
+    near = get_close_matches(name.lower(), {k.lower(): k for k in known}, n=1, cutoff=0.5)
+    return {k.lower(): k for k in known}[near[0]] if near else None

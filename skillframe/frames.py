@@ -1,0 +1,180 @@
+r"""Rotations, poses and wrenches over arrays with any leading dimensions.
+
+Conventions, used everywhere: SI units; quaternions x, y, z, w; spatial vectors linear part first; a pose maps tool
+coordinates to base, \(x_{base} = R\,x_{tool} + p\); a wrench is what the environment exerts on the tool, taken at a
+point and expressed in base axes. Everything here is plain numpy, because a one-off scipy `Rotation` costs 50-70 us and
+`np.cross` 16 us, more than a whole control law.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Float = NDArray[np.float64]
+
+
+class Pose(NamedTuple):
+    """A pose of a frame in base, or a batch of them.
+
+    Attributes:
+        position: (..., 3) origin [m].
+        rotation: (..., 3, 3) rotation matrix, columns are the frame's axes in base.
+    """
+
+    position: Float
+    rotation: Float
+
+    def at(self, offset: Float) -> Pose:
+        """The pose of a point fixed in this frame: same attitude, origin moved by `offset` (..., 3) in frame axes."""
+        return Pose(self.position + rotate(self.rotation, offset), self.rotation)
+
+    def compose(self, other: Pose) -> Pose:
+        """This pose times another: `other` is given in this frame, the result in base."""
+        return Pose(self.position + rotate(self.rotation, other.position), self.rotation @ other.rotation)
+
+    def inverse(self) -> Pose:
+        """The pose of base in this frame."""
+        back = np.swapaxes(self.rotation, -1, -2)
+        return Pose(-rotate(back, self.position), back)
+
+
+def rotate(rotation: Float, vector: Float) -> Float:
+    """Rotate vectors (..., 3) by matrices (..., 3, 3)."""
+    result: Float = (rotation @ vector[..., None])[..., 0]
+    return result
+
+
+def cross(a: Float, b: Float) -> Float:
+    """Cross product of (..., 3) arrays; ten times faster than `np.cross` on small ones."""
+    a, b = np.broadcast_arrays(a, b)
+    result = np.empty(a.shape)
+    result[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
+    result[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
+    result[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return result
+
+
+def skew(v: Float) -> Float:
+    """Matrix (..., 3, 3) of the cross product with v (..., 3)."""
+    result = np.zeros((*v.shape[:-1], 3, 3))
+    result[..., 0, 1], result[..., 0, 2] = -v[..., 2], v[..., 1]
+    result[..., 1, 0], result[..., 1, 2] = v[..., 2], -v[..., 0]
+    result[..., 2, 0], result[..., 2, 1] = -v[..., 1], v[..., 0]
+    return result
+
+
+def norm(v: Float) -> Float:
+    """Euclidean norm over the last axis."""
+    result: Float = np.sqrt((v * v).sum(-1))
+    return result
+
+
+def unit(v: Float) -> Float:
+    """Unit vectors over the last axis; a zero vector stays zero."""
+    length = norm(v)[..., None]
+    result: Float = v / np.where(length > 0.0, length, 1.0)
+    return result
+
+
+def rotation_vector(rotation: Float) -> Float:
+    """Logarithm of rotation matrices (..., 3, 3) as rotation vectors (..., 3), angle in [0, pi].
+
+    Stable near 0 and near pi, where the axis is read from the symmetric part.
+    """
+    w = np.empty(rotation.shape[:-1])
+    w[..., 0] = rotation[..., 2, 1] - rotation[..., 1, 2]
+    w[..., 1] = rotation[..., 0, 2] - rotation[..., 2, 0]
+    w[..., 2] = rotation[..., 1, 0] - rotation[..., 0, 1]
+    w *= 0.5
+    sine = norm(w)
+    cosine = 0.5 * (rotation[..., 0, 0] + rotation[..., 1, 1] + rotation[..., 2, 2] - 1.0)
+    angle = np.arctan2(sine, cosine)
+    factor = np.where(sine > 1e-9, angle / np.where(sine > 1e-9, sine, 1.0), 1.0)
+    result: Float = w * factor[..., None]
+    near_pi = (sine < 1e-4) & (cosine < 0.0)
+    if np.any(near_pi):
+        result[near_pi] = _rotation_vector_near_pi(rotation[near_pi], w[near_pi], angle[near_pi])
+    return result
+
+
+def _rotation_vector_near_pi(rotation: Float, w: Float, angle: Float) -> Float:
+    """Axis from (R + R^T)/2 = cos I + (1 - cos) a a^T, its sign from the antisymmetric part."""
+    cosine = np.cos(angle)[..., None, None]
+    outer = (0.5 * (rotation + np.swapaxes(rotation, -1, -2)) - cosine * np.eye(3)) / (1.0 - cosine)
+    column = np.argmax(np.einsum("...ii->...i", outer), axis=-1)
+    axis = unit(np.take_along_axis(outer, column[..., None, None], axis=-1)[..., 0])
+    sign = np.where((axis * w).sum(-1) < 0.0, -1.0, 1.0)
+    return axis * (sign * angle)[..., None]
+
+
+def rotation_matrix(vector: ArrayLike) -> Float:
+    """Exponential of rotation vectors (..., 3): Rodrigues' formula, exact to rounding for every angle."""
+    v = np.asarray(vector, dtype=float)
+    angle = norm(v)
+    small = angle < 1e-6
+    safe = np.where(small, 1.0, angle)
+    a = np.where(small, 1.0 - angle**2 / 6.0, np.sin(safe) / safe)[..., None, None]
+    b = np.where(small, 0.5 - angle**2 / 24.0, (1.0 - np.cos(safe)) / safe**2)[..., None, None]
+    k = skew(v)
+    result: Float = np.eye(3) + a * k + b * (k @ k)
+    return result
+
+
+def matrix_from_quaternion(quaternion: ArrayLike) -> Float:
+    """Rotation matrices (..., 3, 3) from quaternions (..., 4), x, y, z, w, of any non-zero norm."""
+    q = np.asarray(quaternion, dtype=float)
+    q = q / norm(q)[..., None]
+    x, y, z, w = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
+    result = np.empty((*q.shape[:-1], 3, 3))
+    result[..., 0, 0], result[..., 1, 1], result[..., 2, 2] = (
+        1 - 2 * (y * y + z * z), 1 - 2 * (x * x + z * z), 1 - 2 * (x * x + y * y),
+    )  # fmt: skip
+    result[..., 0, 1], result[..., 1, 0] = 2 * (x * y - z * w), 2 * (x * y + z * w)
+    result[..., 0, 2], result[..., 2, 0] = 2 * (x * z + y * w), 2 * (x * z - y * w)
+    result[..., 1, 2], result[..., 2, 1] = 2 * (y * z - x * w), 2 * (y * z + x * w)
+    return result
+
+
+def quaternion_from_matrix(rotation: ArrayLike) -> Float:
+    """Unit quaternions (..., 4), x, y, z, w with w >= 0, from rotation matrices (..., 3, 3) (Shepperd's method)."""
+    r = np.asarray(rotation, dtype=float)
+    trace = r[..., 0, 0] + r[..., 1, 1] + r[..., 2, 2]
+    diagonal = np.stack([r[..., 0, 0], r[..., 1, 1], r[..., 2, 2], trace], axis=-1)
+    outer = np.empty((*r.shape[:-2], 4, 4))  # 4 q q^T, row of the largest element is best conditioned
+    for i in range(3):
+        outer[..., i, i] = 1.0 + 2.0 * r[..., i, i] - trace
+        outer[..., i, 3] = outer[..., 3, i] = r[..., (i + 2) % 3, (i + 1) % 3] - r[..., (i + 1) % 3, (i + 2) % 3]
+        for j in range(i + 1, 3):
+            outer[..., i, j] = outer[..., j, i] = r[..., i, j] + r[..., j, i]
+    outer[..., 3, 3] = 1.0 + trace
+    best = np.argmax(diagonal, axis=-1)[..., None, None]
+    q = unit(np.take_along_axis(outer, best, axis=-2)[..., 0, :])
+    result: Float = np.where(q[..., 3:] < 0.0, -q, q)
+    return result
+
+
+def move_wrench(wrench: Float, shift: Float) -> Float:
+    """Wrench (..., 6) taken at another point, same axes: T' = T - shift x F.
+
+    Args:
+        wrench: (..., 6) force then torque.
+        shift: (..., 3) new point minus old point, in the wrench's axes [m].
+    """
+    result: Float = np.array(np.broadcast_to(wrench, np.broadcast_shapes(wrench.shape, (*shift.shape[:-1], 6))))
+    result[..., 3:] -= cross(shift, result[..., :3])
+    return result
+
+
+def move_twist(twist: Float, shift: Float) -> Float:
+    """Twist (..., 6) of another point of the same body, same axes: v' = v + w x shift."""
+    result: Float = np.array(np.broadcast_to(twist, np.broadcast_shapes(twist.shape, (*shift.shape[:-1], 6))))
+    result[..., :3] += cross(result[..., 3:], shift)
+    return result
+
+
+def rotate_spatial(rotation: Float, vector: Float) -> Float:
+    """Both halves of spatial vectors (..., 6) rotated by (..., 3, 3)."""
+    return np.concatenate([rotate(rotation, vector[..., :3]), rotate(rotation, vector[..., 3:])], axis=-1)

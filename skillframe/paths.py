@@ -1,0 +1,33 @@
+"""Where data that ships with skillframe lies: in the wheel's `_data`, or beside the package in a checkout."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+_PACKAGE = Path(__file__).resolve().parent
+
+
+def data_dirs(kind: str) -> list[Path]:
+    """Folders that hold data of a kind ("robots", "fmus"), the user's own first.
+
+    Folders listed in the environment variable `SKILLFRAME_PATH` come before the shipped ones; each is expected to hold
+    a sub-folder of that kind.
+    """
+    own = [Path(p) for p in os.environ.get("SKILLFRAME_PATH", "").split(os.pathsep) if p]
+    shipped = [_PACKAGE / "_data", _PACKAGE.parent]
+    return [folder / kind for folder in [*own, *shipped] if (folder / kind).is_dir()]
+
+
+def cache_dir(kind: str) -> Path:
+    """A folder for things that can be made again (created if absent): `$XDG_CACHE_HOME/skillframe/<kind>`."""
+    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    folder = base / "skillframe" / kind
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def recordings_dir() -> Path | None:
+    """Folder with third-party recordings, `$SKILLFRAME_RECORDINGS`, or None where it is not set or absent."""
+    folder = os.environ.get("SKILLFRAME_RECORDINGS", "")
+    return Path(folder) if folder and Path(folder).is_dir() else None

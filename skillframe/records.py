@@ -1,0 +1,123 @@
+"""What plug-ins yield: frozen records with a name, a summary and factories, so that an entry module stays light."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from skillframe.demonstration.record import Demonstration
+    from skillframe.skill import Skill
+    from skillframe.world.scene import Scene
+
+Document = dict[str, Any]
+"""A skill file's content as plain JSON values; its keys are in the contract and `skillframe.skillfile`."""
+
+
+class Illustration(NamedTuple):
+    """One picture that explains a skill: a title, a caption in plain words, and the drawing as SVG text."""
+
+    title: str
+    caption: str
+    svg: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LearnOptions:
+    """The points and axes of learning that the command line sets; see the contract's "four points".
+
+    Attributes:
+        at: where it is learned: "x,y,z" in the tool frame, a frame's name, or None for the recorded tool point.
+        hand: where torque work is taken; None for the demonstration's own `hand`, else the learning point.
+        axes: "base", or "phase_start": the tool's attitude at the start of the phase.
+        settings: the learner's own settings by name, checked by the learner.
+    """
+
+    at: str | None = None
+    hand: str | None = None
+    axes: str = "base"
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SkillType:
+    """A kind of skill.
+
+    Attributes:
+        name: as written in skill files and on the command line.
+        summary: one line for listings.
+        version: of the type's part of the skill file; a newer file is refused.
+        build: a runnable skill from a checked skill document.
+        learn: a skill document's body (`frame`, `phases`, ...) from demonstrations; None if it is not learned.
+        describe: the document in words, a line each.
+        explain: pictures for the report, drawn from the document alone; None if there are none.
+        tunable: names of run parameters that `build` takes from the document's `run` section.
+    """
+
+    name: str
+    summary: str
+    version: int = 1
+    build: Callable[[Document], Skill]
+    learn: Callable[[Sequence[Demonstration], LearnOptions], Document] | None = None
+    describe: Callable[[Document], list[str]] | None = None
+    explain: Callable[[Document], list[Illustration]] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SegmenterType:
+    """A way of cutting demonstrations into phases.
+
+    Attributes:
+        fit: `fit(demonstrations, phases or None, settings)` gives the phase model with boundaries and labels.
+    """
+
+    name: str
+    summary: str
+    version: int = 1
+    fit: Callable[[Sequence[Demonstration], int | None, Mapping[str, Any]], Document]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CoordinatorType:
+    """A skill for several arms: its observations and commands carry a dimension (N, arms, ...)."""
+
+    name: str
+    summary: str
+    version: int = 1
+    build: Callable[[Document], Skill]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorldType:
+    """A world that skills run in.
+
+    Attributes:
+        params: a frozen dataclass type whose fields, in SI units with defaults, are what `--set world.KEY` can change.
+        build: the scene (fixtures, tool, start, goal) from one value of `params`.
+    """
+
+    name: str
+    summary: str
+    version: int = 1
+    params: type
+    build: Callable[[Any], Scene]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReaderType:
+    """A demonstration file format.
+
+    Attributes:
+        suffixes: file name endings that select it (".csv").
+        read: `read(path, options)` gives the demonstration or raises `InputError`.
+        write: the inverse, or None.
+    """
+
+    name: str
+    summary: str
+    suffixes: tuple[str, ...]
+    read: Callable[[Path, Mapping[str, Any]], Demonstration]
+    write: Callable[[Demonstration, Path], None] | None = None

@@ -1,0 +1,1 @@
+"""Robots by URDF: robot.toml, loading, mass audit, kinematics and dynamics."""

@@ -1,0 +1,97 @@
+"""What a run leaves behind: a table over time and what is needed to draw it again, in one npz file.
+
+A trace file needs nothing else to be plotted, replayed in 3-D or reported on: the scene's geometry is in its metadata and
+the bodies' poses are in its arrays.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from skillframe.errors import InputError
+from skillframe.frames import Float
+
+FORMAT, VERSION = "skillframe.trace", 1
+COLUMNS = {
+    "time": (),
+    "position": (3,),
+    "quaternion": (4,),
+    "twist": (6,),
+    "wrench": (6,),
+    "wrench_true": (6,),
+    "desired_position": (3,),
+    "desired_quaternion": (4,),
+    "command_wrench": (6,),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trace:
+    """One trial over time.
+
+    Attributes:
+        time: (T,) [s].
+        position, quaternion: (T, 3), (T, 4) measured pose of the centre of compliance in base.
+        twist: (T, 6) of that point, base axes.
+        wrench: (T, 6) filtered wrench of the environment on the tool at that point, base axes.
+        wrench_true: (T, 6) the simulator's contact wrench at that point, base axes.
+        desired_position, desired_quaternion: (T, 3), (T, 4) what the skill wanted.
+        command_wrench: (T, 6) the law's output at that point, robot on environment, base axes.
+        q: (T, nq) configuration.
+        body_position, body_quaternion: (T, B, 3), (T, B, 4) poses of the drawn bodies in base, x, y, z, w.
+        meta: `robot`, `world`, `params`, `seed`, `trial`, `draws`, `success`, `failure`, `status`, `reason`,
+            `duration_s`, `peak_force_n`, `final_error_m`, `final_error_rad`, `center_of_compliance`, `skill`,
+            `events` ([[t, text]]), and `bodies`: [{`name`, `geoms`: [{`kind`, `size`, `position`, `quaternion`,
+            `rgba`, `vertices`, `faces`}]}] in the order of the body arrays.
+    """
+
+    time: Float
+    position: Float
+    quaternion: Float
+    twist: Float
+    wrench: Float
+    wrench_true: Float
+    desired_position: Float
+    desired_quaternion: Float
+    command_wrench: Float
+    q: Float
+    body_position: Float
+    body_quaternion: Float
+    meta: dict[str, Any] = field(default_factory=dict)
+
+    def save(self, path: Path) -> None:
+        """Write the trace, whole or not at all."""
+        arrays = {name: getattr(self, name) for name in [*COLUMNS, "q", "body_position", "body_quaternion"]}
+        meta = json.dumps({"format": FORMAT, "version": VERSION, **self.meta}, sort_keys=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary = path.with_name(path.name + ".tmp")
+        with temporary.open("wb") as file:
+            np.savez_compressed(file, meta=np.array(meta), **arrays)
+        os.replace(temporary, path)
+
+    @classmethod
+    def load(cls, path: Path) -> Trace:
+        """Read a trace file.
+
+        Raises:
+            InputError: missing, not a trace, or of a newer version.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                arrays = {name: file[name] for name in file.files}
+            meta = json.loads(str(arrays.pop("meta")))
+        except FileNotFoundError:
+            raise InputError(path, "no such file", "check the path") from None
+        except Exception as error:
+            raise InputError(path, f"is not a trace file ({error})", "give a .npz written by skillframe run") from None
+        if meta.get("format") != FORMAT:
+            raise InputError(path, f"has format {meta.get('format')!r}, not {FORMAT!r}", "give a trace file")
+        if meta.get("version", 0) > VERSION:
+            raise InputError(path, f"is of version {meta['version']}, newer than {VERSION}", "update skillframe")
+        return cls(**arrays, meta=meta)

@@ -1,0 +1,1 @@
+"""Worlds: scenes as data, the batched MuJoCo plant, sensors and rates."""

@@ -1,0 +1,125 @@
+"""A scene: fixtures, the tool in the robot's grip, where a run starts and when the task is done; data only.
+
+Frames: the *fixture frame* is where the task is described (its z axis points up, out of the hole or valley); the *tool
+frame* is the robot's `tool_frame` (flange, wrist), its z axis points out along the tool. A scene knows nothing of robots
+or engines; the plant compiles it, the teacher reads `Scene.task`, the learner sees neither.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.frames import Float, Pose
+
+Vector = tuple[float, float, float]
+IDENTITY = (0.0, 0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Geom:
+    """A primitive or convex mesh, placed in its body's frame.
+
+    Attributes:
+        kind: "box" (half sizes), "sphere" (radius), "capsule" and "cylinder" (radius, half length), "plane", "mesh".
+        size: in MuJoCo's meaning for the kind; empty for a mesh.
+        position: (3,) [m]; quaternion: x, y, z, w.
+        vertices: (V, 3) of a convex mesh; faces: (F, 3) triangles, for drawing as well.
+        collide: takes part in contact; a geom that does not is there to be seen.
+        visible: is drawn.
+    """
+
+    kind: str
+    size: tuple[float, ...] = ()
+    position: Vector = (0.0, 0.0, 0.0)
+    quaternion: tuple[float, float, float, float] = IDENTITY
+    rgba: tuple[float, float, float, float] = (0.6, 0.65, 0.7, 1.0)
+    vertices: NDArray[np.float64] | None = None
+    faces: NDArray[np.int64] | None = None
+    collide: bool = True
+    visible: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tool:
+    """What the robot holds, rigidly, behind its force-torque sensor, in the tool frame.
+
+    Attributes:
+        mass: [kg]; center_of_mass: [m]; inertia: xx, yy, zz about the centre of mass [kg m^2].
+        frames: named points of the tool frame; "tip" is always there.
+        hand: name of the frame where a teacher's hand holds it.
+    """
+
+    geoms: tuple[Geom, ...]
+    mass: float
+    center_of_mass: Vector
+    inertia: Vector
+    frames: dict[str, Vector]
+    hand: str = "wrist"
+
+
+class State(NamedTuple):
+    """Where the tool is, seen from the fixture, for goal predicates; N trials.
+
+    Attributes:
+        tip: pose of the tool's "tip" in the true fixture frame: (N, 3), (N, 3, 3), tool axes.
+        wrench: (N, 6) true wrench of the environment on the tool at the tip, fixture axes.
+    """
+
+    tip: Pose
+    wrench: Float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """What a person who sees the scene knows, for the simulated teacher only, in the fixture frame.
+
+    Attributes:
+        direction: unit vector along which the teacher pushes, or None to hold still.
+        aligned: attitude (quaternion) of the tool the teacher turns it to, or None to leave the attitude.
+        turn: rotation vector along which a levering teacher turns the tool, or None.
+        hand: "aligning" (soft and active in rotation), "sliding", "hold" or "lever".
+        starts: nominal starts of the demonstrations, cycled through: dicts of `start.*` quantities.
+        done: predicate of a finished demonstration; the goal if None.
+    """
+
+    direction: Vector | None
+    aligned: tuple[float, float, float, float] | None = None
+    turn: Vector | None = None
+    hand: str = "sliding"
+    starts: tuple[dict[str, float], ...] = ({},)
+    done: Callable[[State], NDArray[np.bool_]] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """Everything about a task but the robot.
+
+    Attributes:
+        fixture: geoms in the fixture frame.
+        friction: Coulomb coefficient of every contact between tool and fixture.
+        start_tip: (3,) nominal start of the tip in the fixture frame.
+        start_quaternion: nominal attitude of the tool frame in the fixture frame.
+        clearance_of_tilt: lift of the start along the fixture's z for a tilt [rad], so that no start penetrates.
+        goal: predicate per trial.
+        goal_error: distance to the goal: (N,) [m] and (N,) [rad].
+        analytic: figures of closed-form theory for the report (e.g. {"largest_tilt": ...}).
+        params: the parameters it was built from, plain values.
+    """
+
+    name: str
+    fixture: tuple[Geom, ...]
+    tool: Tool
+    friction: float
+    start_tip: Vector
+    start_quaternion: tuple[float, float, float, float]
+    goal: Callable[[State], NDArray[np.bool_]]
+    goal_error: Callable[[State], tuple[Float, Float]]
+    task: Task
+    clearance_of_tilt: Callable[[Float], Float] = field(default=lambda tilt: np.zeros_like(tilt))
+    analytic: dict[str, float] = field(default_factory=dict)
+    params: dict[str, Any] = field(default_factory=dict)
