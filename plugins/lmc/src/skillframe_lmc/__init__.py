@@ -1,0 +1,1 @@
+"""skillframe plug-in: lmc."""
