@@ -1,8 +1,8 @@
 """A scene: fixtures, the tool in the robot's grip, where a run starts and when the task is done; data only.
 
 Frames: the *fixture frame* is where the task is described (its z axis points up, out of the hole or valley); the *tool
-frame* is the robot's `tool_frame` (flange, wrist), its z axis points out along the tool. A scene knows nothing of robots
-or engines; the plant compiles it, the teacher reads `Scene.task`, the learner sees neither.
+frame* is the robot's `tool_frame` (flange, wrist), its z axis points out along the tool. A scene knows nothing of
+robots or engines; the plant compiles it, the teacher reads `Scene.task`, the learner sees neither.
 """
 
 from __future__ import annotations
@@ -104,7 +104,8 @@ class Scene:
         friction: Coulomb coefficient of every contact between tool and fixture.
         start_tip: (3,) nominal start of the tip in the fixture frame.
         start_quaternion: nominal attitude of the tool frame in the fixture frame.
-        clearance_of_tilt: lift of the start along the fixture's z for a tilt [rad], so that no start penetrates.
+        start_lift: extra height of the start (N,) [m] for offsets (N, 3) [m] and tilts (N, 3) [rad] of the tip, so that
+            no declared start penetrates the fixture.
         goal: predicate per trial.
         goal_error: distance to the goal: (N,) [m] and (N,) [rad].
         analytic: figures of closed-form theory for the report (e.g. {"largest_tilt": ...}).
@@ -120,6 +121,6 @@ class Scene:
     goal: Callable[[State], NDArray[np.bool_]]
     goal_error: Callable[[State], tuple[Float, Float]]
     task: Task
-    clearance_of_tilt: Callable[[Float], Float] = field(default=lambda tilt: np.zeros_like(tilt))
+    start_lift: Callable[[Float, Float], Float] = field(default=lambda offset, tilt: np.zeros(len(offset)))
     analytic: dict[str, float] = field(default_factory=dict)
     params: dict[str, Any] = field(default_factory=dict)

@@ -1,0 +1,321 @@
+"""The only loop: N trials of one skill in lock-step, from observation to torque, a thousand times a second.
+
+    sensors -> filter -> Observation -> skill.step -> Command -> impedance -> limits -> torque -> plant
+
+One run is N = 1, a campaign's chunk is N = 32 ... 256, and a trial's result does not depend, to the last bit, on which
+others run beside it. The controller knows the nominal robot only: where masses or the grasp differ from trial to trial,
+its kinematics and dynamics come from a second, nominal batch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.conditioning.kalman import SteadyWrenchFilter
+from skillframe.control.impedance import critical_damping, impedance_wrench, null_space_damping, task_inertia
+from skillframe.control.limits import LimitGuard
+from skillframe.frames import Float, Pose, norm
+from skillframe.recorder import Recorder
+from skillframe.robot.model import RobotModel
+from skillframe.skill import Command, Impedance, Observation, Reasons, Skill, Status, no_reasons
+from skillframe.trace import Trace
+from skillframe.world.placement import QUANTITIES, check_quantities, fixture_poses, start_configurations
+from skillframe.world.plant import Draws, Kinematics, Plant
+from skillframe.world.rates import ratio
+from skillframe.world.scene import Scene, State
+from skillframe.world.sensors import TARE_TICKS, Sensors, SensorSettings, at_point
+
+__all__ = ["QUANTITIES", "Result", "Setup", "simulate"]
+
+HOLD = Impedance(np.diag([2000.0] * 3 + [100.0] * 3))
+RAMP_S = 0.05
+NULL_SPACE_DAMPING = 10.0  # 1/s; ours: settles the elbow within half a second
+SLOW_TICKS = 10  # null-space projectors and goal checks are refreshed every 10 ms
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setup:
+    """What does not change between the trials of a batch.
+
+    Attributes:
+        robot: the nominal robot.
+        scene: the task.
+        center_of_compliance: (3,) point of the tool frame that the skill sees and steers.
+        sensors: noise of the sensors.
+        filter_wrench: False hands the raw wrench to the skill and the limits.
+        stop_when: ends a trial as done, looked at every 10 ms; None leaves the end to the skill.
+    """
+
+    robot: RobotModel
+    scene: Scene
+    center_of_compliance: Float = field(default_factory=lambda: np.zeros(3))
+    sensors: SensorSettings = field(default_factory=SensorSettings)
+    filter_wrench: bool = True
+    stop_when: Callable[[State], NDArray[np.bool_]] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Result:
+    """What became of N trials; every array has N rows.
+
+    Attributes:
+        success: the scene's goal was reached and no limit was broken.
+        failure: why not, in words; "" for a success.
+        status: of the skill at its end (`Status`).
+        reason: why the trial ended, in words.
+        duration_s: simulated seconds.
+        peak_force_n: largest true contact force.
+        final_error_m, final_error_rad: distance to the goal at the end.
+        energy_j: work of the controller on the tool.
+        traces: one per trial if asked for.
+    """
+
+    success: NDArray[np.bool_]
+    failure: Reasons
+    status: NDArray[np.int64]
+    reason: Reasons
+    duration_s: Float
+    peak_force_n: Float
+    final_error_m: Float
+    final_error_rad: Float
+    energy_j: Float
+    traces: list[Trace] | None = None
+
+
+def simulate(
+    skill: Skill,
+    setup: Setup,
+    draws: Mapping[str, Float],
+    rngs: Sequence[np.random.Generator],
+    *,
+    duration_s: float = 20.0,
+    trace_hz: float | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Result:
+    """Run a skill on len(rngs) trials until each has ended.
+
+    Args:
+        skill: what to run; `start` is called once.
+        setup: robot, scene and settings.
+        draws: quantities of `QUANTITIES` per trial, each (N,); absent ones are nominal.
+        rngs: one generator per trial; sensors and skill draw from children of it.
+        duration_s: simulated seconds after which a trial is stopped.
+        trace_hz: rate of the traces; None keeps none.
+        progress: called every 10 ms of simulated time with the seconds simulated; it may raise to interrupt.
+
+    Raises:
+        UnknownName: a quantity that nothing reads.
+        UnreachablePose: the robot cannot reach a start.
+        SkillframeError: rates that do not divide.
+    """
+    check_quantities(draws)
+    loop = _Loop(skill, setup, draws, rngs, trace_hz)
+    loop.tare()
+    loop.run(duration_s, progress)
+    return loop.result()
+
+
+class _Loop:
+    """The state of one batch while it runs."""
+
+    def __init__(
+        self, skill: Skill, setup: Setup, draws: Draws, rngs: Sequence[np.random.Generator], trace_hz: float | None
+    ) -> None:
+        robot, scene, count = setup.robot, setup.scene, len(rngs)
+        self.skill, self.setup, self.count = skill, setup, count
+        rate = robot.spec.control.rate_hz
+        self.dt = 1.0 / rate
+        children = [rng.spawn(2) for rng in rngs]
+        self.skill_rngs = [pair[1] for pair in children]
+        fixture = fixture_poses(robot, draws, count)
+        self.plant = Plant(robot, scene, count, fixture, draws, timestep=self.dt)
+        varied = any(key.startswith("grasp.") or key == "robot.mass_scale" for key in draws)
+        self.nominal = Plant(robot, scene, count, fixture, {}, timestep=self.dt) if varied else self.plant
+        self.plant.reset(start_configurations(robot, scene, draws, count))
+        self.sensors = Sensors(setup.sensors, self.plant, [pair[0] for pair in children], draws)
+        self.filter = SteadyWrenchFilter.standard(setup.sensors.force_noise, setup.sensors.torque_noise, self.dt)
+        self.guard = LimitGuard(robot.spec.limits, count, self.dt)
+        self.coc = np.asarray(setup.center_of_compliance, dtype=float)
+        self.active = np.arange(count)
+        self.reason, self.status = no_reasons(count), np.zeros(count, dtype=np.int64)
+        self.limited = np.zeros(count, dtype=bool)
+        self.duration, self.peak = np.zeros(count), np.zeros(count)
+        self.goal, self.errors, self.energy = np.zeros(count, dtype=bool), np.zeros((count, 2)), np.zeros(count)
+        self.recorder = (
+            None if trace_hz is None else Recorder(count, ratio(rate, trace_hz, "control", "the trace"), self.plant)
+        )
+        self._stiffness: Float | None = None
+        self._damping: Float = np.zeros((count, 6, 6))
+        self._projector: Float | None = None
+        self._slow = 0
+
+    def tare(self) -> None:
+        """Hold still before the start, let the readings settle, and take their mean as the sensor's bias."""
+        kinematics = self._kinematics()
+        hold = Pose(kinematics.pose.position.copy(), kinematics.pose.rotation.copy()).at(self.coc)
+        command = Command(
+            hold, np.zeros((self.count, 6)), HOLD, np.zeros((self.count, 6)), self.status, no_reasons(self.count)
+        )
+        total = np.zeros((self.count, 6))
+        for _ in range(TARE_TICKS):
+            kinematics = self._kinematics()
+            pose, wrench = self.sensors.sample(kinematics.pose)
+            total += wrench
+            torque, _ = self._torque(command, kinematics, pose.at(self.coc), 1.0)
+            self.plant.step(torque, self.active)
+        self.sensors.set_tare(total / TARE_TICKS, self._kinematics().pose.rotation)
+
+    def run(self, duration_s: float, progress: Callable[[float], None] | None) -> None:
+        """Tick until every trial has ended or the time is up."""
+        ticks = round(duration_s / self.dt)
+        for tick in range(ticks):
+            self._tick(tick)
+            if not len(self.active):
+                break
+            if progress is not None and tick % SLOW_TICKS == 0:
+                progress(tick * self.dt)
+        if len(self.active):
+            self._end(self.active, ticks * self.dt, f"time limit: {duration_s:g} s of simulated time are over", False)
+
+    def _tick(self, tick: int) -> None:
+        time = tick * self.dt
+        kinematics = self._kinematics()
+        tool, raw = self.sensors.sample(kinematics.pose)
+        wrench = at_point(self._filtered(raw, tick), tool.rotation, self.coc)
+        measured = tool.at(self.coc)
+        twist = (kinematics.jacobian @ kinematics.velocity[..., None])[..., 0]
+        observation = Observation(np.full(self.count, time), self.dt, measured, twist, wrench)
+        if tick == 0:
+            self.skill.start(observation, self.skill_rngs)
+        command = self.skill.step(observation)
+        torque, law = self._torque(command, kinematics, measured, min(1.0, time / RAMP_S), twist)
+        contact = self.plant.contact_wrench(self.coc)
+        self.peak[self.active] = np.maximum(self.peak, norm(contact[:, :3]))[self.active]
+        if self.recorder is not None:
+            self.recorder.record(tick, time, observation, command, law, contact)
+        self._stop_where_due(tick, time, observation, command, tool.position, law)
+        if len(self.active):
+            self.plant.step(torque, self.active)
+
+    def _filtered(self, raw: Float, tick: int) -> Float:
+        if not self.setup.filter_wrench:
+            return raw
+        if tick == 0:
+            self.filter.start(raw * 0.0)
+        return self.filter.step(raw)
+
+    def _kinematics(self) -> Kinematics:
+        if self.nominal is not self.plant:
+            qpos, qvel = self.plant.state
+            self.nominal.set_state(qpos, qvel, self.active)
+        return self.nominal.kinematics(self.coc)
+
+    def _torque(
+        self, command: Command, kinematics: Kinematics, measured: Pose, ramp: float, twist: Float | None = None
+    ) -> tuple[Float, Float]:
+        """Generalised forces (N, nv) of the law, and its wrench (N, 6) at the centre of compliance."""
+        if twist is None:
+            twist = (kinematics.jacobian @ kinematics.velocity[..., None])[..., 0]
+        damping = self._damping_for(command.impedance, kinematics)
+        law = impedance_wrench(
+            command.pose, measured, ramp * command.twist - twist, command.impedance.stiffness, damping,
+            ramp * command.feedforward,
+        )  # fmt: skip
+        torque = (np.swapaxes(kinematics.jacobian, -1, -2) @ law[..., None])[..., 0] + kinematics.bias
+        return self.guard.rate_limited(torque + self._null_space(kinematics)), law
+
+    def _damping_for(self, impedance: Impedance, kinematics: Kinematics) -> Float:
+        """The skill's damping, or critical damping designed anew for the rows whose stiffness has changed."""
+        if impedance.damping is not None:
+            return impedance.damping
+        if impedance.stiffness is self._stiffness:
+            return self._damping
+        now = np.broadcast_to(impedance.stiffness, (self.count, 6, 6))
+        if self._stiffness is None:
+            changed = np.ones(self.count, dtype=bool)
+        else:
+            changed = (now != np.broadcast_to(self._stiffness, now.shape)).any(axis=(-1, -2))
+        if changed.any():
+            inertia = task_inertia(kinematics.jacobian[changed], self.nominal.mass_matrix()[changed])
+            self._damping = self._damping.copy()
+            self._damping[changed] = critical_damping(now[changed], inertia)
+        self._stiffness = impedance.stiffness
+        return self._damping
+
+    def _null_space(self, kinematics: Kinematics) -> Float | float:
+        if self.plant.model.nv <= 6:
+            return 0.0
+        self._slow -= 1
+        if self._slow < 0:
+            self._projector = null_space_damping(kinematics.jacobian, self.nominal.mass_matrix(), NULL_SPACE_DAMPING)
+            self._slow = SLOW_TICKS - 1
+        assert self._projector is not None
+        result: Float = (self._projector @ kinematics.velocity[..., None])[..., 0]
+        return result
+
+    def _stop_where_due(
+        self, tick: int, time: float, observation: Observation, command: Command, position: Float, law: Float
+    ) -> None:
+        reasons = no_reasons(self.count)
+        self.guard.violations(observation.time, position, observation.twist, observation.wrench, law, reasons)
+        broken = self.active[reasons[self.active] != ""]
+        for i in broken:
+            self._end(np.array([i]), time, str(reasons[i]), True)
+        ended = self.active[command.status[self.active] != Status.RUNNING]
+        for i in ended:
+            self.status[i] = command.status[i]
+            self._end(np.array([i]), time, str(command.reason[i]) or "the skill ended", False)
+        if self.setup.stop_when is not None and tick % SLOW_TICKS == 0 and len(self.active):
+            done = self.setup.stop_when(self.plant.tip_state())
+            rows = self.active[done[self.active]]
+            self.status[rows] = Status.SUCCESS
+            self._end(rows, time, "done", False)
+
+    def _end(self, rows: NDArray[np.int64], time: float, reason: str, limit: bool) -> None:
+        """Close trials: judge them by the scene's goal as they stand now, and stop stepping them."""
+        if not len(rows):
+            return
+        state = self.plant.tip_state()
+        self.goal[rows] = self.setup.scene.goal(state)[rows]
+        self.errors[rows] = np.stack(self.setup.scene.goal_error(state), axis=-1)[rows]
+        self.energy[rows] = self.guard.energy[rows]
+        self.duration[rows], self.limited[rows] = time, limit
+        if limit:
+            self.status[rows] = Status.FAILURE
+        for i in rows:
+            self.reason[i] = reason
+        self.active = np.setdiff1d(self.active, rows)
+        if self.recorder is not None:
+            self.recorder.close(rows)
+
+    def result(self) -> Result:
+        """The outcome of every trial."""
+        success = self.goal & ~self.limited & (self.status != Status.FAILURE)
+        failure = no_reasons(self.count)
+        for i in np.flatnonzero(~success):
+            failure[i] = self.reason[i] if self.limited[i] else f"goal not reached: {self.reason[i]}"
+        traces = None
+        if self.recorder is not None:
+            traces = [
+                self.recorder.trace(i, self._meta(i, bool(success[i]), str(failure[i]))) for i in range(self.count)
+            ]
+        return Result(
+            success=success, failure=failure, status=self.status, reason=self.reason, duration_s=self.duration,
+            peak_force_n=self.peak, final_error_m=self.errors[:, 0], final_error_rad=self.errors[:, 1],
+            energy_j=self.energy, traces=traces,
+        )  # fmt: skip
+
+    def _meta(self, i: int, success: bool, failure: str) -> dict[str, object]:
+        scene = self.setup.scene
+        return {
+            "robot": self.setup.robot.spec.name, "world": scene.name, "params": scene.params,
+            "center_of_compliance": self.coc.tolist(), "frames": {k: list(v) for k, v in scene.tool.frames.items()},
+            "hand": scene.tool.hand, "success": success, "failure": failure, "reason": str(self.reason[i]),
+            "status": Status(int(self.status[i])).name, "duration_s": float(self.duration[i]),
+            "peak_force_n": float(self.peak[i]), "final_error_m": float(self.errors[i, 0]),
+            "final_error_rad": float(self.errors[i, 1]), "analytic": scene.analytic,
+        }  # fmt: skip

@@ -1,0 +1,81 @@
+"""Records a running batch into preallocated arrays of bounded size, and gives one `Trace` per trial.
+
+When the arrays are full, every other sample is dropped and the rate is halved, so that an hour-long run keeps a bounded
+trace of the whole run instead of growing without end.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.frames import Float, quaternion_from_matrix
+from skillframe.skill import Command, Observation
+from skillframe.trace import COLUMNS, Trace
+from skillframe.world.drawing import drawn_bodies
+from skillframe.world.plant import Plant
+
+CAPACITY = 20_000
+
+
+class Recorder:
+    """Columns over time for N trials; `every` is the number of control ticks per sample."""
+
+    def __init__(self, count: int, every: int, plant: Plant, capacity: int = CAPACITY) -> None:
+        self._plant, self._every, self._capacity = plant, every, capacity
+        positions, _ = plant.body_poses()
+        shapes: dict[str, tuple[int, ...]] = {
+            **COLUMNS, "q": (plant.configuration.shape[1],), "body_position": positions.shape[1:],
+            "body_quaternion": (positions.shape[1], 4),
+        }  # fmt: skip
+        self._data = {name: np.zeros((min(capacity, 1000), count, *shape)) for name, shape in shapes.items()}
+        self._length = 0
+        self._stop = np.full(count, -1.0)
+        self._time = 0.0
+
+    def record(
+        self, tick: int, time: float, observation: Observation, command: Command, law: Float, contact: Float
+    ) -> None:
+        """Take a sample if one is due at this tick."""
+        self._time = time
+        if tick % self._every:
+            return
+        if self._length == len(self._data["time"]):
+            self._make_room()
+        positions, quaternions = self._plant.body_poses()
+        sample: dict[str, Any] = {
+            "time": observation.time, "position": observation.pose.position, "twist": observation.twist,
+            "quaternion": quaternion_from_matrix(observation.pose.rotation), "wrench": observation.wrench,
+            "wrench_true": contact, "desired_position": command.pose.position,
+            "desired_quaternion": quaternion_from_matrix(command.pose.rotation), "command_wrench": law,
+            "q": self._plant.configuration, "body_position": positions, "body_quaternion": quaternions,
+        }  # fmt: skip
+        for name, value in sample.items():
+            self._data[name][self._length] = value
+        self._length += 1
+
+    def _make_room(self) -> None:
+        if self._length < self._capacity:
+            for name, array in self._data.items():
+                grown = np.zeros((min(2 * self._length, self._capacity), *array.shape[1:]))
+                grown[: self._length] = array
+                self._data[name] = grown
+            return
+        kept = (self._length + 1) // 2
+        for array in self._data.values():
+            array[:kept] = array[: self._length : 2]
+        self._length, self._every = kept, 2 * self._every
+
+    def close(self, rows: NDArray[np.int64]) -> None:
+        """Mark trials as ended now; their later rows are not part of their trace."""
+        self._stop[rows] = self._time
+
+    def trace(self, i: int, meta: dict[str, Any]) -> Trace:
+        """The trace of trial i."""
+        length = self._length
+        if self._stop[i] >= 0.0:
+            length = int(np.searchsorted(self._data["time"][: self._length, i], self._stop[i], side="right"))
+        arrays = {name: array[:length, i].copy() for name, array in self._data.items()}
+        return Trace(**arrays, meta={**meta, "bodies": drawn_bodies(self._plant)})

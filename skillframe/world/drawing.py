@@ -1,0 +1,37 @@
+"""A scene's bodies as plain JSON values, so that a trace can be drawn without the world that made it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from skillframe.world.convert import FIXTURE, TOOL
+from skillframe.world.plant import Plant
+from skillframe.world.scene import Geom
+from skillframe.world.visuals import link_geoms
+
+
+def drawn_bodies(plant: Plant) -> list[dict[str, Any]]:
+    """Name and geoms of every body of the plant but the world, in the order of `Plant.body_poses`."""
+    links = link_geoms(plant.robot)
+    bodies = []
+    for body in range(1, plant.model.nbody):
+        name = mujoco.mj_id2name(plant.model, mujoco.mjtObj.mjOBJ_BODY, body)
+        geoms = {FIXTURE: plant.scene.fixture, TOOL: plant.scene.tool.geoms}.get(name, links.get(name, ()))
+        bodies.append({"name": name, "geoms": [geom_json(g) for g in geoms if g.visible]})
+    return bodies
+
+
+def geom_json(geom: Geom) -> dict[str, Any]:
+    """One geom as plain values; lengths rounded to a micrometre."""
+    result: dict[str, Any] = {
+        "kind": geom.kind, "size": [round(float(s), 6) for s in geom.size],
+        "position": [round(float(p), 6) for p in geom.position],
+        "quaternion": [round(float(q), 8) for q in geom.quaternion], "rgba": list(geom.rgba),
+    }  # fmt: skip
+    if geom.vertices is not None and geom.faces is not None:
+        result["vertices"] = np.round(geom.vertices, 6).tolist()
+        result["faces"] = np.asarray(geom.faces).tolist()
+    return result

@@ -1,0 +1,78 @@
+"""Where a trial starts: the fixture's true pose, and the robot's configuration for a start relative to the nominal one.
+
+The robot is told where the fixture is *nominally*. `fixture.*` moves the true fixture, so it is an error the skill does
+not know of; `start.*` moves the start of the tip, in the nominal fixture's axes (tilts turn about the tip).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from skillframe.errors import UnknownName
+from skillframe.frames import Float, Pose, matrix_from_quaternion
+from skillframe.robot.kinematics import inverse_kinematics
+from skillframe.robot.model import RobotModel
+from skillframe.world.plant import displacement
+from skillframe.world.scene import Scene
+
+_VECTORS = [f"{p}.{k}_{a}" for p in ("start", "fixture", "grasp") for k in ("offset", "tilt") for a in "xyz"]
+_SENSOR = [f"sensor.{k}_bias_{a}" for k in ("force", "torque") for a in "xyz"]
+QUANTITIES = frozenset(
+    [*_VECTORS, *_SENSOR, "sensor.force_noise", "sensor.torque_noise", "robot.mass_scale", "robot.joint_friction",
+     "world.friction"]
+)  # fmt: skip
+"""What can differ between the trials of one batch; other `world.*` parameters need a scene of their own."""
+
+
+def check_quantities(draws: Mapping[str, Float]) -> None:
+    """Refuse a quantity that nothing reads.
+
+    Raises:
+        UnknownName: with the nearest name.
+    """
+    for key in draws:
+        if key not in QUANTITIES:
+            raise UnknownName("quantity", key, QUANTITIES)
+
+
+def nominal_fixture(robot: RobotModel) -> Pose:
+    """Where the fixture stands for this robot: position (3,), upright."""
+    return Pose(np.array(robot.spec.workspace.fixture, dtype=float), np.eye(3))
+
+
+def fixture_poses(robot: RobotModel, draws: Mapping[str, Float], count: int) -> Pose:
+    """True pose of the fixture in base for each trial."""
+    nominal = nominal_fixture(robot)
+    moved = displacement(draws, "fixture", count)
+    if moved is None:
+        moved = Pose(np.zeros((count, 3)), np.broadcast_to(np.eye(3), (count, 3, 3)))
+    return nominal.compose(moved)
+
+
+def start_poses(robot: RobotModel, scene: Scene, draws: Mapping[str, Float], count: int) -> Pose:
+    """Pose of the tool frame at the start of each trial, in base."""
+    zero = np.zeros(count)
+    offset = np.stack([np.asarray(draws.get(f"start.offset_{a}", zero)) for a in "xyz"], axis=-1)
+    tilt = np.stack([np.asarray(draws.get(f"start.tilt_{a}", zero)) for a in "xyz"], axis=-1)
+    moved = displacement({f"start.tilt_{a}": tilt[:, i] for i, a in enumerate("xyz")}, "start", count)
+    assert moved is not None
+    tip = np.array(scene.start_tip) + offset
+    tip[:, 2] += scene.start_lift(offset, tilt)
+    attitude = moved.rotation @ matrix_from_quaternion(scene.start_quaternion)
+    in_fixture = Pose(tip, attitude).at(-np.array(scene.tool.frames["tip"]))
+    return nominal_fixture(robot).compose(in_fixture)
+
+
+def start_configurations(robot: RobotModel, scene: Scene, draws: Mapping[str, Float], count: int) -> Float:
+    """Configurations (N, nq) that put the tool frame at its start poses.
+
+    Raises:
+        UnreachablePose: the robot cannot get there.
+    """
+    poses = start_poses(robot, scene, draws, count)
+    solutions = [
+        inverse_kinematics(robot, 0, Pose(poses.position[i], poses.rotation[i]), robot.home) for i in range(count)
+    ]
+    return np.stack(solutions)

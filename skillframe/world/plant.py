@@ -1,0 +1,286 @@
+"""The simulated robot in its world: N trials in lock-step on one persistent MuJoCo batch.
+
+The plant is the truth: it may differ from the controller's model in mass, friction, grasp and fixture pose, trial by
+trial. After each step its position- and velocity-dependent fields are current, so the kinematics that the controller
+needs are read, not recomputed. Results are bit-identical for any number of trials in the batch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import mujoco
+import mujoco.batch
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.frames import Float, Pose, move_wrench, quaternion_from_matrix, rotate, rotation_matrix
+from skillframe.robot.model import RobotModel
+from skillframe.world.convert import FIXTURE, SENSOR, TIMESTEP, TOOL, build_spec
+from skillframe.world.scene import Scene, State
+
+Draws = Mapping[str, Float]
+
+
+class Kinematics(NamedTuple):
+    """What the controller reads of a robot at a tick.
+
+    Attributes:
+        pose: of the tool frame in base.
+        jacobian: (N, 6, nv) of a point, base axes, linear part first.
+        bias: (N, nv) gravity, Coriolis and centrifugal generalised forces.
+        velocity: (N, nv).
+    """
+
+    pose: Pose
+    jacobian: Float
+    bias: Float
+    velocity: Float
+
+
+class Plant:
+    """N copies of one robot in one scene.
+
+    Args:
+        robot: nominal robot, without the tool.
+        scene: the task.
+        count: number of trials N.
+        fixture: pose of the fixture in base per trial: (N, 3), (N, 3, 3).
+        draws: quantities that differ from nominal: `grasp.*`, `robot.*` and `world.friction`, each (N,).
+    """
+
+    def __init__(
+        self, robot: RobotModel, scene: Scene, count: int, fixture: Pose, draws: Draws, timestep: float = TIMESTEP
+    ) -> None:
+        self.robot, self.scene, self.count = robot, scene, count
+        self.model = build_spec(robot, scene, timestep).compile()
+        self.batch = mujoco.batch.Batch(self.model, count, nthread=1, persistent=True)
+        self._layout = Layout(self.model)
+        self._fixture = fixture
+        self._apply(draws)
+        self._bind()
+
+    def _bind(self) -> None:
+        bind = self.batch.bind
+        self._qpos, self._qvel, self._applied = bind("qpos"), bind("qvel"), bind("qfrc_applied")
+        self._xpos, self._xmat, self._xquat = bind("xpos"), bind("xmat"), bind("xquat")
+        self._anchor, self._axis, self._bias = bind("xanchor"), bind("xaxis"), bind("qfrc_bias")
+        self._sensor, self._external, self._com = bind("sensordata"), bind("cfrc_ext"), bind("subtree_com")
+        self._mocap_pos, self._mocap_quat, self._mass = bind("mocap_pos"), bind("mocap_quat"), bind("M")
+
+    def _apply(self, draws: Draws) -> None:
+        if "world.friction" in draws:
+            friction = self.batch.expand("geom_friction")
+            friction[:, :, 0] = draws["world.friction"][:, None]
+        if "robot.joint_friction" in draws:
+            self.batch.expand("dof_frictionloss")[:] = draws["robot.joint_friction"][:, None]
+        grasp = grasp_pose(draws, self.count)
+        inertial = False
+        if grasp is not None:
+            self.batch.expand("body_pos")[:, self._layout.tool] = grasp.position
+            q = quaternion_from_matrix(grasp.rotation)
+            self.batch.expand("body_quat")[:, self._layout.tool] = q[:, [3, 0, 1, 2]]
+            inertial = True
+        if "robot.mass_scale" in draws:
+            scale = draws["robot.mass_scale"][:, None]
+            links = self._layout.links
+            self.batch.expand("body_mass")[:, links] *= scale
+            self.batch.expand("body_inertia")[:, links] *= scale[..., None]
+            inertial = True
+        if inertial:
+            self.batch.set_const()
+
+    def reset(self, configuration: Float) -> None:
+        """Put the robot at rest at configurations (N, nq), in Pinocchio's order, and the fixture at its pose."""
+        self.batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
+        self._mocap_pos[:, 0] = self._fixture.position
+        self._mocap_quat[:, 0] = quaternion_from_matrix(self._fixture.rotation)[:, [3, 0, 1, 2]]
+        self._qpos[:] = self._layout.to_mujoco(self.robot.model, configuration)
+        self._qvel[:] = 0.0
+        self._applied[:] = 0.0
+        self.batch.forward()
+
+    def set_state(self, qpos: Float, qvel: Float, ids: NDArray[np.int64]) -> None:
+        """Copy another plant's state and bring kinematics and velocities up to date."""
+        self._qpos[:], self._qvel[:] = qpos, qvel
+        self.batch.forward(ids=ids, stage=mujoco.mjtStage.mjSTAGE_VEL)
+
+    @property
+    def state(self) -> tuple[Float, Float]:
+        """Generalised positions and velocities in MuJoCo's order, live views."""
+        return self._qpos, self._qvel
+
+    @property
+    def configuration(self) -> Float:
+        """(N, nq) in Pinocchio's order."""
+        return self._layout.to_pinocchio(self.robot.model, self._qpos)
+
+    def step(self, torque: Float, ids: NDArray[np.int64]) -> None:
+        """Advance some trials by one time step under generalised forces (N, nv) in MuJoCo's order."""
+        self._applied[:] = torque
+        self.batch.step(ids=ids, stage=mujoco.mjtStage.mjSTAGE_VEL)
+
+    def tool_pose(self) -> Pose:
+        """Pose of the robot's tool frame (where the sensor sits) in base."""
+        i = self._layout.sensor
+        return Pose(self._xpos[:, i], self._xmat[:, i].reshape(-1, 3, 3))
+
+    def kinematics(self, offset: Float) -> Kinematics:
+        """Kinematics with the Jacobian of a point fixed in the tool frame, `offset` (3,) or (N, 3)."""
+        pose = self.tool_pose()
+        point = pose.position + rotate(pose.rotation, offset)
+        jacobian = self._layout.jacobian(self._anchor, self._axis, self._xmat, point)
+        return Kinematics(pose, jacobian, self._bias, self._qvel)
+
+    def mass_matrix(self) -> Float:
+        """Dense mass matrices (N, nv, nv), MuJoCo's order."""
+        return self._layout.dense(self._mass)
+
+    def sensor_wrench(self) -> Float:
+        """What the force-torque sensor reads without noise and bias, as the wrench on the tool, tool axes (N, 6).
+
+        It holds contact, tool weight and the tool's inertial forces; the reading is that of the step just taken.
+        """
+        return -self._sensor
+
+    def contact_wrench(self, offset: Float) -> Float:
+        """True wrench (N, 6) of the environment on the tool at a point of the tool frame, base axes."""
+        raw = self._external[:, self._layout.tool]
+        at_com = np.concatenate([raw[:, 3:], raw[:, :3]], axis=-1)
+        pose = self.tool_pose()
+        point = pose.position + rotate(pose.rotation, offset)
+        return move_wrench(at_com, point - self._com[:, self._layout.root])
+
+    def tip_state(self) -> State:
+        """The tool's tip seen from the true fixture, for goals."""
+        i = self._layout.tool
+        held = Pose(self._xpos[:, i], self._xmat[:, i].reshape(-1, 3, 3))
+        tip = np.array(self.scene.tool.frames["tip"])
+        in_base = held.at(tip)
+        in_fixture = self._fixture.inverse().compose(in_base)
+        pose = self.tool_pose()
+        offset = rotate(np.swapaxes(pose.rotation, -1, -2), in_base.position - pose.position)
+        wrench = self.contact_wrench(offset)
+        back = np.swapaxes(self._fixture.rotation, -1, -2)
+        turned = np.concatenate([rotate(back, wrench[:, :3]), rotate(back, wrench[:, 3:])], axis=-1)
+        return State(in_fixture, turned)
+
+    def body_poses(self) -> tuple[Float, Float]:
+        """Positions (N, B, 3) and quaternions x, y, z, w (N, B, 4) of the drawn bodies: all but the world."""
+        return self._xpos[:, 1:], self._xquat[:, 1:][..., [1, 2, 3, 0]]
+
+
+def grasp_pose(draws: Draws, count: int) -> Pose | None:
+    """Pose of the tool in the grip for `grasp.offset_*` [m] and `grasp.tilt_*` [rad] (about the wrist), or None."""
+    return displacement(draws, "grasp", count)
+
+
+def displacement(draws: Draws, prefix: str, count: int) -> Pose | None:
+    """A pose from `<prefix>.offset_x|y|z` and the rotation vector `<prefix>.tilt_x|y|z`; None if none is drawn."""
+    if not any(key.startswith((f"{prefix}.offset_", f"{prefix}.tilt_")) for key in draws):
+        return None
+
+    def vector(kind: str) -> Float:
+        zero = np.zeros(count)
+        return np.stack([np.asarray(draws.get(f"{prefix}.{kind}_{axis}", zero)) for axis in "xyz"], axis=-1)
+
+    return Pose(vector("offset"), rotation_matrix(vector("tilt")))
+
+
+class Layout:
+    """Where things lie in the compiled model: body ids, joint addresses, the order of coordinates."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self.model = model
+        self.sensor, self.tool = (model.body(name).id for name in (SENSOR, TOOL))
+        self.root = int(model.body_rootid[self.tool])
+        fixed = {0, model.body(FIXTURE).id, self.tool, self.sensor}
+        self.links = np.array([b for b in range(model.nbody) if b not in fixed])
+        self.free = bool(model.njnt and model.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE)
+        self._set_chain(model)
+        self._rows, self._columns = _sparse_indices(model)
+
+    def _set_chain(self, model: mujoco.MjModel) -> None:
+        ancestors, body = set(), self.sensor
+        while body:
+            ancestors.add(body)
+            body = int(model.body_parentid[body])
+        joints = [j for j in range(model.njnt) if int(model.jnt_bodyid[j]) in ancestors]
+        hinge, slide = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
+        self.hinges = np.array([j for j in joints if model.jnt_type[j] == hinge], dtype=int)
+        self.slides = np.array([j for j in joints if model.jnt_type[j] == slide], dtype=int)
+        self.hinge_dofs, self.slide_dofs = model.jnt_dofadr[self.hinges], model.jnt_dofadr[self.slides]
+
+    def jacobian(self, anchor: Float, axis: Float, xmat: Float, point: Float) -> Float:
+        """(N, 6, nv): for a hinge [a x (p - anchor); a], for a slide [a; 0], for a free base [1, -[r]x R; 0, R]."""
+        jacobian = np.zeros((len(point), 6, self.model.nv))
+        if len(self.hinges):
+            a = axis[:, self.hinges]
+            r = point[:, None] - anchor[:, self.hinges]
+            jacobian[:, 0, self.hinge_dofs] = a[..., 1] * r[..., 2] - a[..., 2] * r[..., 1]
+            jacobian[:, 1, self.hinge_dofs] = a[..., 2] * r[..., 0] - a[..., 0] * r[..., 2]
+            jacobian[:, 2, self.hinge_dofs] = a[..., 0] * r[..., 1] - a[..., 1] * r[..., 0]
+            jacobian[:, 3:, self.hinge_dofs] = np.swapaxes(a, 1, 2)
+        if len(self.slides):
+            jacobian[:, :3, self.slide_dofs] = np.swapaxes(axis[:, self.slides], 1, 2)
+        if self.free:
+            body = int(self.model.jnt_bodyid[0])
+            rotation = xmat[:, body].reshape(-1, 3, 3)
+            r = point - anchor[:, 0]
+            jacobian[:, [0, 1, 2], [0, 1, 2]] = 1.0
+            jacobian[:, 3:, 3:6] = rotation
+            jacobian[:, :3, 3:6] = np.stack(
+                [
+                    rotation[:, 1] * r[:, 2:] - rotation[:, 2] * r[:, 1:2],
+                    rotation[:, 2] * r[:, :1] - rotation[:, 0] * r[:, 2:],
+                    rotation[:, 0] * r[:, 1:2] - rotation[:, 1] * r[:, :1],
+                ],
+                axis=1,
+            )
+        return jacobian
+
+    def dense(self, sparse: Float) -> Float:
+        """Symmetric matrices (N, nv, nv) from MuJoCo's row-compressed lower triangles."""
+        nv = self.model.nv
+        result = np.zeros((len(sparse), nv, nv))
+        result[:, self._rows, self._columns] = sparse
+        result[:, self._columns, self._rows] = sparse
+        return result
+
+    def to_mujoco(self, model: Any, configuration: Float) -> Float:
+        """Pinocchio's configuration (N, nq) in MuJoCo's order: quaternions w first, continuous joints as angles."""
+        qpos = np.zeros((len(configuration), self.model.nq))
+        for index in range(1, model.njoints):
+            joint, start = model.joints[index], model.joints[index].idx_q
+            address = int(self.model.joint(model.names[index]).qposadr[0])
+            if joint.nq == 7:
+                qpos[:, address : address + 7] = configuration[:, start + np.array([0, 1, 2, 6, 3, 4, 5])]
+            elif joint.nq == 2:
+                qpos[:, address] = np.arctan2(configuration[:, start + 1], configuration[:, start])
+            else:
+                qpos[:, address] = configuration[:, start]
+        return qpos
+
+    def to_pinocchio(self, model: Any, qpos: Float) -> Float:
+        """The inverse of `to_mujoco`."""
+        configuration = np.zeros((len(qpos), model.nq))
+        for index in range(1, model.njoints):
+            joint, start = model.joints[index], model.joints[index].idx_q
+            address = int(self.model.joint(model.names[index]).qposadr[0])
+            if joint.nq == 7:
+                configuration[:, start : start + 7] = qpos[:, address + np.array([0, 1, 2, 4, 5, 6, 3])]
+            elif joint.nq == 2:
+                angle = qpos[:, address]
+                configuration[:, start], configuration[:, start + 1] = np.cos(angle), np.sin(angle)
+            else:
+                configuration[:, start] = qpos[:, address]
+        return configuration
+
+
+def _sparse_indices(model: mujoco.MjModel) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    rows = np.repeat(np.arange(model.nv), model.M_rownnz)
+    columns = np.concatenate(
+        [model.M_colind[a : a + n] for a, n in zip(model.M_rowadr, model.M_rownnz, strict=True)] or [np.zeros(0, int)]
+    )
+    return rows.astype(np.int64), columns.astype(np.int64)

@@ -1,0 +1,64 @@
+"""`edge`: a table's edge to lever a rod on (seed, Fig. 7); turning the rod moves the wrist by contact alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from skillframe.frames import Float
+from skillframe.world.scene import Geom, Scene, State, Task
+from skillframe.world.shapes import FIXTURE_COLOUR, TOOL_COLOUR, quaternion_about
+from skillframe.world.worlds.common import WRIST_TO_TIP, require, tool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EdgeParams:
+    """Parameters of `edge`.
+
+    Attributes:
+        friction: Coulomb coefficient.
+        radius: of the rod [m].
+        tilt: attitude of the rod at the start, tip up from the horizontal [rad].
+        lever: distance along the rod from the wrist to the point on the edge [m].
+    """
+
+    friction: float = 0.2
+    radius: float = 0.008
+    tilt: float = 0.7853981633974483
+    lever: float = 0.11
+
+
+def build(params: EdgeParams) -> Scene:
+    """A table that fills x < 0, z < 0; its edge is the y axis. The wrist is at x > 0, below; the tip points up over it.
+
+    The rod is turned down about +y until it lies level on the edge.
+    """
+    require(
+        "edge",
+        {
+            "0.2 < tilt < 1.3 rad": 0.2 < params.tilt < 1.3,
+            "0.03 < lever < 0.18 m": 0.03 < params.lever < 0.18,
+            "radius > 0 and friction >= 0": params.radius > 0.0 and params.friction >= 0.0,
+        },
+    )
+    table = Geom(kind="box", size=(0.1, 0.1, 0.02), position=(-0.1, 0.0, -0.02), rgba=FIXTURE_COLOUR)
+    rod = Geom(
+        kind="capsule", size=(params.radius, 0.5 * WRIST_TO_TIP - 0.5 * params.radius), rgba=TOOL_COLOUR,
+        position=(0.0, 0.0, 0.5 * WRIST_TO_TIP - 0.5 * params.radius),
+    )  # fmt: skip
+    along = np.array([-np.cos(params.tilt), 0.0, np.sin(params.tilt)])  # from wrist to tip
+    up = np.array([np.sin(params.tilt), 0.0, np.cos(params.tilt)])
+    tip = (WRIST_TO_TIP - params.lever) * along + (params.radius + 0.0005) * up
+
+    def level(state: State) -> Float:
+        return np.arcsin(np.clip(state.tip.rotation[..., 2, 2], -1.0, 1.0))
+
+    return Scene(
+        name="edge", fixture=(table,), tool=tool((rod,)), friction=params.friction,
+        start_tip=(float(tip[0]), 0.0, float(tip[2])),
+        start_quaternion=quaternion_about("y", params.tilt - 0.5 * np.pi),
+        goal=lambda state: np.abs(level(state)) < np.deg2rad(10.0),
+        goal_error=lambda state: (np.zeros(len(state.tip.position)), np.abs(level(state))),
+        task=Task(direction=None, turn=(0.0, -1.0, 0.0), hand="lever"),
+    )  # fmt: skip

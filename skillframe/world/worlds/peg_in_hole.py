@@ -1,0 +1,78 @@
+"""`peg_in_hole`: a filleted peg and a blind hole with 0.25 mm of play (seed, Fig. 15; [6], section IV).
+
+Published: peg radius 16.5 mm, length 80 mm, rounded tip, hole radius 0.25 mm more. Ours: a fillet of 5 mm (the paper
+gives none; it, not the play, decides what tilt is caught), 48 segments, a hole 60 mm deep of 32 boxes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from skillframe.frames import Float, norm
+from skillframe.world.scene import Scene, State, Task
+from skillframe.world.shapes import filleted_peg, hole, shaft
+from skillframe.world.worlds.common import TOOL_DOWN, WRIST_TO_TIP, require, tilt_lift, tilt_of, tool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PegParams:
+    """Parameters of `peg_in_hole`.
+
+    Attributes:
+        radius: of the peg [m].
+        clearance: hole radius minus peg radius [m].
+        length: of the peg [m].
+        depth: of the hole [m].
+        fillet: radius of the peg's rounded edge [m].
+        friction: Coulomb coefficient.
+        segments: of the peg's mesh around.
+        boxes: of the hole's ring.
+        done_depth: depth of the tip that counts as inserted [m].
+    """
+
+    radius: float = 0.0165
+    clearance: float = 0.00025
+    length: float = 0.080
+    depth: float = 0.060
+    fillet: float = 0.005
+    friction: float = 0.2
+    segments: int = 48
+    boxes: int = 32
+    done_depth: float = 0.058
+
+
+def build(params: PegParams) -> Scene:
+    """The hole opens upwards at the fixture's origin; the goal is the tip below `done_depth`."""
+    require(
+        "peg_in_hole",
+        {
+            "clearance > 0": params.clearance > 0.0,
+            "0 < fillet < radius": 0.0 < params.fillet < params.radius,
+            "fillet < length": params.fillet < params.length,
+            "0 < done_depth <= depth": 0.0 < params.done_depth <= params.depth,
+            "friction >= 0": params.friction >= 0.0,
+            "8 to 256 segments and boxes": 8 <= params.segments <= 256 and 8 <= params.boxes <= 256,
+        },
+    )
+    peg = filleted_peg(params.radius, params.length, params.fillet, params.segments, WRIST_TO_TIP)
+
+    def distance(state: State) -> Float:
+        return norm(state.tip.position - np.array([0.0, 0.0, -params.depth]))
+
+    return Scene(
+        name="peg_in_hole",
+        fixture=hole(params.radius + params.clearance, params.depth, params.boxes, wall=0.025),
+        tool=tool((peg, shaft(0.012, 0.012, WRIST_TO_TIP - params.length))),
+        friction=params.friction,
+        start_tip=(0.0, 0.0, 0.001),
+        start_quaternion=TOOL_DOWN,
+        start_lift=tilt_lift(params.radius),
+        goal=lambda state: state.tip.position[..., 2] < -params.done_depth,
+        goal_error=lambda state: (distance(state), tilt_of(state)),
+        task=Task(
+            direction=(0.0, 0.0, -1.0), aligned=TOOL_DOWN, hand="aligning",
+            starts=({"start.tilt_y": float(np.deg2rad(8.0))}, {"start.tilt_y": float(np.deg2rad(-8.0))}),
+        ),
+    )  # fmt: skip

@@ -1,0 +1,79 @@
+r"""`valley`: two slopes that meet in a line along y; a ball slides to the bottom from either side (seed, Fig. 3).
+
+Sliding down a slope of angle a with friction mu under a push tilted by t from straight down needs
+t < a - atan(mu): the analytic convergence region of one desired direction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.frames import Float
+from skillframe.world.scene import Geom, Scene, State, Task
+from skillframe.world.shapes import TOOL_COLOUR, shaft, slope
+from skillframe.world.worlds.common import TOOL_DOWN, WRIST_TO_TIP, require, tool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ValleyParams:
+    """Parameters of `valley`.
+
+    Attributes:
+        slope: angle of both sides from the horizontal [rad].
+        friction: Coulomb coefficient.
+        radius: of the ball at the tip [m].
+        length: of each side along the slope [m].
+        tolerance: horizontal distance from the bottom that counts as there [m].
+    """
+
+    slope: float = 0.7853981633974483
+    friction: float = 0.2
+    radius: float = 0.005
+    length: float = 0.12
+    tolerance: float = 0.001
+
+
+def build(params: ValleyParams) -> Scene:
+    """The valley with its line along y through the fixture's origin."""
+    require(
+        "valley",
+        {
+            "0 < slope < 1.4 rad": 0.0 < params.slope < 1.4,
+            "friction >= 0": params.friction >= 0.0,
+            "radius, length and tolerance > 0": min(params.radius, params.length, params.tolerance) > 0.0,
+        },
+    )
+    resting = params.radius / np.cos(params.slope)
+    ball = Geom(kind="sphere", size=(params.radius,), position=(0.0, 0.0, WRIST_TO_TIP), rgba=TOOL_COLOUR)
+
+    def distance(state: State) -> Float:
+        result: Float = np.abs(state.tip.position[..., 0])
+        return result
+
+    def at_bottom(state: State) -> NDArray[np.bool_]:
+        resting_on_both = np.abs(state.tip.position[..., 2] - resting) < 0.002
+        reached: NDArray[np.bool_] = (distance(state) < params.tolerance) & resting_on_both
+        return reached
+
+    return Scene(
+        name="valley",
+        fixture=(
+            slope(params.slope, 0.0, params.length, 0.16),
+            slope(params.slope, np.pi, params.length, 0.16),
+        ),
+        tool=tool((ball, shaft(0.004, 0.01, WRIST_TO_TIP - params.radius))),
+        friction=params.friction,
+        start_tip=(0.0, 0.0, float(resting + 0.004)),
+        start_quaternion=TOOL_DOWN,
+        start_lift=lambda offset, tilt: np.abs(offset[..., 0]) * np.tan(params.slope),
+        goal=at_bottom,
+        goal_error=lambda state: (distance(state), np.zeros(len(state.tip.position))),
+        task=Task(
+            direction=(0.0, 0.0, -1.0), hand="sliding",
+            starts=({"start.offset_x": 0.025}, {"start.offset_x": -0.025}),
+        ),
+        analytic={"largest_tilt_rad": float(params.slope - np.arctan(params.friction))},
+    )  # fmt: skip
