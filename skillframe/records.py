@@ -54,7 +54,8 @@ class SkillType:
         learn: a skill document's body (`frame`, `phases`, ...) from demonstrations; None if it is not learned.
         describe: the document in words, a line each.
         explain: pictures for the report, drawn from the document alone; None if there are none.
-        tunable: names of run parameters that `build` takes from the document's `run` section.
+        example: a small valid document to try the type with, for a type that is not learned, or that the example
+            demonstrations of `skillframe.testing` do not suit.
     """
 
     name: str
@@ -64,6 +65,7 @@ class SkillType:
     learn: Callable[[Sequence[Demonstration], LearnOptions], Document] | None = None
     describe: Callable[[Document], list[str]] | None = None
     explain: Callable[[Document], list[Illustration]] | None = None
+    example: Callable[[], Document] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

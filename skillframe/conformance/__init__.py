@@ -1,0 +1,12 @@
+"""Checks that any plug-in must pass: functions that return problems in words, an empty list when all is well.
+
+`skillframe plugins check` runs them on what is installed; `skillframe.testing` wraps them as pytest classes.
+"""
+
+from skillframe.conformance.plugins import Finding, check_plugin
+from skillframe.conformance.readers import check_reader
+from skillframe.conformance.segmenters import check_segmenter
+from skillframe.conformance.skills import check_skill
+from skillframe.conformance.worlds import check_world
+
+__all__ = ["Finding", "check_plugin", "check_reader", "check_segmenter", "check_skill", "check_world"]

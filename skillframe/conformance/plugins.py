@@ -1,0 +1,52 @@
+"""The conformance checks of everything that a plug-in provides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from skillframe.conformance.readers import check_reader
+from skillframe.conformance.segmenters import check_segmenter
+from skillframe.conformance.skills import check_skill
+from skillframe.conformance.worlds import check_world
+from skillframe.registry import Plugin, Registry
+
+CHECKS: Mapping[str, Callable[[Any], list[str]]] = {
+    "skill": check_skill,
+    "segmenter": check_segmenter,
+    "world": check_world,
+    "reader": check_reader,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """What checking one thing of a plug-in gave.
+
+    Attributes:
+        subject: "skill:replay"; "plug-in" for its loading.
+        problems: in words; empty if it conforms, None if there is no check for its kind.
+    """
+
+    subject: str
+    problems: list[str] | None
+
+
+def check_plugin(registry: Registry, plugin: Plugin) -> list[Finding]:
+    """Findings for a plug-in's loading and for each record that it provides."""
+    findings = [Finding(subject="plug-in", problems=[plugin.error] if plugin.error else [])]
+    for subject in plugin.provides:
+        kind, _, name = subject.partition(":")
+        if name in registry.names(kind):
+            findings.append(Finding(subject=subject, problems=_check(registry, kind, name)))
+    return findings
+
+
+def _check(registry: Registry, kind: str, name: str) -> list[str] | None:
+    check = CHECKS.get(kind)
+    if check is None:
+        return None
+    record: Any = getattr(registry, kind)(name)
+    general = [] if record.summary else ["has no summary; write one line for listings"]
+    return general + check(record)

@@ -1,0 +1,50 @@
+"""What every segmenter must do: boundaries inside each demonstration, in order, with a label for each interval."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from skillframe.conformance.examples import example_demonstrations
+from skillframe.conformance.problems import attempt, json_problems
+from skillframe.demonstration.record import Demonstration
+from skillframe.records import Document, SegmenterType
+
+
+def check_segmenter(
+    segmenter: SegmenterType, demonstrations: Sequence[Demonstration] | None = None, phases: int = 2
+) -> list[str]:
+    """Problems of a segmenter, tried on demonstrations (default: the examples); empty if it conforms."""
+    demos = example_demonstrations() if demonstrations is None else list(demonstrations)
+
+    def on(count: int | None) -> Callable[[], Iterator[str]]:
+        return lambda: _fit_problems(segmenter, demos, count)
+
+    return attempt("number of phases found", on(None)) + attempt(f"{phases} phases asked for", on(phases))
+
+
+def _fit_problems(segmenter: SegmenterType, demos: Sequence[Demonstration], count: int | None) -> Iterator[str]:
+    document = segmenter.fit(demos, count, {})
+    yield from json_problems(document)
+    if segmenter.fit(demos, count, {}) != document:
+        yield "fitting the same demonstrations twice gives different results"
+    yield from segmentation_problems(document, demos, count)
+
+
+def segmentation_problems(document: Document, demos: Sequence[Demonstration], count: int | None) -> Iterator[str]:
+    """Whether the segmentation that a document holds is one of these demonstrations."""
+    rows: list[dict[str, Any]] = document.get("demonstrations", [])
+    if "phase_model" not in document:
+        yield "there is no 'phase_model'"
+    if len(rows) != len(demos):
+        yield f"'demonstrations' has {len(rows)} entries for {len(demos)} demonstrations"
+        return
+    for i, (row, demo) in enumerate(zip(rows, demos, strict=True)):
+        cuts, labels = row["boundaries"], row["labels"]
+        inside = all(demo.time[0] < cut < demo.time[-1] for cut in cuts)
+        if not inside or any(b <= a for a, b in zip(cuts, cuts[1:], strict=False)):
+            yield f"demonstration {i}: boundaries {cuts} are not inner times in increasing order"
+        if len(labels) != len(cuts) + 1:
+            yield f"demonstration {i}: {len(labels)} labels for {len(cuts) + 1} intervals"
+        if count is not None and not set(labels) <= set(range(count)):
+            yield f"demonstration {i}: labels {labels} are not below {count}"

@@ -1,0 +1,257 @@
+"""What every kind of skill must do, whatever it does: the laws of the loop's contract (`skillframe.skill`).
+
+Batched rows must equal the same trials run one by one to 1e-9 (metres, radians, newtons): a skill that is written over
+arrays differs from its own scalar run by rounding only, and 1e-9 lies far above rounding and far below a micrometre.
+"""
+
+from __future__ import annotations
+
+import copy
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from skillframe.conformance.examples import example_demonstrations, random_observations
+from skillframe.conformance.problems import attempt, json_problems
+from skillframe.frames import Float, norm, rotation_vector
+from skillframe.records import Document, SkillType
+from skillframe.skill import Command, Observation, Skill, Status, row
+
+TRIALS, TICKS, DT = 8, 25, 0.05  # 200 observations over 1.25 s
+AGREEMENT = 1e-9
+LARGEST_STEP = (2e-3, 5e-3)  # m, rad in the first millisecond: more than any tool that starts at rest can follow
+LARGEST_FEEDFORWARD = (1.0, 0.1)  # N, Nm at the first tick
+
+
+def example_document(skill: SkillType) -> Document:
+    """A document to try a type with: its own example, or one learned from the example demonstrations."""
+    from skillframe.skillsource import learned
+
+    return learned(skill, example_demonstrations()) if skill.example is None else skill.example()
+
+
+def check_skill(skill: SkillType, document: Document | None = None) -> list[str]:
+    """Problems of a skill type, tried with a document (default: `example_document`); empty if it conforms."""
+    if document is None:
+        found: list[Document] = []
+        problems = attempt("example document", lambda: found.append(example_document(skill)) or ())
+        if problems:
+            return [f"{problems[0]}; give SkillType.example, or a document"]
+        document = found[0]
+    ready = document
+    return [p for what, check in CHECKS.items() for p in attempt(what, lambda c=check: c(skill, ready))]  # type: ignore[misc]
+
+
+def play(skill: Skill, observations: Sequence[Observation], seeds: Sequence[int]) -> list[Command]:
+    """Start a skill and step it through observations, one generator per trial."""
+    skill.start(observations[0], [np.random.default_rng([7, seed]) for seed in seeds])
+    return [_kept(skill.step(observation)) for observation in observations]
+
+
+def _kept(command: Command) -> Command:
+    """A copy, in case the skill re-uses its arrays."""
+    return copy.deepcopy(command)
+
+
+def _observations(seed: int = 1, ticks: int = TICKS, dt: float = DT) -> list[Observation]:
+    return random_observations(np.random.default_rng([8, seed]), TRIALS, ticks, dt)
+
+
+def builds(skill: SkillType, document: Document) -> Iterator[str]:
+    """Building gives a `Skill`, from a document that stays as it was."""
+    before = copy.deepcopy(document)
+    built = skill.build(document)
+    if not isinstance(built, Skill):
+        yield f"build gave {type(built).__name__}, not a skillframe.Skill"
+    if document != before:
+        yield "build changes the document it is given"
+
+
+def answers_in_shape(skill: SkillType, document: Document) -> Iterator[str]:
+    """Commands have the contract's shapes, finite values, rotations and symmetric gains."""
+    for command in play(skill.build(document), _observations(), range(TRIALS)):
+        problems = list(_command_problems(command, TRIALS))
+        if problems:
+            yield from problems
+            return
+
+
+def _command_problems(command: Command, n: int) -> Iterator[str]:
+    shapes = {
+        "pose.position": (command.pose.position, (n, 3)), "pose.rotation": (command.pose.rotation, (n, 3, 3)),
+        "twist": (command.twist, (n, 6)), "feedforward": (command.feedforward, (n, 6)),
+        "status": (command.status, (n,)), "reason": (command.reason, (n,)),
+    }  # fmt: skip
+    wrong = [f"{k} has shape {np.shape(v)}, expected {s}" for k, (v, s) in shapes.items() if np.shape(v) != s]
+    if wrong:
+        yield from wrong
+        return
+    for name in ("pose.position", "pose.rotation", "twist", "feedforward"):
+        if not np.all(np.isfinite(shapes[name][0])):
+            yield f"{name} holds values that are not finite"
+    rotation = command.pose.rotation
+    if np.abs(np.swapaxes(rotation, -1, -2) @ rotation - np.eye(3)).max() > 1e-6:
+        yield "pose.rotation is not orthonormal"
+    yield from _gain_problems("stiffness", command.impedance.stiffness, n)
+    if command.impedance.damping is not None:
+        yield from _gain_problems("damping", command.impedance.damping, n)
+
+
+def _gain_problems(name: str, gain: Float, n: int) -> Iterator[str]:
+    if np.shape(gain) not in ((6, 6), (n, 6, 6)):
+        yield f"{name} has shape {np.shape(gain)}, expected (6, 6) or ({n}, 6, 6)"
+        return
+    scale = max(float(np.abs(gain).max()), 1.0)
+    if np.abs(gain - np.swapaxes(gain, -1, -2)).max() > 1e-9 * scale:
+        yield f"{name} is not symmetric"
+    elif np.linalg.eigvalsh(gain).min() < -1e-9 * scale:
+        yield f"{name} is not positive semi-definite"
+
+
+def starts_without_a_bump(skill: SkillType, document: Document) -> Iterator[str]:
+    """The first command asks for the pose where the tool is, and for next to no force."""
+    observations = _observations(ticks=1, dt=1e-3)
+    command = play(skill.build(document), observations, range(TRIALS))[0]
+    measured = observations[0].pose
+    step = norm(command.pose.position - measured.position).max()
+    turn = norm(rotation_vector(command.pose.rotation @ np.swapaxes(measured.rotation, -1, -2))).max()
+    force, torque = norm(command.feedforward[:, :3]).max(), norm(command.feedforward[:, 3:]).max()
+    if step > LARGEST_STEP[0] or turn > LARGEST_STEP[1]:
+        yield f"the first desired pose is {1e3 * step:.3g} mm and {turn:.3g} rad away from where the tool is"
+    if force > LARGEST_FEEDFORWARD[0] or torque > LARGEST_FEEDFORWARD[1]:
+        yield f"the first feed-forward is {force:.3g} N and {torque:.3g} Nm; let it grow from nothing"
+
+
+def rows_equal_single_trials(skill: SkillType, document: Document) -> Iterator[str]:
+    """Each row of a batch is commanded as the same trial would be alone."""
+    observations = _observations()
+    together = play(skill.build(document), observations, range(TRIALS))
+    for i in range(TRIALS):
+        alone = play(skill.build(document), [row(o, i) for o in observations], [i])
+        yield from _first_difference(together, alone, slice(i, i + 1), AGREEMENT, f"trial {i} of {TRIALS} against alone")
+
+
+def rows_are_independent(skill: SkillType, document: Document) -> Iterator[str]:
+    """What happens in other trials does not reach a trial."""
+    observations, others = _observations(1), _observations(2)
+    mixed = [_with_row(other, own, 0) for other, own in zip(others, observations, strict=True)]
+    first = play(skill.build(document), observations, range(TRIALS))
+    second = play(skill.build(document), mixed, [0, *range(100, 99 + TRIALS)])
+    one = slice(0, 1)
+    yield from _first_difference(
+        [_rows(c, one) for c in first], [_rows(c, one) for c in second], one, AGREEMENT, "trial 0 among other trials"
+    )
+
+
+def _with_row(base: Observation, other: Observation, i: int) -> Observation:
+    """`base` with its trial i taken from `other`."""
+
+    def mix(a: Float, b: Float) -> Float:
+        result = a.copy()
+        result[i] = b[i]
+        result.setflags(write=False)
+        return result
+
+    pose = type(base.pose)(*(mix(a, b) for a, b in zip(base.pose, other.pose, strict=True)))
+    return Observation(base.time, base.dt, pose, mix(base.twist, other.twist), mix(base.wrench, other.wrench))
+
+
+def repeats_with_its_seed(skill: SkillType, document: Document) -> Iterator[str]:
+    """The same seeds give exactly the same commands, and numpy's global generator is left alone."""
+    state = np.random.get_state(legacy=False)  # noqa: NPY002 - watched, not used
+    first = play(skill.build(document), _observations(), range(TRIALS))
+    again = play(skill.build(document), _observations(), range(TRIALS))
+    yield from _first_difference(first, again, slice(None), 0.0, "the same seeds run twice")
+    if str(np.random.get_state(legacy=False)) != str(state):  # noqa: NPY002
+        yield "draws from numpy's global generator; use the generators handed to start"
+
+
+def ends_with_a_reason(skill: SkillType, document: Document) -> Iterator[str]:
+    """Status is RUNNING, SUCCESS or FAILURE; what has ended says why, what runs says nothing."""
+    for command in play(skill.build(document), _observations(ticks=200, dt=0.1), range(TRIALS)):
+        status = np.asarray(command.status)
+        if not np.issubdtype(status.dtype, np.integer) or not set(status.tolist()) <= {int(s) for s in Status}:
+            yield f"status holds {sorted(set(status.tolist()))} ({status.dtype}), expected the integers of Status"
+            return
+        for code, reason in zip(status.tolist(), command.reason.tolist(), strict=True):
+            if not isinstance(reason, str) or bool(reason) != (code != Status.RUNNING):
+                yield f"status {Status(code).name} comes with the reason {reason!r}; a reason is given exactly at the end"
+                return
+
+
+def survives_json(skill: SkillType, document: Document) -> Iterator[str]:
+    """The document is plain JSON, and the skill built from what was read back does the same."""
+    import json
+
+    yield from json_problems(document)
+    back = json.loads(json.dumps(document))
+    first = play(skill.build(document), _observations(), range(TRIALS))
+    second = play(skill.build(back), _observations(), range(TRIALS))
+    yield from _first_difference(first, second, slice(None), 0.0, "built from the document read back")
+
+
+def says_what_it_does(skill: SkillType, document: Document) -> Iterator[str]:
+    """`describe` gives lines of text, and `explain` gives drawings that are SVG."""
+    lines = [] if skill.describe is None else skill.describe(document)
+    if not lines or not all(isinstance(line, str) and line for line in lines):
+        yield f"describe gave {lines!r}; give a few lines of words, for `skillframe skill show`"
+    for picture in [] if skill.explain is None else skill.explain(document):
+        if ElementTree.fromstring(picture.svg).tag.rpartition("}")[2] != "svg":
+            yield f"explain's picture {picture.title!r} is not SVG"
+
+
+def _first_difference(
+    a: Sequence[Command], b: Sequence[Command], rows: slice, tolerance: float, what: str
+) -> Iterator[str]:
+    """The first tick at which rows of `a` differ from all of `b`, in words."""
+    for tick, (one, two) in enumerate(zip(a, b, strict=True)):
+        for name, x, y in zip(NAMES, _fields(_rows(one, rows)), _fields(two), strict=True):
+            equal = x.tolist() == y.tolist() if x.dtype == object else _gap(x, y) <= tolerance
+            if not equal:
+                size = "" if x.dtype == object else f" by {_gap(x, y):.3g}"
+                yield f"{what}: {name} differs{size} at tick {tick}"
+                return
+
+
+NAMES = ("position", "rotation", "twist", "stiffness", "damping", "feedforward", "status", "reason")
+
+
+def _rows(command: Command, rows: slice) -> Command:
+    """Some rows of a command; gains that all rows share are spread first."""
+    n = len(command.status)
+    gains = [None if g is None else np.broadcast_to(g, (n, 6, 6))[rows] for g in command.impedance]
+    assert gains[0] is not None
+    return Command(
+        type(command.pose)(*(v[rows] for v in command.pose)), command.twist[rows],
+        type(command.impedance)(gains[0], gains[1]), command.feedforward[rows], command.status[rows],
+        command.reason[rows],
+    )  # fmt: skip
+
+
+def _fields(command: Command) -> list[np.ndarray]:  # type: ignore[type-arg]
+    whole = _rows(command, slice(None))
+    damping = np.zeros(0) if whole.impedance.damping is None else whole.impedance.damping
+    return [
+        *whole.pose, whole.twist, whole.impedance.stiffness, damping, whole.feedforward, whole.status,
+        np.asarray(whole.reason, dtype=object),
+    ]  # fmt: skip
+
+
+def _gap(x: Float, y: Float) -> float:
+    if x.shape != y.shape:
+        return float("inf")
+    return float(np.abs(x - y).max(initial=0.0))
+
+
+CHECKS: Mapping[str, Callable[[SkillType, Document], Iterable[str]]] = {
+    "builds": builds,
+    "answers in shape": answers_in_shape,
+    "starts without a bump": starts_without_a_bump,
+    "batched rows equal single trials": rows_equal_single_trials,
+    "rows are independent": rows_are_independent,
+    "repeats with its seed": repeats_with_its_seed,
+    "ends with a reason": ends_with_a_reason,
+    "survives JSON": survives_json,
+    "says what it does": says_what_it_does,
+}

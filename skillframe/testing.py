@@ -1,0 +1,215 @@
+"""For plug-in authors: conformance suites to inherit, and small skills to test with.
+
+    from skillframe.testing import SkillConformance
+
+    class TestMySkill(SkillConformance):
+        skill_type = "my_skill"
+
+Run under pytest, the class finds the skill through the registry, as a user would, and checks the laws of the loop's
+contract. The same checks, as functions, are in `skillframe.conformance`; `skillframe plugins check` runs them too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from skillframe.conformance import skills
+from skillframe.conformance.examples import example_demonstrations, random_observations
+from skillframe.conformance.readers import check_reader, differences
+from skillframe.conformance.segmenters import check_segmenter
+from skillframe.conformance.skills import check_skill, example_document, play
+from skillframe.conformance.worlds import check_world
+from skillframe.demonstration.record import Demonstration
+from skillframe.frames import Float, Pose
+from skillframe.records import Document, SkillType
+from skillframe.registry import registry
+from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
+
+__all__ = [
+    "HoldSkill",
+    "ReaderConformance",
+    "ScriptedSkill",
+    "SegmenterConformance",
+    "SkillConformance",
+    "WorldConformance",
+    "check_reader",
+    "check_segmenter",
+    "check_skill",
+    "check_world",
+    "differences",
+    "example_demonstrations",
+    "play",
+    "random_observations",
+]
+
+
+def _demand(problems: Sequence[str]) -> None:
+    if problems:
+        raise AssertionError("\n".join(problems))
+
+
+class SkillConformance:
+    """Inherit, set `skill_type`, and pytest checks the skill.
+
+    Attributes:
+        skill_type: the name it is registered under.
+        document: a skill document to try it with, or None.
+        demonstrations: demonstrations to learn the document from, or None: the type's own `example`, or else the example
+            demonstrations.
+    """
+
+    skill_type: ClassVar[str] = ""
+    document: ClassVar[Document | None] = None
+    demonstrations: ClassVar[Sequence[Demonstration] | None] = None
+
+    def _type(self) -> SkillType:
+        return registry().skill(self.skill_type)
+
+    def _document(self) -> Document:
+        from skillframe.skillsource import learned
+
+        if self.document is not None:
+            return self.document
+        if self.demonstrations is not None:
+            return learned(self._type(), self.demonstrations)
+        return example_document(self._type())
+
+    def _check(self, check: Callable[[SkillType, Document], object]) -> None:
+        _demand(list(check(self._type(), self._document())))  # type: ignore[call-overload]
+
+    def test_is_discovered(self) -> None:
+        """The registry knows the skill, from a plug-in that loaded without error."""
+        assert registry().provider("skill", self.skill_type).error is None
+        assert self._type().summary
+
+    def test_builds(self) -> None:
+        """Building gives a skill and leaves the document alone."""
+        self._check(skills.builds)
+
+    def test_answers_in_shape(self) -> None:
+        """Commands have the contract's shapes, finite values, rotations and symmetric gains."""
+        self._check(skills.answers_in_shape)
+
+    def test_starts_without_a_bump(self) -> None:
+        """The first command asks for the pose where the tool is, and for next to no force."""
+        self._check(skills.starts_without_a_bump)
+
+    def test_batched_rows_equal_single_trials(self) -> None:
+        """Each row of a batch is commanded as the same trial would be alone."""
+        self._check(skills.rows_equal_single_trials)
+
+    def test_rows_are_independent(self) -> None:
+        """What happens in other trials does not reach a trial."""
+        self._check(skills.rows_are_independent)
+
+    def test_repeats_with_its_seed(self) -> None:
+        """The same seeds give exactly the same commands."""
+        self._check(skills.repeats_with_its_seed)
+
+    def test_ends_with_a_reason(self) -> None:
+        """Status is one of three, and what has ended says why."""
+        self._check(skills.ends_with_a_reason)
+
+    def test_survives_json(self) -> None:
+        """The document is plain JSON, and what is read back does the same."""
+        self._check(skills.survives_json)
+
+    def test_says_what_it_does(self) -> None:
+        """The skill can be told in words, and its pictures are pictures."""
+        self._check(skills.says_what_it_does)
+
+
+class WorldConformance:
+    """Inherit, set `world`, and pytest checks the world."""
+
+    world: ClassVar[str] = ""
+
+    def test_is_discovered(self) -> None:
+        """The registry knows the world, from a plug-in that loaded without error."""
+        assert registry().provider("world", self.world).error is None
+
+    def test_conforms(self) -> None:
+        """Parameters, scene, tool and goal obey the contract."""
+        _demand(check_world(registry().world(self.world)))
+
+
+class ReaderConformance:
+    """Inherit, set `reader`, and pytest checks the file format."""
+
+    reader: ClassVar[str] = ""
+
+    def test_is_discovered(self) -> None:
+        """The registry knows the format, from a plug-in that loaded without error."""
+        assert registry().provider("reader", self.reader).error is None
+
+    def test_conforms(self) -> None:
+        """What is written comes back, and what cannot be read is refused in words."""
+        _demand(check_reader(registry().reader(self.reader)))
+
+
+class SegmenterConformance:
+    """Inherit, set `segmenter` (and `demonstrations`, if the examples do not suit), and pytest checks it."""
+
+    segmenter: ClassVar[str] = ""
+    demonstrations: ClassVar[Sequence[Demonstration] | None] = None
+    phases: ClassVar[int] = 2
+
+    def test_is_discovered(self) -> None:
+        """The registry knows the segmenter, from a plug-in that loaded without error."""
+        assert registry().provider("segmenter", self.segmenter).error is None
+
+    def test_conforms(self) -> None:
+        """Boundaries and labels describe the demonstrations."""
+        _demand(check_segmenter(registry().segmenter(self.segmenter), self.demonstrations, self.phases))
+
+
+class HoldSkill(Skill):
+    """Holds the pose it started in, for a while or for ever.
+
+    Args:
+        stiffness: of translation [N/m] and of rotation [Nm/rad].
+        duration: seconds until it ends with SUCCESS; None for never.
+    """
+
+    def __init__(self, stiffness: tuple[float, float] = (1000.0, 50.0), duration: float | None = None) -> None:
+        self._impedance = Impedance(np.diag(np.repeat(stiffness, 3)).astype(float))
+        self._duration = np.inf if duration is None else duration
+
+    def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
+        """Remember where the tool is."""
+        self._home = Pose(observation.pose.position.copy(), observation.pose.rotation.copy())
+
+    def step(self, observation: Observation) -> Command:
+        """Ask for the pose of the start."""
+        n = len(observation.time)
+        ended = observation.time >= self._duration
+        status = np.where(ended, Status.SUCCESS, Status.RUNNING).astype(np.int64)
+        reason = no_reasons(n)
+        reason[ended] = f"held for {self._duration:g} s"
+        return Command(self._home, np.zeros((n, 6)), self._impedance, np.zeros((n, 6)), status, reason)
+
+
+class ScriptedSkill(HoldSkill):
+    """Moves as a script says, relative to where it started.
+
+    Args:
+        offset: seconds since the start (N,) -> displacement (N, 3) in base [m].
+    """
+
+    def __init__(
+        self,
+        offset: Callable[[Float], Float],
+        stiffness: tuple[float, float] = (1000.0, 50.0),
+        duration: float | None = None,
+    ) -> None:
+        super().__init__(stiffness, duration)
+        self._offset = offset
+
+    def step(self, observation: Observation) -> Command:
+        """Ask for the start's pose displaced by the script."""
+        command = super().step(observation)
+        pose = Pose(self._home.position + self._offset(observation.time), self._home.rotation)
+        return command._replace(pose=pose)

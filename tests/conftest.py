@@ -1,0 +1,27 @@
+"""Shared by every test: tests of plug-ins are skipped where no plug-in may load, and each test sees a fresh registry."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+
+import pytest
+
+from skillframe.registry import registry
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    if os.environ.get("SKILLFRAME_PLUGINS") != "":
+        return
+    skip = pytest.mark.skip(reason="SKILLFRAME_PLUGINS is empty: no plug-in is loaded")
+    for item in items:
+        if item.get_closest_marker("needs_plugins"):
+            item.add_marker(skip)
+
+
+@pytest.fixture
+def fresh_registry() -> Iterator[None]:
+    """The process's registry is loaded anew in this test, and again after it."""
+    registry.cache_clear()
+    yield
+    registry.cache_clear()
