@@ -1,0 +1,226 @@
+"""`RobotSpec`: what robot.toml says about a robot, checked; no library of robot dynamics is needed to read it.
+
+A robot is a name under a `robots/` folder (shipped, or in `$SKILLFRAME_PATH`), a folder, a robot.toml, or, to be
+checked, a bare URDF, which stands on a fixed base and has no arm until a robot.toml names one.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, Literal
+
+from skillframe.config import build, read_toml
+from skillframe.errors import InputError, UnknownName
+from skillframe.paths import data_dirs
+
+Vector = tuple[float, float, float]
+_URDF_SUFFIXES = (".urdf", ".xml", ".xacro", ".sdf")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arm:
+    """One arm: a name, and the URDF frame (flange, wrist) that tools are mounted on, z axis out along the tool."""
+
+    name: str
+    tool_frame: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Control:
+    """How the robot is controlled: `rate_hz` of the impedance loop [Hz]."""
+
+    rate_hz: float = 1000.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """Limits that stop a run; None switches one off.
+
+    Attributes:
+        force_n: contact force at the tool [N]; torque_n_m: contact torque at the tool [N m].
+        torque_rate_nm_s: change of a joint's commanded torque [N m/s].
+        workspace_m: box the tool point stays in, (lower, upper) corners in base [m].
+        energy_j: energy the controller may put into the robot [J].
+    """
+
+    force_n: float | None = 80.0
+    torque_n_m: float | None = None
+    torque_rate_nm_s: float | None = 1000.0
+    workspace_m: tuple[Vector, Vector] | None = None
+    energy_j: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Workspace:
+    """Where work is done: `fixture` is the place in base [m] where a world's fixture stands."""
+
+    fixture: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkInertia:
+    """Inertia of a link that replaces the URDF's, in link axes.
+
+    Attributes:
+        mass: [kg]; com: centre of mass [m]; inertia: xx, yy, zz, xy, xz, yz about the centre of mass [kg m^2].
+    """
+
+    mass: float
+    com: Vector = (0.0, 0.0, 0.0)
+    inertia: tuple[float, float, float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Loop:
+    """A closed chain: the origins of two frames of the tree coincide."""
+
+    frame_a: str
+    frame_b: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Actuation:
+    """An actuator (an FMU) on a joint; `inputs` and `outputs` map our names to the FMU's."""
+
+    joint: str
+    fmu: str
+    parameters: dict[str, Any] = field(default_factory=dict)
+    inputs: dict[str, str] = field(default_factory=dict)
+    outputs: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotFile:
+    """The keys of robot.toml, word for word (contract: robot.toml)."""
+
+    urdf: str
+    summary: str = ""
+    base: Literal["fixed", "free"] = "fixed"
+    mimic: bool = True
+    arm: tuple[Arm, ...] = ()
+    home: dict[str, float] = field(default_factory=dict)
+    control: Control = field(default_factory=Control)
+    limits: Limits = field(default_factory=Limits)
+    workspace: Workspace = field(default_factory=Workspace)
+    inertia: dict[str, LinkInertia] = field(default_factory=dict)
+    loop: tuple[Loop, ...] = ()
+    actuation: tuple[Actuation, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotSpec:
+    """A robot as declared.
+
+    Attributes:
+        name: folder's name, or the URDF's stem; summary: one line for people.
+        folder: where relative paths start; urdf: absolute path of the URDF.
+        base: "fixed", or "free" for a free-flying body.
+        mimic: joints with a URDF mimic tag follow their leader; False makes every joint independent.
+        home: joint positions by joint name [rad or m]; joints not named stand at the neutral position.
+        inertia: overlay by link name; loop, actuation: parsed and kept, not simulated yet.
+    """
+
+    name: str
+    folder: Path
+    urdf: Path
+    summary: str = ""
+    base: Literal["fixed", "free"] = "fixed"
+    mimic: bool = True
+    arm: tuple[Arm, ...] = ()
+    home: dict[str, float] = field(default_factory=dict)
+    control: Control = field(default_factory=Control)
+    limits: Limits = field(default_factory=Limits)
+    workspace: Workspace = field(default_factory=Workspace)
+    inertia: dict[str, LinkInertia] = field(default_factory=dict)
+    loop: tuple[Loop, ...] = ()
+    actuation: tuple[Actuation, ...] = ()
+
+    def require_simulated(self) -> None:
+        """Refuse to be simulated where that would be wrong.
+
+        Raises:
+            InputError: the robot has closed loops or actuators, which are not simulated yet, or names no arm.
+        """
+        where = self.folder / "robot.toml"
+        for key in ("loop", "actuation"):
+            if getattr(self, key):
+                raise InputError(where, f"[[{key}]] is read but not simulated yet", "take a robot without it")
+        if not self.arm:
+            raise InputError(where, "names no arm", 'add [[arm]] with name = "arm" and tool_frame = "<a URDF link>"')
+
+
+def load_robot(name_or_path: str | Path) -> RobotSpec:
+    """The robot of a shipped name, a folder with robot.toml, a robot.toml, or a bare URDF.
+
+    Raises:
+        InputError: a file is missing, or says something that is not allowed.
+        UnknownName: a name that no `robots/` folder holds.
+    """
+    path = Path(name_or_path)
+    bare_name = isinstance(name_or_path, str) and path.parts == (name_or_path,) and not path.suffix
+    if bare_name and (found := robot_names().get(name_or_path)):
+        return _from_toml(found / "robot.toml")
+    if path.is_dir():
+        return _from_toml(path / "robot.toml")
+    if not path.exists():
+        raise (
+            UnknownName("robot", str(name_or_path), robot_names())
+            if bare_name
+            else InputError(
+                path,
+                "no such file",
+                "give a URDF, a robot.toml, a folder with one, or a name from `skillframe robots list`",
+            )
+        )
+    return _from_toml(path) if path.suffix == ".toml" else _from_urdf(path)
+
+
+def robot_names() -> dict[str, Path]:
+    """Folder of every robot that can be named, the user's own before the shipped ones."""
+    names: dict[str, Path] = {}
+    for folder in data_dirs("robots"):
+        for robot in sorted(p.parent for p in folder.glob("*/robot.toml")):
+            names.setdefault(robot.name, robot)
+    return names
+
+
+def _from_urdf(path: Path) -> RobotSpec:
+    path = path.resolve()
+    return RobotSpec(name=path.stem, folder=path.parent, urdf=path)
+
+
+def _from_toml(path: Path) -> RobotSpec:
+    values = read_toml(path)
+    declared = build(RobotFile, values, str(path))
+    folder = path.resolve().parent
+    urdf = folder / declared.urdf
+    if not urdf.is_file():
+        raise InputError(f"{path}: urdf", f"there is no file {declared.urdf!r} beside it", "correct the name")
+    _check_values(declared, str(path))
+    rest = {f.name: getattr(declared, f.name) for f in fields(declared) if f.name != "urdf"}
+    return RobotSpec(name=folder.name, folder=folder, urdf=urdf.resolve(), **rest)
+
+
+def _check_values(declared: RobotFile, where: str) -> None:
+    """Values that have the right type and are still impossible."""
+    positive = {"control.rate_hz": declared.control.rate_hz}
+    positive |= {
+        f"limits.{k}": getattr(declared.limits, k) for k in ("force_n", "torque_n_m", "torque_rate_nm_s", "energy_j")
+    }
+    for key, value in positive.items():
+        if value is not None and not (0.0 < value < math.inf):
+            raise InputError(f"{where}: {key}", f"is {value:g}", "give a positive, finite number")
+    for joint, value in declared.home.items():
+        if not math.isfinite(value):
+            raise InputError(f"{where}: home.{joint}", f"is {value:g}", "give a finite number")
+    box = declared.limits.workspace_m
+    if box is not None and not all(low < high for low, high in zip(*box, strict=True)):
+        raise InputError(f"{where}: limits.workspace_m", f"{box} is empty", "give the lower corner first")
+    names = [arm.name for arm in declared.arm]
+    if len(set(names)) < len(names):
+        raise InputError(f"{where}: arm", f"two arms have one name ({', '.join(names)})", "rename one")
+    for link, inertia in declared.inertia.items():
+        if not all(math.isfinite(x) for x in (inertia.mass, *inertia.com, *inertia.inertia)):
+            raise InputError(f"{where}: inertia.{link}", "holds a number that is not finite", "correct it")
