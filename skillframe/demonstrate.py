@@ -1,0 +1,123 @@
+"""Record demonstrations from the simulated teacher: the same world, sensors and executor as a run, then one file each.
+
+A demonstration that fails (jams, breaks a limit, runs out of time) is redrawn with the next seed of its slot and
+counted; the count is part of the result and of the file's metadata.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from skillframe.demonstration.record import Demonstration
+from skillframe.errors import SkillframeError
+from skillframe.executor import Result, Setup, simulate
+from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, rotate
+from skillframe.robot.model import RobotModel
+from skillframe.teacher import Teacher, TeacherSettings
+from skillframe.trace import Trace
+from skillframe.world.placement import fixture_poses
+from skillframe.world.scene import Scene
+from skillframe.world.sensors import SensorSettings
+
+MOST_ATTEMPTS = 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recording:
+    """Demonstrations in order, and how many attempts failed on the way, with their reasons."""
+
+    demonstrations: list[Demonstration]
+    rejected: list[str]
+
+
+def record(
+    robot: RobotModel,
+    scene: Scene,
+    settings: TeacherSettings,
+    *,
+    count: int,
+    seed: int,
+    draws: Mapping[str, float] | None = None,
+    rate_hz: float = 500.0,
+    duration_s: float = 12.0,
+    sensors: SensorSettings | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Recording:
+    """Demonstrate a scene `count` times; the starts of the scene's task are taken in turn.
+
+    Args:
+        robot: who is taught.
+        scene: what is taught.
+        settings: the person.
+        count: demonstrations wanted.
+        seed: everything random follows from it.
+        draws: quantities that hold for every demonstration (`start.*` is added to the task's own start).
+        rate_hz: sample rate of the files.
+        duration_s: longest demonstration.
+        sensors: noise of the sensors.
+        progress: told in words what happens.
+
+    Raises:
+        SkillframeError: a slot still fails after 20 attempts; says with what.
+    """
+    done: dict[int, Demonstration] = {}
+    rejected: list[str] = []
+    for attempt in range(MOST_ATTEMPTS):
+        slots = [slot for slot in range(count) if slot not in done]
+        result = _attempt(robot, scene, settings, slots, attempt, seed, draws or {}, rate_hz, duration_s, sensors)
+        assert result.traces is not None
+        for slot, good, failure, trace in zip(slots, result.success, result.failure, result.traces, strict=True):
+            if good:
+                done[slot] = demonstration_from(trace, scene, settings, seed=seed, slot=slot, attempt=attempt)
+            else:
+                rejected.append(f"demonstration {slot}, attempt {attempt}: {failure}")
+        if progress is not None:
+            progress(f"{len(done)} of {count} demonstrations recorded, {len(rejected)} rejected")
+        if len(done) == count:
+            break
+    else:
+        raise SkillframeError(
+            f"world {scene.name}: the teacher failed {MOST_ATTEMPTS} times for one demonstration "
+            f"(last: {rejected[-1]}); lower the noise or choose another start"
+        )
+    return Recording(demonstrations=[done[slot] for slot in range(count)], rejected=rejected)
+
+
+def _attempt(
+    robot: RobotModel, scene: Scene, settings: TeacherSettings, slots: list[int], attempt: int, seed: int,
+    draws: Mapping[str, float], rate_hz: float, duration_s: float, sensors: SensorSettings | None,
+) -> Result:  # fmt: skip
+    starts = [{**scene.task.starts[slot % len(scene.task.starts)]} for slot in slots]
+    for start in starts:
+        for key, value in draws.items():
+            start[key] = start.get(key, 0.0) + value if key.startswith("start.") else value
+    keys = sorted({key for start in starts for key in start})
+    columns = {key: np.array([start.get(key, 0.0) for start in starts]) for key in keys}
+    teacher = Teacher(scene.task, fixture_poses(robot, columns, len(slots)), settings)
+    setup = Setup(
+        robot=robot, scene=scene, center_of_compliance=np.array(scene.tool.frames[scene.tool.hand]),
+        sensors=sensors or SensorSettings(), filter_wrench=False, stop_when=scene.task.done or scene.goal,
+    )  # fmt: skip
+    rngs = [np.random.default_rng([seed, slot, attempt]) for slot in slots]
+    return simulate(teacher, setup, columns, rngs, duration_s=duration_s, trace_hz=rate_hz)
+
+
+def demonstration_from(trace: Trace, scene: Scene, settings: TeacherSettings, **provenance: int) -> Demonstration:
+    """A demonstration at the tool point out of a trace taken at the handle; the wrench is as sensed, not filtered."""
+    pose = Pose(trace.position, matrix_from_quaternion(trace.quaternion))
+    handle: Float = np.array(trace.meta["center_of_compliance"])
+    sensors = SensorSettings()
+    meta = {
+        "task": scene.name, "teacher": settings.kind, "rate": float(1.0 / np.median(np.diff(trace.time))),
+        "frames": {name: list(point) for name, point in scene.tool.frames.items()}, "hand": scene.tool.hand,
+        "contact": bool(scene.fixture), "simulated": {**asdict(settings), **provenance},
+        "robot": trace.meta["robot"], "world": {"name": scene.name, "params": scene.params},
+        "sensor": {"force_noise": sensors.force_noise, "torque_noise": sensors.torque_noise},
+    }  # fmt: skip
+    return Demonstration(
+        time=trace.time.copy(), position=pose.at(-handle).position, quaternion=trace.quaternion.copy(),
+        wrench=move_wrench(trace.wrench, rotate(pose.rotation, -handle)), meta=meta, source=scene.name,
+    )  # fmt: skip
