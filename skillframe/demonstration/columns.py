@@ -1,0 +1,202 @@
+"""Named columns of a file as a clock, poses and wrenches in SI units: names, units, attitudes.
+
+An attitude can be a quaternion (qx, qy, qz, qw), Euler angles (roll, pitch, yaw: about x, y, z whatever the order), a
+rotation vector (rvx, rvy, rvz) or a matrix (r11 ... r33, by rows). Euler angles are multiplied out in the stated order,
+R = R_c(c) R_b(b) R_a(a) about fixed axes a, b, c (lower case) and R_a(a) R_b(b) R_c(c) about moving ones (upper case),
+scipy's convention; the columns are taken by axis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from skillframe.demonstration.options import scales
+from skillframe.demonstration.table import Table
+from skillframe.errors import InputError
+from skillframe.frames import Float, matrix_from_quaternion, quaternion_from_matrix, rotation_matrix
+
+POSITION = ("px", "py", "pz")
+QUATERNION = ("qx", "qy", "qz", "qw")
+FORCE, TORQUE = ("fx", "fy", "fz"), ("tx", "ty", "tz")
+WRENCH = FORCE + TORQUE
+EULER = ("roll", "pitch", "yaw")
+ROTATION_VECTOR = ("rvx", "rvy", "rvz")
+MATRIX = tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
+CANONICAL = ("t", *POSITION, *QUATERNION, *WRENCH)
+KNOWN = (*CANONICAL, *EULER, *ROTATION_VECTOR, *MATRIX)
+QUANTITY = {
+    "t": "time", **dict.fromkeys(POSITION, "length"), **dict.fromkeys((*EULER, *ROTATION_VECTOR), "angle"),
+    **dict.fromkeys(FORCE, "force"), **dict.fromkeys(TORQUE, "torque"),
+}  # fmt: skip
+ALIASES = {
+    "time": "t", "timestamp": "t", "stamp": "t", "x": "px", "y": "py", "z": "pz", "pos_x": "px", "pos_y": "py",
+    "pos_z": "pz", "mx": "tx", "my": "ty", "mz": "tz", "rx": "rvx", "ry": "rvy", "rz": "rvz",
+}  # fmt: skip
+"""Names that other tools use, for suggestions only: a header is never guessed."""
+
+
+class Columns(dict[str, Float]):
+    """Columns by name, with where they came from and how their rows are called in messages."""
+
+    def __init__(self, values: Mapping[str, Float], source: str, rows: Sequence[int] | None = None) -> None:
+        super().__init__(values)
+        self.source, self.rows = source, rows
+
+    def place(self, row: int, column: str = "") -> str:
+        """ "file: row N, column c" for messages; rows as an editor counts them, or from 1 in files without lines."""
+        number = row + 1 if self.rows is None else int(self.rows[row])
+        return f"{self.source}: row {number}" + (f", column {column}" if column else "")
+
+    def with_values(self, values: Mapping[str, Float]) -> Columns:
+        """Other values of the same rows."""
+        return Columns(values, self.source, self.rows)
+
+    def has(self, names: Iterable[str]) -> bool:
+        """Whether every one of these columns is there."""
+        return all(name in self for name in names)
+
+    def stack(self, names: Sequence[str]) -> Float:
+        """Columns side by side, (T, len(names))."""
+        return np.stack([self[name] for name in names], axis=-1)
+
+
+def name_columns(table: Table, spec: str | None, units: str | None) -> Columns:
+    """A table's columns under their names and in SI units.
+
+    Args:
+        table: as read.
+        spec: `ReadOptions.columns`; None to use the header.
+        units: `ReadOptions.units`.
+
+    Raises:
+        InputError: no header and no names, a number of names that does not fit, a name twice, words where numbers belong.
+    """
+    picks = _picks(table, spec)
+    factors = scales(units)
+    columns: dict[str, Float] = {}
+    for name, index in picks.items():
+        if index in table.text:
+            if name.rpartition("_")[2] in KNOWN:
+                raise InputError(
+                    f"{table.source}: row {table.text[index]}, column {name}", "is not a number", "mend that cell"
+                )
+            continue
+        factor = factors.get(QUANTITY.get(name.rpartition("_")[2], ""), 1.0)
+        columns[name] = table.values[:, index] * factor if factor != 1.0 else table.values[:, index].copy()
+    return Columns(columns, table.source, table.rows.tolist())
+
+
+def left_out(table: Table) -> list[str]:
+    """Sentences about columns of words, which a demonstration has no place for."""
+    return [
+        f"column {table.names[i] if table.names else i + 1} holds words and was left out" for i in sorted(table.text)
+    ]
+
+
+def _picks(table: Table, spec: str | None) -> dict[str, int]:
+    """Column index by name."""
+    width = table.values.shape[1]
+    if spec is None and not table.names:
+        raise InputError(
+            f"{table.source}: row {table.rows[0]}", "has no header",
+            "add the header t,px,py,pz,qx,qy,qz,qw,fx,fy,fz,tx,ty,tz or name the columns with --columns",
+        )  # fmt: skip
+    names = table.names if spec is None else [name.strip() for name in spec.split(",")]
+    if spec is not None and "=" in spec:
+        pairs = [name.partition("=") for name in names]
+        return _unique(table.source, [(name, _column(table, column or name)) for name, _, column in pairs])
+    if len(names) != width:
+        raise InputError(
+            table.source, f"has {width} columns, --columns names {len(names)}",
+            'name every column in order, "_" for one to ignore, or pick by header with NAME=COLUMN',
+        )  # fmt: skip
+    return _unique(table.source, [(name, i) for i, name in enumerate(names) if name not in ("_", "")])
+
+
+def _column(table: Table, column: str) -> int:
+    """Index of a column by header name or number from 1."""
+    if column in table.names:
+        return table.names.index(column)
+    if column.isdigit() and 1 <= int(column) <= table.values.shape[1]:
+        return int(column) - 1
+    there = ", ".join(table.names) or f"numbers 1 to {table.values.shape[1]}"
+    raise InputError(table.source, f"has no column {column!r}", f"there are: {there}")
+
+
+def _unique(source: str, pairs: list[tuple[str, int]]) -> dict[str, int]:
+    for i, (name, _) in enumerate(pairs):
+        if name in dict(pairs[:i]):
+            raise InputError(source, f"names column {name!r} twice", "give every column its own name")
+    return dict(pairs)
+
+
+def select_arm(columns: Columns, arm: str | None) -> Columns:
+    """One arm's columns without their prefix; everything else stays as it is.
+
+    Raises:
+        InputError: several arms and none chosen, or no such arm.
+    """
+    arms = sorted({name[: -len("_px")] for name in columns if name.endswith("_px")})
+    if arm is None:
+        if arms and "px" not in columns:
+            raise InputError(columns.source, f"holds the arms {', '.join(arms)}", f"choose one with --arm {arms[0]}")
+        return columns
+    if arm not in arms:
+        raise InputError(columns.source, f"has no arm {arm!r}", f"there are: {', '.join(arms) or 'none'}")
+    prefix = f"{arm}_"
+    own = {name.removeprefix(prefix) for name in columns if name.startswith(prefix)}
+    kept = {n: v for n, v in columns.items() if not n.startswith(prefix) and n not in own}
+    return columns.with_values({**kept, **{n: columns[prefix + n] for n in own}})
+
+
+def with_quaternion(columns: Columns, euler: str | None) -> Columns:
+    """The same columns with the attitude as a quaternion, whatever form it came in.
+
+    Raises:
+        InputError: Euler angles without their order, a bad order, or a matrix that is no rotation.
+    """
+    if columns.has(QUATERNION):
+        return columns
+    for names, convert in ((EULER, _from_euler), (ROTATION_VECTOR, _from_vector), (MATRIX, _from_matrix)):
+        if columns.has(names):
+            quaternion = quaternion_from_matrix(convert(columns, euler))
+            rest = {n: v for n, v in columns.items() if n not in names}
+            return columns.with_values({**rest, **{n: quaternion[:, i] for i, n in enumerate(QUATERNION)}})
+    return columns
+
+
+def _from_euler(columns: Columns, euler: str | None) -> Float:
+    order = euler or ""
+    axes = order.lower()
+    proper = len(axes) == 3 and sorted(axes) == ["x", "y", "z"] and order in (axes, axes.upper())
+    if not proper:
+        what = f"the order {euler!r} is not one of x, y, z" if euler else "has roll, pitch, yaw without their order"
+        raise InputError(
+            columns.source, what, "give --euler xyz (fixed axes) or --euler ZYX (moving axes), for example"
+        )
+    result = np.eye(3)
+    for axis in axes:
+        index = "xyz".index(axis)
+        vector = np.zeros((len(columns["roll"]), 3))
+        vector[:, index] = columns[EULER[index]]
+        turn = rotation_matrix(vector)
+        result = result @ turn if order.isupper() else turn @ result
+    return result
+
+
+def _from_vector(columns: Columns, _: str | None) -> Float:
+    return rotation_matrix(columns.stack(ROTATION_VECTOR))
+
+
+def _from_matrix(columns: Columns, _: str | None) -> Float:
+    matrix = columns.stack(MATRIX).reshape(-1, 3, 3)
+    quaternion = quaternion_from_matrix(matrix)
+    error = np.abs(matrix_from_quaternion(quaternion) - matrix).max(axis=(1, 2))
+    if error.max() > 0.01:
+        raise InputError(
+            columns.place(int(np.argmax(error))), f"r11 ... r33 is no rotation matrix (off by {error.max():.3f})",
+            "check the columns' order (by rows) and sign",
+        )  # fmt: skip
+    return matrix

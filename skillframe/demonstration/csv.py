@@ -1,0 +1,55 @@
+"""CSV demonstrations: a header, one row per sample, metadata in `NAME.meta.toml` beside it; numbers round-trip exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from skillframe.demonstration.assemble import assemble
+from skillframe.demonstration.checks import refuse_w_first_header
+from skillframe.demonstration.columns import CANONICAL, Columns, left_out, name_columns
+from skillframe.demonstration.delimited import read_wrench_file
+from skillframe.demonstration.metafile import meta_path, read_meta, toml_text
+from skillframe.demonstration.options import read_options
+from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration.safe import replace_file
+from skillframe.demonstration.table import read_table
+from skillframe.errors import InputError
+
+
+def read_csv(path: Path, options: Mapping[str, Any]) -> Demonstration:
+    """A demonstration from a CSV file.
+
+    Args:
+        path: the file; `NAME.meta.toml` beside it is read too.
+        options: fields of `ReadOptions`.
+
+    Raises:
+        InputError: anything of the contract's list of bad input.
+    """
+    chosen = read_options(options)
+    table = read_table(path)
+    if chosen.columns is None:
+        refuse_w_first_header(table.source, table.names)
+    columns = name_columns(table, chosen.columns, chosen.units)
+    return assemble(columns, read_meta(path), chosen, left_out(table), read_wrench_file(chosen))
+
+
+def demonstration_columns(demonstration: Demonstration) -> Columns:
+    """A demonstration's arrays under their file names, further columns last."""
+    d = demonstration
+    arrays = [d.time, *d.position.T, *d.quaternion.T, *d.wrench.T]
+    return Columns({**dict(zip(CANONICAL, arrays, strict=True)), **d.extra}, d.source)
+
+
+def write_csv(demonstration: Demonstration, path: Path) -> None:
+    """Write a CSV and its metadata; each file appears complete or not at all."""
+    columns = demonstration_columns(demonstration)
+    for name in columns:
+        if any(c in name for c in ',;"\n'):
+            raise InputError(path, f"column name {name!r} cannot stand in a CSV header", "rename it, or write .npz")
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    text = "\n".join([",".join(columns), *(",".join(map(repr, row)) for row in rows)]) + "\n"
+    replace_file(meta_path(path), toml_text({"quaternion": "xyzw", **demonstration.meta}).encode())
+    replace_file(path, text.encode())

@@ -1,0 +1,55 @@
+"""Reading and writing demonstrations by file name: the ending chooses the format among those that are registered."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from skillframe.errors import InputError
+from skillframe.records import ReaderType
+
+if TYPE_CHECKING:
+    from skillframe.demonstration.record import Demonstration
+
+
+def read_demonstration(path: Path | str, **options: Any) -> Demonstration:
+    """A demonstration from a file of any registered format.
+
+    Args:
+        path: the file.
+        **options: settings of the format; the core's readers take the fields of `options.ReadOptions`.
+
+    Raises:
+        InputError: an ending that no format has, or anything wrong with the file.
+    """
+    path = Path(path)
+    return _format_of(path, reading=True, named_columns=options.get("columns") is not None).read(path, options)
+
+
+def write_demonstration(demonstration: Demonstration, path: Path | str) -> None:
+    """Write a demonstration; the file appears complete or not at all.
+
+    Raises:
+        InputError: an ending that no format writes, or a place that cannot be written to.
+    """
+    path = Path(path)
+    write = _format_of(path, reading=False).write
+    assert write is not None
+    write(demonstration, path)
+
+
+def _format_of(path: Path, *, reading: bool, named_columns: bool = False) -> ReaderType:
+    """The format of the longest matching ending; any ending is delimited text once its columns are named."""
+    from skillframe.registry import registry
+
+    records: list[ReaderType] = [r for r in registry().records("reader") if reading or r.write is not None]
+    matches = [(len(s), r) for r in records for s in r.suffixes if path.name.lower().endswith(s)]
+    if matches:
+        return max(matches, key=lambda match: match[0])[1]
+    if reading and named_columns:
+        return registry().reader("delimited")
+    if reading and not path.exists():
+        raise InputError(path, "no such file", "check the path")
+    endings = ", ".join(sorted(s for r in records for s in r.suffixes))
+    advice = f"use one of {endings}" + (", or name the columns with --columns" if reading else "")
+    raise InputError(path, f"no format {'reads' if reading else 'writes'} files ending in {path.suffix!r}", advice)

@@ -1,0 +1,129 @@
+"""The native form: one array per column and a JSON text `meta` with format and version, in an uncompressed npz."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from skillframe.demonstration.assemble import assemble
+from skillframe.demonstration.columns import Columns
+from skillframe.demonstration.csv import demonstration_columns
+from skillframe.demonstration.delimited import read_wrench_file
+from skillframe.demonstration.options import ReadOptions, read_options
+from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration.safe import replace_file
+from skillframe.errors import InputError
+from skillframe.frames import Float
+
+FORMAT, VERSION = "skillframe.demonstration", 1
+
+
+def read_npz(path: Path, options: Mapping[str, Any]) -> Demonstration:
+    """A demonstration from its native form.
+
+    Args:
+        path: the file.
+        options: fields of `ReadOptions`; those that name columns do not apply.
+
+    Raises:
+        InputError: no npz, of another format or a newer version, or anything of the contract's list of bad input.
+    """
+    chosen = read_options(options)
+    _refuse_text_settings(path, chosen)
+    arrays = _load(path)
+    meta = _meta(path, arrays)
+    columns = Columns(_columns(path, arrays), str(path))
+    return assemble(columns, meta, chosen, [], read_wrench_file(chosen))
+
+
+def _refuse_text_settings(path: Path, options: ReadOptions) -> None:
+    for name in ("columns", "units"):
+        if getattr(options, name) is not None:
+            raise InputError(
+                path, f"--{name} does not apply to the native form", "leave it out; its arrays are named, in SI units"
+            )
+
+
+def _load(path: Path) -> dict[str, Any]:
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            if isinstance(file, np.ndarray):
+                raise ValueError("a single array")
+            return {name: file[name] for name in file.files}
+    except FileNotFoundError:
+        raise InputError(path, "no such file", "check the path") from None
+    except IsADirectoryError:
+        raise InputError(path, "is a folder", "give a file") from None
+    except EOFError:
+        raise InputError(path, "is empty", "write it again") from None
+    except (
+        ValueError,
+        OSError,
+        zipfile.BadZipFile,
+        zlib.error,
+        KeyError,
+        AttributeError,
+        TypeError,
+        NotImplementedError,
+    ) as error:
+        raise InputError(path, f"is not a readable npz file, or is truncated ({error})", "write it again") from None
+
+
+def _meta(path: Path, arrays: dict[str, Any]) -> dict[str, Any]:
+    """The metadata, with format and version checked and taken off."""
+    if "meta" not in arrays:
+        raise InputError(
+            path, "holds no meta", f'store a JSON text meta with "format": "{FORMAT}", "version": {VERSION}'
+        )
+    try:
+        meta = json.loads(str(arrays["meta"][()]))
+    except (ValueError, TypeError, IndexError):
+        meta = None
+    if not isinstance(meta, dict):
+        raise InputError(f"{path}: meta", "is not a JSON object", "store one JSON text")
+    form, version = meta.pop("format", None), meta.pop("version", None)
+    if form != FORMAT:
+        raise InputError(f"{path}: meta.format", f"is {form!r}, not {FORMAT!r}", "give a demonstration")
+    if not isinstance(version, int) or isinstance(version, bool) or not 1 <= version <= VERSION:
+        raise InputError(
+            f"{path}: meta.version", f"is {version!r}; this skillframe reads up to {VERSION}", "update skillframe"
+        )
+    return meta
+
+
+def _columns(path: Path, arrays: dict[str, Any]) -> dict[str, Float]:
+    columns: dict[str, Float] = {}
+    for name, array in arrays.items():
+        if name == "meta":
+            continue
+        if array.ndim != 1 or array.dtype.kind not in "fiub":
+            raise InputError(
+                f"{path}: {name}", f"is {array.dtype} of shape {array.shape}", "store one number per sample"
+            )
+        columns[name] = array.astype(float)
+    lengths = {name: len(column) for name, column in columns.items()}
+    reference = lengths.get("t", next(iter(lengths.values()), 0))
+    for name, length in lengths.items():
+        if length != reference:
+            raise InputError(f"{path}: {name}", f"has {length} values, t has {reference}", "store arrays of one length")
+    if not reference:
+        raise InputError(path, "has no rows", "record again, or check the export")
+    return columns
+
+
+def write_npz(demonstration: Demonstration, path: Path) -> None:
+    """Write the native form; the file appears complete or not at all."""
+    meta = {"quaternion": "xyzw", **demonstration.meta, "format": FORMAT, "version": VERSION}
+    columns = demonstration_columns(demonstration)
+    if "meta" in columns:
+        raise InputError(path, "a column is called meta", "rename it")
+    buffer = io.BytesIO()
+    np.savez(buffer, allow_pickle=False, meta=np.array(json.dumps(meta, sort_keys=True)), **columns)
+    replace_file(path, buffer.getvalue())

@@ -1,0 +1,149 @@
+"""Delimited text as named columns of numbers, with the file's row numbers kept for messages.
+
+Rows are counted as an editor counts lines, from 1. Commas, semicolons, tabs and blanks are told apart by the first
+rows; a decimal comma is not read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.errors import InputError
+from skillframe.frames import Float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """Columns of one file.
+
+    Attributes:
+        source: the file.
+        names: of the header; empty where there is none.
+        values: (T, C) numbers, NaN where `text` says that a column holds words.
+        rows: (T,) row numbers in the file, from 1.
+        text: indices of columns that are not numbers, with the first offending row.
+    """
+
+    source: str
+    names: list[str]
+    values: Float
+    rows: NDArray[np.int64]
+    text: dict[int, int]
+
+
+def read_text(path: Path) -> str:
+    """The text of a file.
+
+    Raises:
+        InputError: missing, a folder, empty, or binary.
+    """
+    try:
+        raw = path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(path, "no such file", "check the path") from None
+    except IsADirectoryError:
+        raise InputError(path, "is a folder", "give a file") from None
+    except OSError as error:
+        raise InputError(path, f"cannot be read ({error.strerror})", "check its permissions") from None
+    if not raw.strip():
+        raise InputError(path, "is empty", "give a file with a header and rows")
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = "\0"
+    if "\0" in text:
+        raise InputError(path, "is binary, not text", "give delimited text, or name a native file .npz")
+    return text
+
+
+def read_table(path: Path, header: bool | None = None) -> Table:
+    """A delimited file as a table.
+
+    Args:
+        path: the file.
+        header: whether the first row is a header; None to see for itself.
+
+    Raises:
+        InputError: not text, no rows, or rows of different length.
+    """
+    lines = [(i, line.strip()) for i, line in enumerate(read_text(path).splitlines(), start=1)]
+    lines = [(i, line) for i, line in lines if line]
+    delimiter = _delimiter(lines[0][1])
+    names: list[str] = []
+    while lines and lines[0][1][0] in "#%" and not header and not _looks_like_header(lines, delimiter):
+        lines = lines[1:]
+    if lines and (header or (header is None and not _is_numeric(lines[0][1], delimiter))):
+        names = [name.strip().strip('"') for name in _split(lines[0][1].lstrip("#% "), delimiter)]
+        lines = lines[1:]
+    if not lines:
+        raise InputError(
+            path, "has a header but no rows" if names else "has no rows", "record again, or check the export"
+        )
+    _refuse_ragged(path, names, lines, delimiter)
+    values, text = _numbers([line for _, line in lines], delimiter, np.array([i for i, _ in lines]))
+    return Table(source=str(path), names=names, values=values, rows=np.array([i for i, _ in lines]), text=text)
+
+
+def _delimiter(line: str) -> str | None:
+    """The separator of a row; None for runs of blanks and tabs."""
+    for candidate in (",", ";"):
+        if candidate in line:
+            return candidate
+    return None
+
+
+def _split(line: str, delimiter: str | None) -> list[str]:
+    return line.split(delimiter)
+
+
+def _looks_like_header(lines: list[tuple[int, str]], delimiter: str | None) -> bool:
+    """Whether a commented row names the columns of the row after it ("%time,x,y" of a topic's export)."""
+    names = _split(lines[0][1].lstrip("#% "), delimiter)
+    following = next((line for _, line in lines[1:] if line[0] not in "#%"), "")
+    same = len(names) == len(_split(following, _delimiter(following))) if following else len(names) > 1
+    return same and not _is_numeric(lines[0][1].lstrip("#% "), delimiter)
+
+
+def _is_numeric(line: str, delimiter: str | None) -> bool:
+    """Whether a row is data: at least one field of it is a number."""
+    return any(_number(field) is not None for field in _split(line, delimiter))
+
+
+def _number(field: str) -> float | None:
+    try:
+        return float(field)
+    except ValueError:
+        return None
+
+
+def _refuse_ragged(path: Path, names: list[str], lines: list[tuple[int, str]], delimiter: str | None) -> None:
+    width = len(names) or len(_split(lines[0][1], delimiter))
+    for row, line in lines:
+        count = len(_split(line, delimiter))
+        if count != width:
+            reference = "the header" if names else f"row {lines[0][0]}"
+            raise InputError(
+                f"{path}: row {row}", f"has {count} values, {reference} has {width}",
+                "rows must be of one length; remove or mend that row (a last row like this is a truncated file)",
+            )  # fmt: skip
+
+
+def _numbers(lines: list[str], delimiter: str | None, rows: NDArray[np.int64]) -> tuple[Float, dict[int, int]]:
+    """The numbers, and which columns hold words: numpy's own parser first, cell by cell where it fails."""
+    try:
+        return np.loadtxt(lines, delimiter=delimiter, comments=None, ndmin=2), {}
+    except ValueError:
+        pass
+    text: dict[int, int] = {}
+    values = np.empty((len(lines), len(_split(lines[0], delimiter))))
+    for i, line in enumerate(lines):
+        for j, cell in enumerate(_split(line, delimiter)):
+            number = _number(cell) if cell.strip() else np.nan
+            if number is None:
+                text.setdefault(j, int(rows[i]))
+            values[i, j] = np.nan if number is None else number
+    return values, text
