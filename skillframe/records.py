@@ -51,6 +51,8 @@ class SkillType:
         summary: one line for listings.
         version: of the type's part of the skill file; a newer file is refused.
         build: a runnable skill from a checked skill document.
+        check: raises `InputError` naming the key if the kind's part of a document is not as it should be; None: no more
+            than the common layout is checked when a file is read.
         learn: a skill document's body (`frame`, `phases`, ...) from demonstrations; None if it is not learned.
         describe: the document in words, a line each.
         explain: pictures for the report, drawn from the document alone; None if there are none.
@@ -62,6 +64,7 @@ class SkillType:
     summary: str
     version: int = 1
     build: Callable[[Document], Skill]
+    check: Callable[[Document], None] | None = None
     learn: Callable[[Sequence[Demonstration], LearnOptions], Document] | None = None
     describe: Callable[[Document], list[str]] | None = None
     explain: Callable[[Document], list[Illustration]] | None = None
