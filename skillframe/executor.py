@@ -72,6 +72,7 @@ class Result:
         final_error_m, final_error_rad: distance to the goal at the end.
         energy_j: work of the controller on the tool.
         traces: one per trial if asked for.
+        interrupted: Ctrl-C came before the end; what was running is closed as it stood.
     """
 
     success: NDArray[np.bool_]
@@ -84,6 +85,7 @@ class Result:
     final_error_rad: Float
     energy_j: Float
     traces: list[Trace] | None = None
+    interrupted: bool = False
 
 
 def simulate(
@@ -105,7 +107,7 @@ def simulate(
         rngs: one generator per trial; sensors and skill draw from children of it.
         duration_s: simulated seconds after which a trial is stopped.
         trace_hz: rate of the traces; None keeps none.
-        progress: called every 10 ms of simulated time with the seconds simulated; it may raise to interrupt.
+        progress: called every 10 ms of simulated time with the seconds simulated.
 
     Raises:
         UnknownName: a quantity that nothing reads.
@@ -152,6 +154,7 @@ class _Loop:
         self._damping: Float = np.zeros((count, 6, 6))
         self._projector: Float | None = None
         self._slow = 0
+        self.interrupted = False
 
     def tare(self) -> None:
         """Hold still before the start, let the readings settle, and take their mean as the sensor's bias."""
@@ -172,12 +175,17 @@ class _Loop:
     def run(self, duration_s: float, progress: Callable[[float], None] | None) -> None:
         """Tick until every trial has ended or the time is up."""
         ticks = round(duration_s / self.dt)
-        for tick in range(ticks):
-            self._tick(tick)
-            if not len(self.active):
-                break
-            if progress is not None and tick % SLOW_TICKS == 0:
-                progress(tick * self.dt)
+        tick = 0
+        try:
+            for tick in range(ticks):
+                self._tick(tick)
+                if not len(self.active):
+                    return
+                if progress is not None and tick % SLOW_TICKS == 0:
+                    progress(tick * self.dt)
+        except KeyboardInterrupt:
+            self.interrupted = True
+            self._end(self.active, tick * self.dt, "interrupted", True)
         if len(self.active):
             self._end(self.active, ticks * self.dt, f"time limit: {duration_s:g} s of simulated time are over", False)
 
@@ -306,7 +314,7 @@ class _Loop:
         return Result(
             success=success, failure=failure, status=self.status, reason=self.reason, duration_s=self.duration,
             peak_force_n=self.peak, final_error_m=self.errors[:, 0], final_error_rad=self.errors[:, 1],
-            energy_j=self.energy, traces=traces,
+            energy_j=self.energy, traces=traces, interrupted=self.interrupted,
         )  # fmt: skip
 
     def _meta(self, i: int, success: bool, failure: str) -> dict[str, object]:

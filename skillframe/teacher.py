@@ -1,15 +1,15 @@
-r"""A simulated person who demonstrates: a compliant hand that holds the tool at a handle, pushes, and turns it actively.
+r"""A simulated person who demonstrates: a compliant hand that holds the tool at a handle, pushes and turns it.
 
-The teacher is a skill whose centre of compliance is the handle, run by the one executor in the same world, with the same
-sensors, as any run. It knows the task (`Scene.task`) and sees the fixture; the learner never does. The hand is a Maxwell
-element (all figures ours, chosen so that demonstrations look and feel like recorded ones):
+The teacher is a skill whose centre of compliance is the handle, run by the one executor in the same world, with the
+same sensors, as any run. It knows the task (`Scene.task`) and sees the fixture; the learner never does. The hand is a
+Maxwell element (all figures ours, chosen so that demonstrations look and feel like recorded ones):
 
     d = unit(d_0 + o),  do = -o dt / 0.5 s + sigma sqrt(2 dt / 0.5 s) N(0, 1)     where the person aims
     x_h += v_h d dt;  x_h -= e_perp dt / tau;  push capped at F_max               e = x_h - x(t - delay)
     F = K_h (x_h - x) + B_h (v_h d - v) + tremor
 
-A person softens to align a part and stiffens to slide it, hence one hand per task. Teleoperation adds a one-way delay to
-what the person sees and to what arrives, and scales the person's tremor by the motion scale.
+A person softens to align a part and stiffens to slide it, hence one hand per task. Teleoperation adds a one-way delay
+to what the person sees and to what arrives, and scales the person's tremor by the motion scale.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ BLOCK = 500
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hand:
-    """How the hand holds: translation stiffness [N/m], damping [Ns/m], relaxation time [s]; rotation alike [Nm/rad ...].
+    """How the hand holds: translation stiffness [N/m], damping [Ns/m], relaxation time [s]; rotation alike.
 
     `turn_rate` [rad/s] is how fast an active hand turns the part, `torque_max` [Nm] how hard.
     """

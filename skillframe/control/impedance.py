@@ -4,8 +4,8 @@ r"""Cartesian impedance, equation (1) of the seed document with the damping sign
 
 The attitude error is the rotation vector of R_d R^T in base axes. As printed, "+ D v" would only dissipate for a
 negative D; here D acts on desired minus measured twist and is positive definite. Critical damping is designed from the
-task-space inertia Lambda = (J M^-1 J^T)^-1 by D = 2 zeta Lambda^(1/2) (Lambda^(-1/2) K Lambda^(-1/2))^(1/2) Lambda^(1/2),
-the matrix form of d = 2 zeta sqrt(k m), with a floor so that compliant axes (K = 0) are damped too (the floor is ours).
+task-space inertia L = (J M^-1 J^T)^-1 by D = 2 zeta L^(1/2) (L^(-1/2) K L^(-1/2))^(1/2) L^(1/2), the matrix form of
+d = 2 zeta sqrt(k m), with a floor so that compliant axes (K = 0) are damped too (the floor is ours).
 """
 
 from __future__ import annotations
@@ -49,7 +49,9 @@ def task_inertia(jacobian: Float, mass_matrix: Float) -> Float:
     return 0.5 * (result + np.swapaxes(result, -1, -2))
 
 
-def critical_damping(stiffness: Float, inertia: Float, ratio: float = 1.0, floor: tuple[float, float] = DAMPING_FLOOR) -> Float:
+def critical_damping(
+    stiffness: Float, inertia: Float, ratio: float = 1.0, floor: tuple[float, float] = DAMPING_FLOOR
+) -> Float:
     """Damping matrices (N, 6, 6) of a damping ratio for a stiffness and task inertia, with a floor.
 
     The translational and rotational parts are designed apart (the block diagonal of Lambda), so that the axes of each
@@ -93,8 +95,8 @@ def _raise_to(matrix: Float, least: float) -> Float:
 def null_space_damping(jacobian: Float, mass_matrix: Float, damping: float) -> Float:
     """Matrices (N, nv, nv) that turn joint velocities into damping torques without any effect on the task.
 
-    With the dynamically consistent inverse Jbar = M^-1 J^T Lambda, the torque is -d N M N' q' with N = 1 - J^T Jbar^T, so
-    that J M^-1 tau = 0 (Khatib 1987); `damping` d is in 1/s. Zero for robots without redundancy.
+    With the dynamically consistent inverse Jbar = M^-1 J^T Lambda, the torque is -d N M N' q' with N = 1 - J^T Jbar^T,
+    so that J M^-1 tau = 0 (Khatib 1987); `damping` d is in 1/s. Zero for robots without redundancy.
     """
     transposed = np.swapaxes(jacobian, -1, -2)
     solved = np.linalg.solve(mass_matrix, transposed)  # M^-1 J^T

@@ -1,6 +1,6 @@
 """Safety limits that stop a trial, with the reason in words; each is checked at every control tick.
 
-- force: norm of the filtered contact force above `force_n` (and torque above `torque_nm`);
+- force: norm of the filtered contact force above `force_n` (and torque above `torque_n_m`);
 - torque rate: the commanded joint torques are held to `torque_rate_nm_s`; a command that asks for more for
   `RATE_PERSISTENCE` ticks running is stopped (one tick of saturation is what the limiter is for);
 - workspace: the tool point outside its box;
@@ -9,6 +9,8 @@
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +35,10 @@ class LimitGuard:
 
     def rate_limited(self, torque: Float) -> Float:
         """Joint torques (N, nv) held to the torque rate of the limits."""
+        if self._limits.torque_rate_nm_s is None:
+            return torque
         step = self._limits.torque_rate_nm_s * self._dt
-        if self._torque is None or not np.isfinite(step):
+        if self._torque is None:
             self._torque = torque.copy()
             return torque
         change = torque - self._torque
@@ -43,7 +47,9 @@ class LimitGuard:
         self._torque = self._torque + np.clip(change, -step, step)
         return self._torque
 
-    def violations(self, time: Float, position: Float, twist: Float, wrench: Float, command: Float, reasons: Reasons) -> None:
+    def violations(
+        self, time: Float, position: Float, twist: Float, wrench: Float, command: Float, reasons: Reasons
+    ) -> None:
         """Write the reason of each trial that broke a limit into `reasons` where it is still empty.
 
         Args:
@@ -60,13 +66,13 @@ class LimitGuard:
         finite = np.isfinite(position).all(-1) & np.isfinite(twist).all(-1)
         _write(reasons, ~finite, time, lambda i: "diverged: the state is not a finite number")
         speed = norm(twist[:, :3])
-        _write(reasons, finite & (speed > SPEED_CEILING), time, lambda i: f"diverged: the tool moves at {speed[i]:.1f} m/s")
-        _write(
-            reasons, force > limits.force_n, time,
-            lambda i: f"force limit: {force[i]:.1f} N is above {limits.force_n:g} N",
-        )  # fmt: skip
-        if limits.torque_nm is not None:
-            most = limits.torque_nm
+        fast = finite & (speed > SPEED_CEILING)
+        _write(reasons, fast, time, lambda i: f"diverged: the tool moves at {speed[i]:.1f} m/s")
+        if limits.force_n is not None:
+            largest = limits.force_n
+            _write(reasons, force > largest, time, lambda i: f"force limit: {force[i]:.1f} N is above {largest:g} N")
+        if limits.torque_n_m is not None:
+            most = limits.torque_n_m
             _write(reasons, torque > most, time, lambda i: f"torque limit: {torque[i]:.2f} Nm is above {most:g} Nm")
         _write(
             reasons, self._saturated >= RATE_PERSISTENCE, time,
@@ -75,7 +81,10 @@ class LimitGuard:
         if limits.workspace_m is not None:
             low, high = np.array(limits.workspace_m)
             outside = ((position < low) | (position > high)).any(-1)
-            _write(reasons, outside, time, lambda i: f"workspace limit: tool point at {np.round(position[i], 3).tolist()} m")
+            _write(
+                reasons, outside, time,
+                lambda i: f"workspace limit: tool point at {np.round(position[i], 3).tolist()} m",
+            )  # fmt: skip
         if limits.energy_j is not None:
             ceiling = limits.energy_j
             _write(
@@ -84,9 +93,9 @@ class LimitGuard:
             )  # fmt: skip
 
 
-def _write(reasons: Reasons, broken: NDArray[np.bool_], time: Float, text: "object") -> None:
+def _write(reasons: Reasons, broken: NDArray[np.bool_], time: Float, text: Callable[[int], str]) -> None:
     if not broken.any():
         return
     for i in np.flatnonzero(broken):
         if not reasons[i]:
-            reasons[i] = f"{text(i)} (at {time[i]:.3f} s)"  # type: ignore[operator]
+            reasons[i] = f"{text(int(i))} (at {time[i]:.3f} s)"

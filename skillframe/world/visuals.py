@@ -56,7 +56,9 @@ def _visual(visual: ET.Element, placement: pin.SE3) -> Geom | None:
         return None
     x, y, z, w = (float(v) for v in quaternion_from_matrix(at.rotation))
     px, py, pz = (float(v) for v in at.translation)
-    return Geom(kind=kind, size=size, position=(px, py, pz), quaternion=(x, y, z, w), rgba=_colour(visual), collide=False)
+    return Geom(
+        kind=kind, size=size, position=(px, py, pz), quaternion=(x, y, z, w), rgba=_colour(visual), collide=False
+    )
 
 
 def _origin(origin: ET.Element | None) -> pin.SE3:

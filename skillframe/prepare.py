@@ -1,0 +1,86 @@
+"""From names and values to a skill and a set-up that the executor can run; shared by `run`, campaigns and quickstart.
+
+Settings are the keys of `--set` and of `[vary]`: parameters of the world's dataclass (`world.clearance`) shape the scene;
+the quantities of the executor (`start.tilt_y`, `fixture.offset_x`, `world.friction` ...) are per trial.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from skillframe.demonstration.record import resolve_point
+from skillframe.errors import InputError, UnknownName
+from skillframe.executor import QUANTITIES, Setup
+from skillframe.frames import Float
+from skillframe.records import Document
+from skillframe.registry import registry
+from skillframe.robot.model import RobotModel, load_model
+from skillframe.robot.spec import load_robot
+from skillframe.skill import Skill
+from skillframe.world.catalogue import make_scene
+from skillframe.world.scene import Scene
+
+
+def split_settings(world: str, settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, float]]:
+    """Scene parameters (without the `world.` prefix) and per-trial quantities out of `--set` keys.
+
+    Raises:
+        UnknownName: a key that exists in neither, with the nearest one.
+        InputError: a quantity that is not a number.
+    """
+    fields = {f"world.{f.name}" for f in dataclasses.fields(registry().world(world).params)}
+    params: dict[str, Any] = {}
+    draws: dict[str, float] = {}
+    for key, value in settings.items():
+        if key in fields:
+            params[key.removeprefix("world.")] = value
+        elif key in QUANTITIES:
+            if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+                raise InputError(f"--set {key}", f"expected a finite number, got {value!r}", "give it in SI units")
+            draws[key] = float(value)
+        else:
+            raise UnknownName("setting", key, {*fields, *QUANTITIES})
+    return params, draws
+
+
+def load_world(name: str, params: Mapping[str, Any]) -> Scene:
+    """A world's scene with parameters set.
+
+    Raises:
+        UnknownName: no such world. InputError: a parameter it does not have, or out of range.
+    """
+    return make_scene(registry().world(name), params)
+
+
+def load_robot_model(name: str) -> RobotModel:
+    """A robot by name or path, ready to be simulated.
+
+    Raises:
+        SkillframeError: unknown, does not load, or has no arm.
+    """
+    return load_model(load_robot(name))
+
+
+def center_of_compliance(document: Document, scene: Scene, coc: str | None) -> Float:
+    """The point of the tool frame (3,) that the skill steers: `coc` if given, else the skill file's own.
+
+    Raises:
+        UnknownName: `coc` is neither three numbers nor a frame of the tool.
+    """
+    if coc is None:
+        return np.array(document["frame"]["center_of_compliance"], dtype=float)
+    return resolve_point(coc, {**document["frame"].get("frames", {}), **scene.tool.frames})
+
+
+def prepare(robot: RobotModel, scene: Scene, document: Document, coc: str | None = None) -> tuple[Skill, Setup]:
+    """A runnable skill and its set-up from a checked skill document.
+
+    Raises:
+        UnknownName: the skill's type or the centre of compliance is unknown.
+    """
+    skill = registry().skill(document["type"]).build(document)
+    return skill, Setup(robot=robot, scene=scene, center_of_compliance=center_of_compliance(document, scene, coc))
