@@ -1,1 +1,1 @@
-"""Kalman filtering and smoothing of wrenches, and identification of bias and tool weight."""
+"""Conditioning of wrenches: Kalman filter and smoother, noise figures from data, bias and tool weight."""
