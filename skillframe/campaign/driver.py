@@ -1,0 +1,170 @@
+"""Gets every trial's row out of workers that may die: halve what fails, and never blame the innocent.
+
+A chunk whose worker died is halved. A single trial whose worker died is only a suspect, for a scheduler blames every
+task that was queued on the dead worker; suspects are run again at the end, one by one with nothing else in flight, and
+one that dies then is recorded as the reason. A trial that raises is known for certain and recorded at once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Protocol
+
+from skillframe.campaign.rows import ChunkJob, Row
+from skillframe.errors import SkillframeError
+
+HOPELESS = 20
+"""Chunks lost in a row from the very start after which a campaign gives up: the set-up is broken, not a trial."""
+Evaluate = Callable[[ChunkJob], list[Row]]
+
+
+class Died(NamedTuple):
+    """The worker went away under the job; cause is "killed", "time limit" or "memory"."""
+
+    cause: str
+
+
+class Raised(NamedTuple):
+    """The job raised."""
+
+    error: Exception
+
+
+Answer = list[Row] | Died | Raised
+
+
+class Pool(Protocol):
+    """Where jobs run.
+
+    Attributes:
+        size: how many jobs may be in flight.
+    """
+
+    size: int
+
+    def submit(self, job: ChunkJob) -> None:
+        """Start a job."""
+
+    def next(self) -> tuple[ChunkJob, Answer]:
+        """The next job to end, and how."""
+
+    def close(self) -> None:
+        """End everything, including what is in flight."""
+
+
+class CampaignError(SkillframeError):
+    """Nothing works: every chunk was lost from the start."""
+
+
+@dataclass(slots=True, kw_only=True)
+class Driver:
+    """Runs chunks through a pool.
+
+    Attributes:
+        pool: where.
+        keep: what to do with the rows of a chunk that ended.
+        lost: the row of a trial that left none, from its job and the reason.
+        enough: asked before each chunk; True starts no more.
+    """
+
+    pool: Pool
+    keep: Callable[[list[Row]], None]
+    lost: Callable[[ChunkJob, str], Row]
+    enough: Callable[[], bool]
+    _good: bool = False
+    _losses: int = 0
+
+    def run(self, jobs: Iterable[ChunkJob]) -> None:
+        """Run all jobs.
+
+        Raises:
+            CampaignError: nothing but losses from the start.
+        """
+        queue, suspects, flying = deque(jobs), list[ChunkJob](), 0
+        while flying or (queue and not self.enough()):
+            while queue and flying < self.pool.size and not self.enough():
+                self.pool.submit(queue.popleft())
+                flying += 1
+            job, answer = self.pool.next()
+            flying -= 1
+            self._handle(job, answer, queue, suspects)
+        for job in suspects:
+            if not self.enough():
+                self.pool.submit(job)
+                self._judge(*self.pool.next())
+
+    def _handle(self, job: ChunkJob, answer: Answer, queue: deque[ChunkJob], suspects: list[ChunkJob]) -> None:
+        if isinstance(answer, list):
+            self._store(answer)
+            return
+        self._count_loss(answer)
+        if len(job.trials) > 1:
+            queue.extendleft(reversed(halves(job)))
+        elif isinstance(answer, Died):
+            suspects.append(job)
+        else:
+            self.keep([self.lost(job, reason_of(answer))])
+
+    def _judge(self, job: ChunkJob, answer: Answer) -> None:
+        """The last word on a suspect that ran alone."""
+        if isinstance(answer, list):
+            self._store(answer)
+        else:
+            self.keep([self.lost(job, reason_of(answer))])
+
+    def _store(self, rows: list[Row]) -> None:
+        self._good = True
+        self.keep(rows)
+
+    def _count_loss(self, answer: Died | Raised) -> None:
+        self._losses += 1
+        if not self._good and self._losses >= HOPELESS:
+            error = answer.error if isinstance(answer, Raised) else None
+            raise CampaignError(f"no trial ran, {self._losses} chunks were lost: {reason_of(answer)}") from error
+
+
+def reason_of(answer: Died | Raised) -> str:
+    """What a row says about a trial that left no outcome."""
+    if isinstance(answer, Died):
+        return f"worker died ({answer.cause})"
+    return f"error: {type(answer.error).__name__}: {answer.error}"
+
+
+def halves(job: ChunkJob) -> list[ChunkJob]:
+    """The two halves of a chunk."""
+    middle = len(job.trials) // 2
+    return [replace(job, trials=part) for part in (job.trials[:middle], job.trials[middle:])]
+
+
+def chunk_size(trials: int, workers: int, largest: int) -> int:
+    """Even chunks, at most `largest` trials each and a multiple of the workers in number where that is possible."""
+    rounds = math.ceil(trials / (largest * workers))
+    return max(1, math.ceil(trials / (rounds * workers)))
+
+
+class InProcess:
+    """A pool of one: this process; a trial that kills it ends the campaign, which can be resumed."""
+
+    size = 1
+
+    def __init__(self, evaluate: Evaluate) -> None:
+        self._evaluate = evaluate
+        self._jobs: deque[ChunkJob] = deque()
+
+    def submit(self, job: ChunkJob) -> None:
+        """Queue a job."""
+        self._jobs.append(job)
+
+    def next(self) -> tuple[ChunkJob, Answer]:
+        """Run the next job now."""
+        job = self._jobs.popleft()
+        try:
+            return job, self._evaluate(job)
+        except Exception as error:  # whatever a skill or world raises is that trial's outcome
+            return job, Raised(error)
+
+    def close(self) -> None:
+        """Nothing to end."""

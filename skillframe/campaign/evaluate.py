@@ -1,0 +1,113 @@
+"""A chunk of a campaign through the executor: draws, set-up, simulation, rows.
+
+World parameters shape the scene, so trials that differ in one (all but `world.friction`, which the plant takes per
+trial) are simulated in groups of equal scenes; a trial's row is the same in whatever group it runs.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from skillframe.campaign.axes import Value
+from skillframe.campaign.rows import EXTRA, OUTCOME, TRACE, ChunkJob, Row, plain_value, rows_of
+from skillframe.campaign.sampling import draws, trial_rngs
+from skillframe.campaign.spec import CampaignSpec
+from skillframe.executor import simulate
+from skillframe.prepare import load_robot_model, load_world, prepare
+from skillframe.skillsource import load_skill
+from skillframe.trace import Trace
+from skillframe.world.drawing import geom_json
+from skillframe.world.scene import Scene
+
+TRACE_HZ = 100.0
+
+
+def evaluate(job: ChunkJob) -> list[Row]:
+    """Simulate a chunk; rows in the order of its trials.
+
+    Raises:
+        SkillframeError: a skill, robot, world or draw that cannot be used.
+    """
+    spec = CampaignSpec.from_plain(job.spec, Path(job.folder))
+    drawn = draws(spec, job.trials)
+    scenes = [name for name in drawn if _shapes_scene(name)]
+    groups: dict[tuple[Value, ...], list[int]] = {}
+    for i, trial in enumerate(job.trials):
+        groups.setdefault(tuple(plain_value(drawn[name][i]) for name in scenes), []).append(trial)
+    rows = {
+        row["trial"]: row
+        for values, trials in groups.items()
+        for row in _simulate(spec, job, tuple(trials), dict(zip(scenes, values, strict=True)))
+    }
+    return [rows[trial] for trial in job.trials]
+
+
+def describe(spec: CampaignSpec) -> dict[str, Any]:
+    """The nominal scene as plain JSON values for scene.json; refuses what would not run.
+
+    Raises:
+        SkillframeError: a skill, the robot, or a world parameter at one of its declared values cannot be used.
+    """
+    robot = load_robot_model(str(spec.folder / spec.robot))
+    scene = _scene(spec, {})
+    for text in spec.skills:
+        prepare(robot, scene, load_skill(text, spec.folder)[1], spec.coc)
+    for name, value in _declared_values(spec):
+        _scene(spec, {name: value})
+    tool = {
+        "geoms": [geom_json(g) for g in scene.tool.geoms],
+        "frames": {k: list(v) for k, v in scene.tool.frames.items()},
+    }
+    return {
+        "world": scene.name, "params": scene.params, "analytic": scene.analytic, "friction": scene.friction,
+        "fixture": [geom_json(g) for g in scene.fixture], "tool": tool,
+    }  # fmt: skip
+
+
+def _shapes_scene(name: str) -> bool:
+    return name.startswith("world.") and name != "world.friction"
+
+
+def _declared_values(spec: CampaignSpec) -> Iterator[tuple[str, Value]]:
+    """Ends and listed values of the varied world parameters."""
+    for name, axis in spec.vary.items():
+        if name.startswith("world.") and axis.kind != "normal":
+            yield from ((name, value) for value in axis.numbers)
+
+
+def _scene(spec: CampaignSpec, varied: Mapping[str, Value]) -> Scene:
+    settings = {**spec.fixed, **varied}
+    return load_world(spec.world, {n.removeprefix("world."): v for n, v in settings.items() if n.startswith("world.")})
+
+
+def _simulate(spec: CampaignSpec, job: ChunkJob, trials: tuple[int, ...], scene: Mapping[str, Value]) -> list[Row]:
+    """Rows of trials that share a scene."""
+    robot = load_robot_model(str(spec.folder / spec.robot))
+    _, document = load_skill(spec.skills[job.skill], spec.folder)
+    skill, setup = prepare(robot, _scene(spec, scene), document, spec.coc)
+    constant = {n: np.full(len(trials), v) for n, v in spec.fixed.items() if not n.startswith("world.")}
+    varied = {name: values for name, values in draws(spec, trials).items() if name not in scene}
+    result = simulate(
+        skill, setup, {**constant, **varied}, trial_rngs(spec.seed, trials), duration_s=spec.duration_s,
+        trace_hz=TRACE_HZ if job.traces else None,
+    )  # fmt: skip
+    rows = rows_of(spec, job.skill, trials, {name: getattr(result, name) for name in (*OUTCOME, *EXTRA)})
+    for row, trace in zip(rows, result.traces or [], strict=job.traces):
+        row[TRACE] = _trace_bytes(trace, row, list(spec.vary))
+    return rows
+
+
+def _trace_bytes(trace: Trace, row: Row, varied: list[str]) -> bytes:
+    """The trace as the content of its file, with the trial it is of."""
+    drawn = {name: row[name] for name in varied}
+    meta = {**trace.meta, "seed": row["seed"], "trial": row["trial"], "skill": row["skill"], "draws": drawn}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "trace.npz"
+        dataclasses.replace(trace, meta=meta).save(path)
+        return path.read_bytes()

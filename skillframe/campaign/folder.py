@@ -1,0 +1,192 @@
+"""A campaign's folder: all that the campaign needs is copied in; reports, resumes and replays need nothing else.
+
+    campaign.toml   as run: world parameters in full, paths into this folder
+    skills/ robots/ copies of what ran
+    scene.json      geometry of the scene and its analytic figures
+    rows.jsonl      see `store`
+    results.csv summary.json traces/
+
+The folder is prepared beside its place and moved there when it is whole, so a kill leaves no half of one.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import re
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from skillframe.campaign.axes import Value
+from skillframe.campaign.entries import parse_entry
+from skillframe.campaign.provenance import combined_hash, file_hashes
+from skillframe.campaign.spec import CampaignSpec
+from skillframe.config import build, read_toml
+from skillframe.errors import InputError, UnknownName
+from skillframe.paths import data_dirs
+
+CAMPAIGN, SCENE = "campaign.toml", "scene.json"
+COPIES = ("skills", "robots")
+Describe = Callable[[CampaignSpec], dict[str, Any]]
+
+
+def prepare(spec: CampaignSpec, out: Path, describe: Describe, params: type) -> CampaignSpec:
+    """Make a campaign's folder.
+
+    Args:
+        spec: as read from the user's file.
+        out: the folder; absent or empty.
+        describe: the scene as plain JSON values, from the spec as it will run; raises where it cannot run.
+        params: the world's parameter dataclass.
+
+    Returns:
+        the campaign as it will run, relative to the new folder.
+
+    Raises:
+        InputError: the folder holds something, a robot or skill cannot be found, or `describe` refuses.
+    """
+    _refuse_full(out)
+    temporary = out.absolute().with_name(f"{out.absolute().name}.tmp-{os.getpid()}")
+    shutil.rmtree(temporary, ignore_errors=True)
+    try:
+        temporary.mkdir(parents=True)
+        ready = replace(
+            spec, folder=temporary, skills=_copy_skills(spec, temporary), robot=_copy_robot(spec, temporary),
+            fixed=_all_fixed(spec, params),
+        )  # fmt: skip
+        (temporary / CAMPAIGN).write_text(to_toml(ready), encoding="utf-8")
+        (temporary / SCENE).write_text(json.dumps(describe(ready), sort_keys=True), encoding="utf-8")
+        os.replace(temporary, out)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    return CampaignSpec.from_toml(out / CAMPAIGN, params)
+
+
+def load(folder: Path, params: type | None = None) -> CampaignSpec:
+    """The campaign of a prepared folder.
+
+    Raises:
+        InputError: there is none.
+    """
+    if not (folder / CAMPAIGN).is_file():
+        raise InputError(
+            folder, "is not a campaign's folder", "start one with skillframe campaign run FILE.toml --out DIR"
+        )
+    return CampaignSpec.from_toml(folder / CAMPAIGN, params)
+
+
+def campaign_hash(spec: CampaignSpec) -> str:
+    """Hash of everything that decides the rows: the campaign as run, and the files it uses."""
+    return combined_hash({"spec": spec.plain(), "files": file_hashes(spec.folder, COPIES)})
+
+
+def _refuse_full(out: Path) -> None:
+    if (out / CAMPAIGN).exists():
+        raise InputError(
+            out, "holds a campaign already", f"type skillframe campaign resume {out}, or choose another --out"
+        )
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise InputError(out, "exists and is not an empty folder", "choose another --out")
+
+
+def _copy_skills(spec: CampaignSpec, target: Path) -> tuple[str, ...]:
+    (target / "skills").mkdir()
+    copied: dict[str, str] = {}  # name in the folder to source
+
+    def place(file: str) -> str:
+        source = spec.folder / file
+        if copied.setdefault(source.name, file) != file:
+            problem = f"{copied[source.name]} and {file} have the same name"
+            raise InputError("campaign: skills", problem, "rename one of them")
+        beside = source.with_name(source.stem + ".meta.toml")  # a CSV demonstration's metadata
+        for part in (source, beside) if beside.is_file() else (source,):
+            shutil.copyfile(part, target / "skills" / part.name)
+        return f"skills/{source.name}"
+
+    return tuple(parse_entry(text).moved(place).text for text in spec.skills)
+
+
+def _copy_robot(spec: CampaignSpec, target: Path) -> str:
+    """Copy the robot's description; meshes are for looks and stay behind."""
+    given = spec.folder / spec.robot
+    if given.is_dir() and (given / "robot.toml").is_file():
+        given = given / "robot.toml"
+    if given.is_file():
+        return _copy_robot_file(given, target)
+    for folder in data_dirs("robots"):
+        if (folder / spec.robot / "robot.toml").is_file():
+            return _copy_robot_file(folder / spec.robot / "robot.toml", target)
+    known = [p.parent.name for folder in data_dirs("robots") for p in folder.glob("*/robot.toml")]
+    raise UnknownName(
+        "robot", spec.robot, known, "or give the path of a robot.toml or URDF, relative to the campaign file"
+    )
+
+
+def _copy_robot_file(source: Path, target: Path) -> str:
+    """A robot.toml with the URDF it names, or a bare URDF."""
+    name = source.resolve().parent.name if source.name == "robot.toml" else source.stem
+    place = target / "robots" / name
+    place.mkdir(parents=True)
+    shutil.copyfile(source, place / source.name)
+    if source.suffix == ".toml":
+        urdf = read_toml(source).get("urdf")
+        if not isinstance(urdf, str) or not (source.parent / urdf).is_file():
+            raise InputError(f"{source}: urdf", f"no such file: {urdf!r}", "it is relative to robot.toml")
+        inside = place / urdf
+        if not inside.resolve().is_relative_to(place.resolve()):
+            raise InputError(f"{source}: urdf", f"{urdf} lies outside the robot's folder", "put both into one folder")
+        inside.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(source.parent / urdf, inside)
+    return (place / source.name).relative_to(target).as_posix()
+
+
+def _all_fixed(spec: CampaignSpec, params: type) -> dict[str, Value]:
+    """The fixed quantities with every world parameter that does not vary, so that new defaults change no replay."""
+    given = {name.removeprefix("world."): v for name, v in spec.fixed.items() if name.startswith("world.")}
+    world: Any = build(params, given, f"world.{spec.world}")
+    full = {f"world.{f.name}": getattr(world, f.name) for f in dataclasses.fields(world) if f.init}
+    kept = {name: value for name, value in full.items() if name not in spec.vary and value is not None}
+    return {**spec.fixed, **kept}
+
+
+def to_toml(spec: CampaignSpec) -> str:
+    """The campaign as TOML that `CampaignSpec.from_toml` reads back."""
+    top = {
+        key: getattr(spec, key) for key in ("name", "seed", "trials", "robot", "world", "skills", "coc", "duration_s")
+    }
+    stop, expect = dataclasses.asdict(spec.stop), dataclasses.asdict(spec.expect)
+    tables: dict[str, Mapping[str, Any]] = {
+        "vary": {n: a.plain() for n, a in spec.vary.items()},
+        "set": spec.fixed,
+        "stop": stop,
+        "expect": expect,
+    }
+    parts = [_lines(top), *(f"[{name}]\n{_lines(table)}" for name, table in tables.items() if _lines(table))]
+    return "\n".join(parts)
+
+
+def _lines(table: Mapping[str, Any]) -> str:
+    return "".join(f"{_key(key)} = {_toml(value)}\n" for key, value in table.items() if value is not None)
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{_key(k)} = {_toml(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(value) if isinstance(value, int | float) else _text(str(value))
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch("[A-Za-z0-9_-]+", name) else _text(name)
+
+
+def _text(text: str) -> str:
+    """A TOML basic string; JSON's escapes are a subset of TOML's."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -1,0 +1,98 @@
+"""One writer per campaign folder: a lock file that says who, and that a killed writer cannot leave behind.
+
+The file holds pid and host; the operating system's advisory lock on it (`flock`) ends with the process, however that
+ends. So a file that is not locked is stale if it names this host, and is taken over. On another host (a shared file
+system) nobody can tell, so it is refused with the sentence that says what to do.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import socket
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+
+from skillframe.errors import InputError
+
+NAME = "lock"
+
+
+class FolderLock:
+    """Context manager that holds a campaign folder's lock.
+
+    Raises:
+        InputError: on entry, if another process holds it or a process on another host may.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / NAME
+        self._descriptor = -1
+
+    def __enter__(self) -> FolderLock:
+        self._descriptor = self._acquire()
+        os.ftruncate(self._descriptor, 0)
+        os.pwrite(self._descriptor, json.dumps({"pid": os.getpid(), "host": socket.gethostname()}).encode(), 0)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        with suppress(FileNotFoundError):
+            self._path.unlink()
+        os.close(self._descriptor)
+
+    def _acquire(self) -> int:
+        while True:
+            descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o644)
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                self._refuse_other_host(descriptor)
+            except BlockingIOError:
+                pid, host = _owner(descriptor)
+                os.close(descriptor)
+                fix = "wait until it ends, or stop it"
+                raise InputError(self._path, f"process {pid} on {host} is writing this campaign", fix) from None
+            except BaseException:
+                os.close(descriptor)
+                raise
+            if self._is_current(descriptor):
+                return descriptor
+            os.close(descriptor)  # its owner removed it between our opening and locking it
+
+    def _is_current(self, descriptor: int) -> bool:
+        with suppress(FileNotFoundError):
+            return os.path.samestat(os.fstat(descriptor), self._path.stat())
+        return False
+
+    def _refuse_other_host(self, descriptor: int) -> None:
+        pid, host = _owner(descriptor)
+        if host not in ("", socket.gethostname()):
+            fix = f"make sure that it has ended there, then delete {self._path}"
+            raise InputError(self._path, f"process {pid} on {host} may be writing this campaign", fix)
+
+
+def _owner(descriptor: int) -> tuple[int, str]:
+    """Pid and host in a lock file; 0 and "" where it is empty or damaged."""
+    try:
+        content = json.loads(os.pread(descriptor, 4096, 0))
+        return int(content["pid"]), str(content["host"])
+    except (ValueError, KeyError, TypeError):
+        return 0, ""
+
+
+def holder(folder: Path) -> tuple[int, str] | None:
+    """Pid and host of the process that is writing a campaign, or None."""
+    try:
+        descriptor = os.open(folder / NAME, os.O_RDONLY)
+    except FileNotFoundError:
+        return None
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        return None
+    except BlockingIOError:
+        return _owner(descriptor)
+    finally:
+        os.close(descriptor)

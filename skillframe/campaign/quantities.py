@@ -1,0 +1,64 @@
+"""What a campaign can vary, by name, and the refusal of everything else with a suggestion.
+
+`start.*` moves the tool's start, `fixture.*` and `grasp.*` the true pose of fixture and tool against what the
+controller believes, `robot.*` the plant against the controller's nominal model, `sensor.*` the wrench sensor; `world.*`
+are the fields of the world's parameter dataclass.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import typing
+from collections.abc import Iterable
+from typing import Any
+
+from skillframe.campaign.axes import Axis, Value
+from skillframe.config import coerce
+from skillframe.errors import InputError, UnknownName
+
+_POSES = [
+    f"{what}.{kind}_{axis}" for what in ("start", "fixture", "grasp") for kind in ("offset", "tilt") for axis in "xyz"
+]
+_BIASES = [f"sensor.{kind}_bias_{axis}" for kind in ("force", "torque") for axis in "xyz"]
+QUANTITIES = frozenset(
+    [*_POSES, *_BIASES, "robot.mass_scale", "robot.joint_friction", "sensor.force_noise", "sensor.torque_noise"]
+)
+GROUPS = ("start", "fixture", "grasp", "world", "robot", "actuator", "sensor")
+
+
+def world_hints(params: type) -> dict[str, Any]:
+    """`world.KEY` to annotation, from a world's parameter dataclass."""
+    hints = typing.get_type_hints(params)
+    return {f"world.{f.name}": hints[f.name] for f in dataclasses.fields(params) if f.init}
+
+
+def check_name(name: str, params: type, where: str) -> None:
+    """Refuse a quantity that cannot vary.
+
+    Raises:
+        InputError: with the nearest name, and the names of its group if the group is right.
+    """
+    known = {*QUANTITIES, *world_hints(params)}
+    if name in known:
+        return
+    group = name.partition(".")[0]
+    among: Iterable[str] = [k for k in known if k.startswith(f"{group}.")] if group in GROUPS else known
+    raise InputError(where, str(UnknownName("quantity", name, among)))
+
+
+def check_value(name: str, value: Value, params: type, where: str) -> Value:
+    """A value of a quantity, of the type that its world parameter has; every other quantity is a number."""
+    hint = world_hints(params).get(name, float)
+    checked: Value = coerce(value, hint, where)
+    return checked
+
+
+def check_axis(name: str, axis: Axis, params: type, where: str) -> Axis:
+    """The axis with its values in the quantity's own type.
+
+    Raises:
+        InputError: an unknown quantity, or values that it cannot take.
+    """
+    check_name(name, params, where)
+    values = tuple(check_value(name, v, params, f"{where}.{axis.kind}[{i}]") for i, v in enumerate(axis.numbers))
+    return Axis(kind=axis.kind, numbers=values)

@@ -1,0 +1,106 @@
+"""One row a trial and skill: its columns, its text form, and what two of them have to have in common.
+
+A row is a flat dict: `trial`, `skill`, `seed`, every varied quantity, then `OUTCOME`; a stored row also keeps `status`
+and `reason`. Numbers that JSON does not know (NaN, infinities) are stored as text and read back as numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from skillframe.campaign.sampling import draws
+from skillframe.campaign.spec import CampaignSpec
+
+Row = dict[str, Any]
+MEASURES = ("duration_s", "peak_force_n", "final_error_m", "final_error_rad")
+OUTCOME = ("success", "failure", *MEASURES)
+EXTRA = ("status", "reason")
+TRACE = "trace"
+"""Key of a row's trace as the bytes of a trace file, taken out before the row is stored."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChunkJob:
+    """Some trials of one skill: what a worker is handed.
+
+    Attributes:
+        spec: `CampaignSpec.plain()`.
+        folder: the campaign's folder, where the spec's relative paths start.
+        skill: index of the skill.
+        trials: trial numbers.
+        traces: whether every row shall bring its trace, as `TRACE`.
+    """
+
+    spec: dict[str, Any]
+    folder: str
+    skill: int
+    trials: tuple[int, ...]
+    traces: bool = False
+
+
+def columns(spec: CampaignSpec) -> list[str]:
+    """The columns of results.csv."""
+    return ["trial", "skill", "seed", *spec.vary, *OUTCOME]
+
+
+def rows_of(spec: CampaignSpec, skill: int, trials: tuple[int, ...], outcomes: Mapping[str, Any]) -> list[Row]:
+    """Rows out of arrays of outcomes, in the order of the trials.
+
+    Args:
+        spec: the campaign.
+        skill: index of the skill.
+        trials: n trial numbers.
+        outcomes: `OUTCOME` and, where there are, `EXTRA`, each (n,).
+    """
+    drawn = draws(spec, trials)
+    given = {name: outcomes[name] for name in (*OUTCOME, *EXTRA) if name in outcomes}
+    return [
+        {"trial": trial, "skill": spec.labels[skill], "seed": spec.seed}
+        | {name: plain_value(values[i]) for name, values in {**drawn, **given}.items()}
+        for i, trial in enumerate(trials)
+    ]
+
+
+def dead_row(spec: CampaignSpec, skill: int, trial: int, failure: str) -> Row:
+    """The row of a trial that left no outcome."""
+    outcome = {"success": [False], "failure": [failure], **{name: [math.nan] for name in MEASURES}}
+    return rows_of(spec, skill, (trial,), outcome)[0]
+
+
+def plain_value(value: Any) -> Any:
+    """A numpy scalar as Python's own."""
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def encode(value: Any) -> Any:
+    """A value for JSON: non-finite numbers as text."""
+    return repr(value) if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def decode(row: Row) -> Row:
+    """A row as it was before `encode`."""
+    return {key: float(v) if key in MEASURES and isinstance(v, str) else v for key, v in row.items()}
+
+
+def cell(value: Any) -> str:
+    """A value in results.csv: 1 and 0 for true and false, numbers that round-trip exactly."""
+    if isinstance(value, bool):
+        return str(int(value))
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+def differences(first: Row, second: Row) -> dict[str, tuple[Any, Any]]:
+    """Columns in which two rows are not bit-identical; two NaN are the same."""
+    names = [n for n in {**first, **second} if n != TRACE]
+    return {n: (first.get(n), second.get(n)) for n in names if not _same(first.get(n), second.get(n))}
+
+
+def _same(a: Any, b: Any) -> bool:
+    if isinstance(a, float) and isinstance(b, float):
+        return np.float64(a).tobytes() == np.float64(b).tobytes() or (math.isnan(a) and math.isnan(b))
+    return bool(a == b)

@@ -1,0 +1,221 @@
+"""`campaign.toml` as a checked record: what runs, how often, and what varies.
+
+`trials` is the total number per skill. Trial i of a campaign with grid axes takes cell i modulo the number of cells, so
+that every prefix of the trials covers the grid as evenly as it can; fewer trials than cells are refused. `[set]` fixes
+quantities (those of `--set`: `"world.clearance" = 0.0002`) that `[vary]` does not name.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from skillframe.campaign.axes import Axis, Value, parse_axis
+from skillframe.campaign.entries import parse_entry
+from skillframe.campaign.quantities import GROUPS, check_axis, check_name, check_value
+from skillframe.config import build, read_toml
+from skillframe.errors import InputError
+
+DURATION_S = 20.0
+"""Simulated time after which a trial has failed; our choice, several times what an insertion takes."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stop:
+    """When to stop early.
+
+    Attributes:
+        interval_width: stop once every skill's anytime-valid 95 % interval is this narrow.
+    """
+
+    interval_width: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Expect:
+    """The bar: exit code 1 when a skill's success rate is below it.
+
+    Attributes:
+        rate: lowest acceptable success rate.
+        skill: label of the skill it is asked of; None asks it of the first one.
+    """
+
+    rate: float | None = None
+    skill: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _File:
+    """The keys of a campaign file, in the types TOML has."""
+
+    seed: int
+    trials: int
+    robot: str
+    world: str
+    skills: tuple[str, ...]
+    name: str = ""
+    coc: str | None = None
+    duration_s: float = DURATION_S
+    vary: dict[str, Any] = field(default_factory=dict)
+    set: dict[str, Any] = field(default_factory=dict)
+    stop: Stop = field(default_factory=Stop)
+    expect: Expect = field(default_factory=Expect)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CampaignSpec:
+    """A campaign.
+
+    Attributes:
+        name: for people; the file's name if it has none.
+        seed: of every draw; trial i of a seed is the same whatever else runs.
+        trials: total number per skill.
+        robot: a robot's name or a path to a robot.toml or URDF, relative to `folder`.
+        world: a world's name.
+        skills: "FILE.skill.json" or "TYPE:DEMO,..." (see `entries`), relative to `folder`.
+        vary: what varies, by quantity.
+        fixed: quantities at one other value than the default, `[set]` in the file.
+        coc: centre of compliance, "x,y,z" in the tool frame or a frame's name; None for the skill's own.
+        duration_s: simulated time after which a trial has failed.
+        folder: where the file lies; relative paths start there.
+    """
+
+    name: str
+    seed: int
+    trials: int
+    robot: str
+    world: str
+    skills: tuple[str, ...]
+    vary: dict[str, Axis] = field(default_factory=dict)
+    fixed: dict[str, Value] = field(default_factory=dict)
+    coc: str | None = None
+    duration_s: float = DURATION_S
+    stop: Stop = field(default_factory=Stop)
+    expect: Expect = field(default_factory=Expect)
+    folder: Path = Path()
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """What the skills are called in results: "peg.skill.json", "replay:demo1.npz"."""
+        return tuple(parse_entry(text).label for text in self.skills)
+
+    @property
+    def cells(self) -> int:
+        """Number of cells of the grid; 1 without grid axes."""
+        return math.prod(len(axis.numbers) for axis in self.vary.values() if axis.kind == "grid")
+
+    def plain(self) -> dict[str, Any]:
+        """The campaign as plain JSON values, as `from_plain` reads them; without its folder."""
+        values = {key: value for key, value in asdict(self).items() if key not in ("vary", "folder")}
+        values["skills"] = list(self.skills)
+        return {**values, "vary": {name: axis.plain() for name, axis in self.vary.items()}}
+
+    @classmethod
+    def from_plain(cls, values: Mapping[str, Any], folder: Path = Path()) -> CampaignSpec:
+        """The inverse of `plain`, for values that were checked before."""
+        axes = {name: parse_axis(value, name) for name, value in values["vary"].items()}
+        stop, expect = Stop(**values["stop"]), Expect(**values["expect"])
+        rest = {k: v for k, v in values.items() if k not in ("vary", "stop", "expect", "skills")}
+        return cls(**rest, skills=tuple(values["skills"]), vary=axes, stop=stop, expect=expect, folder=folder)
+
+    @classmethod
+    def from_toml(cls, path: Path, params: type | None = None) -> CampaignSpec:
+        """A checked campaign from its file.
+
+        Args:
+            path: the TOML file.
+            params: the world's parameter dataclass; None looks it up in the registry.
+
+        Raises:
+            InputError: what is wrong and where, as "file: section.key".
+            UnknownName: there is no such world.
+        """
+        file = build(_File, read_toml(path), f"{path}: campaign")
+        params = params or _world_params(file.world)
+        _check_numbers(file, path)
+        _check_skills(file, path)
+        given = flatten(file.vary)
+        vary = {name: _axis(name, value, params, file, path) for name, value in given.items()}
+        fixed = {name: _fixed(name, value, params, given, path) for name, value in flatten(file.set).items()}
+        values = {k: getattr(file, k) for k in ("seed", "trials", "robot", "world", "skills", "coc", "duration_s")}
+        spec = cls(**values, name=file.name or path.stem, vary=vary, fixed=fixed, stop=file.stop, expect=file.expect,
+                   folder=path.parent)  # fmt: skip
+        _check_designs(spec, path)
+        return spec
+
+
+def flatten(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Quantities of a table, whether written as "start.tilt_y", as start.tilt_y or under [vary.start]."""
+    flat: dict[str, Any] = {}
+    for key, value in table.items():
+        if key in GROUPS and isinstance(value, Mapping):
+            flat.update({f"{key}.{name}": content for name, content in value.items()})
+        else:
+            flat[key] = value
+    return flat
+
+
+def _world_params(name: str) -> type:
+    from skillframe.registry import registry
+
+    return registry().world(name).params
+
+
+def _check_numbers(file: _File, path: Path) -> None:
+    width, rate = file.stop.interval_width, file.expect.rate
+    checks = [
+        ("seed", file.seed, file.seed >= 0, "give zero or more"),
+        ("trials", file.trials, file.trials >= 1, "give at least 1"),
+        ("duration_s", file.duration_s, 0.0 < file.duration_s < math.inf, "give seconds above zero"),
+        ("stop.interval_width", width, width is None or 0.0 < width < 1.0, "give a number between 0 and 1"),
+        ("expect.rate", rate, rate is None or 0.0 <= rate <= 1.0, "give a number from 0 to 1"),
+    ]
+    for key, value, good, fix in checks:
+        if not good:
+            raise InputError(f"{path}: {key}", f"is {value}", fix)
+
+
+def _check_skills(file: _File, path: Path) -> None:
+    if not file.skills:
+        raise InputError(f"{path}: skills", "is empty", "name at least one skill file")
+    entries = [parse_entry(text) for text in file.skills]
+    labels = [entry.label for entry in entries]
+    for i, entry in enumerate(entries):
+        where = f"{path}: skills[{i}]"
+        if labels.index(entry.label) != i:
+            raise InputError(where, f"a second skill is called {entry.label!r}", "rename one of the files")
+        if not entry.files:
+            raise InputError(where, f"{entry.text!r} names no file", f"write for example {entry.kind}:demo.npz")
+        missing = [name for name in entry.files if not (path.parent / name).is_file()]
+        if missing:
+            raise InputError(where, f"no such file: {missing[0]}", "paths are relative to the campaign file")
+    if file.expect.skill is not None and file.expect.skill not in labels:
+        raise InputError(f"{path}: expect.skill", f"no skill is called {file.expect.skill!r}; there are {labels}")
+
+
+def _axis(name: str, value: Any, params: type, file: _File, path: Path) -> Axis:
+    where = f"{path}: vary.{name}"
+    check_name(name, params, where)
+    axis = check_axis(name, parse_axis(value, where), params, where)
+    if axis.kind == "values" and len(axis.numbers) != file.trials:
+        raise InputError(where, f"{len(axis.numbers)} values for {file.trials} trials", "give one value per trial")
+    return axis
+
+
+def _fixed(name: str, value: Any, params: type, varied: Mapping[str, Any], path: Path) -> Value:
+    where = f"{path}: set.{name}"
+    check_name(name, params, where)
+    if name in varied:
+        raise InputError(where, "is both fixed and varied", "keep one of the two")
+    return check_value(name, value, params, where)
+
+
+def _check_designs(spec: CampaignSpec, path: Path) -> None:
+    if spec.trials < spec.cells:
+        raise InputError(
+            f"{path}: trials", f"{spec.trials} trials leave some of the grid's {spec.cells} cells empty",
+            f"give at least {spec.cells}, best a multiple of it",
+        )  # fmt: skip

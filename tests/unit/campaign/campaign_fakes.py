@@ -1,0 +1,146 @@
+"""A campaign without a simulator: success inside a closed-form region, and trials that kill, hang, hoard and raise."""
+
+import ctypes
+import math
+import os
+import signal
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from skillframe.campaign.folder import prepare
+from skillframe.campaign.rows import TRACE, rows_of
+from skillframe.campaign.runner import Options, run_campaign
+from skillframe.campaign.sampling import draws, trial_rngs
+from skillframe.campaign.spec import CampaignSpec
+
+GUILTY = 37
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FakeParams:
+    friction: float = 0.2
+    clearance: float = 0.00025
+    profile: str = "round"
+    segments: int = 48
+
+
+TEXT = """
+name = "fake"
+seed = 7
+trials = {trials}
+robot = "robots/box/robot.toml"
+world = "fake"
+skills = ["a.skill.json", "replay:demo.npz"]
+duration_s = 5.0
+[vary]
+"start.tilt_y" = {{ uniform = [-0.21, 0.21] }}
+"start.offset_x" = {{ normal = [0.0, 0.002] }}
+"world.friction" = {{ choice = [0.1, 0.2, 0.3] }}
+{extra}
+"""
+
+
+def write_campaign(folder: Path, *, trials: int = 128, extra: str = "", text: str = TEXT) -> Path:
+    (folder / "robots" / "box").mkdir(parents=True, exist_ok=True)
+    (folder / "robots" / "box" / "robot.toml").write_text('urdf = "box.urdf"\n')
+    (folder / "robots" / "box" / "box.urdf").write_text("<robot/>")
+    (folder / "a.skill.json").write_text("{}")
+    (folder / "demo.npz").write_bytes(b"\x00")
+    path = folder / "campaign.toml"
+    path.write_text(text.format(trials=trials, extra=extra))
+    return path
+
+
+def start(path: Path, out: Path) -> Path:
+    prepare(CampaignSpec.from_toml(path, FakeParams), out, lambda spec: {"fixture": []}, FakeParams)
+    return out
+
+
+def run(folder: Path, evaluate=None, notify=None, **options):
+    return run_campaign(folder, evaluate or good, Options(**options), notify, FakeParams)
+
+
+def good(job):
+    """A skill succeeds while |tilt| stays below its cone less the friction; noise comes from the trial's generator."""
+    spec = CampaignSpec.from_plain(job.spec)
+    drawn = draws(spec, job.trials)
+    noise = np.array([rng.standard_normal() for rng in trial_rngs(spec.seed, job.trials)])
+    reach = np.abs(drawn["start.tilt_y"]) + 0.1 * drawn["world.friction"] + 0.01 * noise + abs(drawn["start.offset_x"])
+    success = reach < (0.18 if job.skill == 0 else 0.12)
+    rows = rows_of(spec, job.skill, job.trials, {
+        "success": success, "failure": np.where(success, "", "stuck"), "duration_s": 2.0 + reach,
+        "peak_force_n": np.where(success, 10.0 + noise, np.nan), "final_error_m": reach / 7.0,
+        "final_error_rad": np.zeros(len(reach)), "status": np.where(success, 1, 2), "reason": np.where(success, "done", ""),
+    })  # fmt: skip
+    for row in rows if job.traces else ():
+        row[TRACE] = f"trace of {row['trial']}".encode()
+    return rows
+
+
+def slow(job):
+    time.sleep(0.02 * len(job.trials))
+    return good(job)
+
+
+def _guilty(job):
+    return GUILTY in job.trials and job.skill == 0 and not job.traces
+
+
+def kills(job):
+    if _guilty(job):
+        os.kill(os.getpid(), signal.SIGKILL)
+    return slow(job)
+
+
+def hangs(job):
+    if _guilty(job):
+        time.sleep(3600)
+    return slow(job)
+
+
+def hangs_holding_the_lock(job):
+    if _guilty(job):
+        ctypes.PyDLL(None).sleep(3600)
+    return slow(job)
+
+
+def hoards(job):
+    if _guilty(job):
+        hoard = []
+        while True:
+            hoard.append(np.ones(1_000_000))
+            time.sleep(0.005)
+    return slow(job)
+
+
+def raises(job):
+    if _guilty(job):
+        raise ValueError("the skill tripped")
+    return slow(job)
+
+
+def always_raises(job):
+    raise ValueError("nothing works")
+
+
+def dies_once(job):
+    """Kills its worker the first time the guilty trial runs; the marker lies beside the rows."""
+    marker = Path(job.folder) / "died"
+    if _guilty(job) and not marker.exists():
+        marker.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return slow(job)
+
+
+def dark(job):
+    """Every measure is not a number."""
+    return [{**row, "peak_force_n": math.nan, "final_error_m": math.inf} for row in good(job)]
+
+
+if __name__ == "__main__":  # campaign_fakes.py FOLDER FUNCTION [WORKERS]: a client that tests kill
+    workers = int(sys.argv[3]) if len(sys.argv) > 3 else None
+    run(Path(sys.argv[1]), getattr(__import__("campaign_fakes"), sys.argv[2]), workers=workers, chunk=8, traces=0)
