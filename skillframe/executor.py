@@ -10,17 +10,18 @@ its kinematics and dynamics come from a second, nominal batch.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.conditioning.kalman import SteadyWrenchFilter
+from skillframe.conditioning.kalman import WrenchFilter
 from skillframe.control.impedance import critical_damping, impedance_wrench, null_space_damping, task_inertia
 from skillframe.control.limits import LimitGuard
 from skillframe.frames import Float, Pose, norm
 from skillframe.recorder import Recorder
 from skillframe.robot.model import RobotModel
+from skillframe.robot.spec import Limits
 from skillframe.skill import Command, Impedance, Observation, Reasons, Skill, Status, no_reasons
 from skillframe.trace import Trace
 from skillframe.world.placement import QUANTITIES, check_quantities, fixture_poses, start_configurations
@@ -121,6 +122,12 @@ def simulate(
     return loop.result()
 
 
+def _joint_limits(robot: RobotModel) -> Limits:
+    """The robot's limits; a free-flying tool has no joints whose torque rate could be limited."""
+    limits = robot.spec.limits
+    return replace(limits, torque_rate_nm_s=None) if robot.spec.base == "free" else limits
+
+
 class _Loop:
     """The state of one batch while it runs."""
 
@@ -139,8 +146,8 @@ class _Loop:
         self.nominal = Plant(robot, scene, count, fixture, {}, timestep=self.dt) if varied else self.plant
         self.plant.reset(start_configurations(robot, scene, draws, count))
         self.sensors = Sensors(setup.sensors, self.plant, [pair[0] for pair in children], draws)
-        self.filter = SteadyWrenchFilter.standard(setup.sensors.force_noise, setup.sensors.torque_noise, self.dt)
-        self.guard = LimitGuard(robot.spec.limits, count, self.dt)
+        self.filter = WrenchFilter(dt=self.dt).steady()
+        self.guard = LimitGuard(_joint_limits(robot), count, self.dt)
         self.coc = np.asarray(setup.center_of_compliance, dtype=float)
         self.active = np.arange(count)
         self.reason, self.status = no_reasons(count), np.zeros(count, dtype=np.int64)

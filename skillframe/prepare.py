@@ -1,7 +1,7 @@
 """From names and values to a skill and a set-up that the executor can run; shared by `run`, campaigns and quickstart.
 
-Settings are the keys of `--set` and of `[vary]`: parameters of the world's dataclass (`world.clearance`) shape the scene;
-the quantities of the executor (`start.tilt_y`, `fixture.offset_x`, `world.friction` ...) are per trial.
+Settings are the keys of `--set` and of `[vary]`: parameters of the world's dataclass (`world.clearance`) shape the
+scene; the quantities of the executor (`start.tilt_y`, `fixture.offset_x`, `world.friction` ...) are per trial.
 """
 
 from __future__ import annotations

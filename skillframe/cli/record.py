@@ -29,8 +29,8 @@ def command(
 ) -> int:  # fmt: skip
     """Record demonstrations of a world from a simulated person.
 
-    Demonstrations that fail are redrawn and counted. The starts of the world's task are taken in turn, so that --count 2
-    shows the valley from both sides.
+    Demonstrations that fail are redrawn and counted. The starts of the world's task are taken in turn, so that
+    --count 2 shows the valley from both sides.
 
     \b
     Example:

@@ -13,7 +13,7 @@ import click
 @click.argument("skill")
 @click.option("--world", required=True, help="World to run in (skillframe plugins list names them).")
 @click.option("--robot", default="free_tool", show_default=True, help="Robot name, robot.toml or URDF.")
-@click.option("--coc", help='Centre of compliance: "x,y,z" in the tool frame or a frame (tip, wrist); default as learned.')
+@click.option("--coc", help='Centre of compliance: "x,y,z" in the tool frame, or a frame (tip, wrist) [as learned].')
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="world.*, start.*, fixture.*, grasp.* ...")
 @click.option("--out", type=click.Path(path_type=Path), help="Trace file (.npz).")
 @click.option("--replay", type=click.Path(path_type=Path), help="3-D replay of the run (.html).")

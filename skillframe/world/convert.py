@@ -50,6 +50,7 @@ def build_spec(robot: RobotModel, scene: Scene, timestep: float = TIMESTEP) -> m
 
 
 def _set_options(spec: mujoco.MjSpec, timestep: float) -> None:
+    spec.compiler.degree = False
     spec.option.timestep = timestep
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
@@ -101,7 +102,7 @@ def _add_joint(body: Any, model: pin.Model, index: int) -> None:
     made = body.add_joint(
         name=name, axis=axis, type=mujoco.mjtJoint.mjJNT_SLIDE if sliding else mujoco.mjtJoint.mjJNT_HINGE
     )
-    made.damping = float(model.damping[v])
+    made.damping = [float(model.damping[v]), 0.0, 0.0]
     made.frictionloss = float(model.friction[v])
     made.armature = float(model.armature[v])
     if joint.nq == 1 and np.isfinite(model.lowerPositionLimit[joint.idx_q]):
