@@ -97,6 +97,8 @@ def _simulate(spec: CampaignSpec, job: ChunkJob, trials: tuple[int, ...], scene:
         skill, setup, {**constant, **varied}, trial_rngs(spec.seed, trials), duration_s=spec.duration_s,
         trace_hz=TRACE_HZ if job.traces else None,
     )  # fmt: skip
+    if result.interrupted:  # rows that a Ctrl-C cut short are no outcome
+        raise KeyboardInterrupt
     rows = rows_of(spec, job.skill, trials, {name: getattr(result, name) for name in (*OUTCOME, *EXTRA)})
     for row, trace in zip(rows, result.traces or [], strict=job.traces):
         row[TRACE] = _trace_bytes(trace, row, list(spec.vary))

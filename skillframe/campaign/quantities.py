@@ -16,13 +16,6 @@ from skillframe.campaign.axes import Axis, Value
 from skillframe.config import coerce
 from skillframe.errors import InputError, UnknownName
 
-_POSES = [
-    f"{what}.{kind}_{axis}" for what in ("start", "fixture", "grasp") for kind in ("offset", "tilt") for axis in "xyz"
-]
-_BIASES = [f"sensor.{kind}_bias_{axis}" for kind in ("force", "torque") for axis in "xyz"]
-QUANTITIES = frozenset(
-    [*_POSES, *_BIASES, "robot.mass_scale", "robot.joint_friction", "sensor.force_noise", "sensor.torque_noise"]
-)
 GROUPS = ("start", "fixture", "grasp", "world", "robot", "actuator", "sensor")
 
 
@@ -38,7 +31,9 @@ def check_name(name: str, params: type, where: str) -> None:
     Raises:
         InputError: with the nearest name, and the names of its group if the group is right.
     """
-    known = {*QUANTITIES, *world_hints(params)}
+    from skillframe.executor import QUANTITIES
+
+    known = {*(name for name in QUANTITIES if not name.startswith("world.")), *world_hints(params)}
     if name in known:
         return
     group = name.partition(".")[0]

@@ -1,0 +1,45 @@
+"""How far a campaign is, read from its folder alone, also while another process runs it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from skillframe.campaign.folder import campaign_hash, load
+from skillframe.campaign.lock import holder
+from skillframe.campaign.stopping import StopRule
+from skillframe.campaign.store import ordered, read_rows
+from skillframe.campaign.summary import comparisons, rates
+
+
+def status_of(folder: Path, params: type | None = None) -> dict[str, Any]:
+    """The state of a campaign as plain JSON values.
+
+    Args:
+        folder: the campaign's folder.
+        params: the world's parameter dataclass; None looks it up.
+
+    Returns:
+        `name`, `rows`, `planned_rows`, `complete`, `stopped_after_trial`, `running` (null, or `pid` and `host` of the
+        process that is writing), `skills` and `comparisons` as in summary.json.
+
+    Raises:
+        InputError: not a campaign's folder, or rows of another campaign.
+    """
+    spec = load(folder, params)
+    done, _ = read_rows(folder, campaign_hash(spec))
+    rule = StopRule(spec)
+    rule.add(done.values())
+    planned = spec.trials * len(spec.skills)
+    complete = rule.after is not None or len(done) == planned
+    rows, owner = ordered(spec, done.values(), rule.after), holder(folder)
+    return {
+        "name": spec.name,
+        "rows": len(rows),
+        "planned_rows": planned,
+        "complete": complete,
+        "stopped_after_trial": rule.after,
+        "running": {"pid": owner[0], "host": owner[1]} if owner else None,
+        "skills": rates(spec, rows, complete),
+        "comparisons": comparisons(spec, rows, complete),
+    }

@@ -1,0 +1,244 @@
+"""`skillframe campaign`: run, resume, look at and replay campaigns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from skillframe.campaign.runner import Options, Progress
+    from skillframe.campaign.spec import CampaignSpec
+
+_FOLDER = click.Path(path_type=Path)
+INTERRUPTED = 130
+
+
+@click.group(name="campaign")
+def command() -> None:
+    """Run skills many times over declared uncertainty, and keep every row.
+
+    \b
+    Example:
+      skillframe campaign run peg.toml --out results --workers 2
+      skillframe campaign status results
+      skillframe campaign replay results 17 --out trial17.npz
+    """
+
+
+def _running(function: Callable[..., int]) -> Callable[..., int]:
+    """The options that `run` and `resume` share."""
+    options = [
+        click.option("--workers", type=click.IntRange(min=1), help="Worker processes on this machine [in-process]."),
+        click.option("--scheduler", metavar="ADDRESS", help="A running Dask scheduler, e.g. tcp://10.0.0.5:8786."),
+        click.option("--chunk", type=click.IntRange(min=1), help="Largest number of trials per job [64]."),
+        click.option(
+            "--time-limit", "time_limit_s", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS",
+            help="Wall time after which a worker is taken for hung [60 s + 0.25 s per simulated second and trial].",
+        ),
+        click.option("--traces", type=click.IntRange(min=0), help="Trials per skill that leave a trace [8]."),
+    ]  # fmt: skip
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
+@command.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--out", type=_FOLDER, required=True, help="Folder for the results; absent or empty.")
+@_running
+def run(file: Path, out: Path, **settings: Any) -> int:
+    """Run the campaign that FILE (campaign.toml) declares.
+
+    Exit code 0; 1 if a success rate is below `[expect] rate`; 2 if something given cannot be used; 130 after Ctrl-C,
+    with everything that was finished kept.
+
+    \b
+    Example:
+      skillframe campaign run peg.toml --out results --workers 2
+    """
+    options = _options(settings)
+    from skillframe.campaign import evaluate
+    from skillframe.campaign.folder import prepare
+    from skillframe.campaign.spec import CampaignSpec
+    from skillframe.registry import registry
+
+    spec = CampaignSpec.from_toml(file)
+    prepare(spec, out, evaluate.describe, registry().world(spec.world).params)
+    return _go_on(out, options)
+
+
+@command.command()
+@click.argument("folder", type=_FOLDER)
+@_running
+def resume(folder: Path, **settings: Any) -> int:
+    """Run what is missing of the campaign in FOLDER; ends in the table an uninterrupted run gives.
+
+    Exit codes as for `run`.
+
+    \b
+    Example:
+      skillframe campaign resume results --workers 2
+    """
+    return _go_on(folder, _options(settings))
+
+
+@command.command()
+@click.argument("folder", type=_FOLDER)
+@click.option("--json", "as_json", is_flag=True, help="JSON alone on stdout.")
+def status(folder: Path, as_json: bool) -> int:
+    """How far the campaign in FOLDER is, and its rates so far; may be asked while it runs.
+
+    \b
+    Example:
+      skillframe campaign status results --json
+    """
+    from skillframe.campaign.status import status_of
+    from skillframe.cli.output import emit_json
+
+    now = status_of(folder)
+    if as_json:
+        emit_json(now)
+        return 0
+    state = "complete" if now["complete"] else "unfinished"
+    if now["running"]:
+        state = f"running, process {now['running']['pid']} on {now['running']['host']}"
+    click.echo(f"{now['name']}: {now['rows']} of {now['planned_rows']} rows, {state}")
+    _show_rates(now["skills"])
+    if state == "unfinished":
+        click.echo(f"to go on: skillframe campaign resume {folder}")
+    return 0
+
+
+@command.command()
+@click.argument("folder", type=_FOLDER)
+@click.argument("trial", type=click.IntRange(min=0))
+@click.option("--skill", help="Skill as in results.csv, or its beginning [the first].")
+@click.option("--out", type=_FOLDER, help="Trace file (.npz).")
+def replay(folder: Path, trial: int, skill: str | None, out: Path | None) -> int:
+    """Run TRIAL of the campaign in FOLDER again, alone, and compare it with its row bit by bit.
+
+    Exit code 0 if they are identical, 1 if not.
+
+    \b
+    Example:
+      skillframe campaign replay results 17 --skill peg --out trial17.npz
+    """
+    from skillframe.campaign import evaluate
+    from skillframe.campaign.replay import replay_trial
+    from skillframe.campaign.store import write_bytes
+    from skillframe.cli.output import table
+
+    found = replay_trial(folder, trial, evaluate.evaluate, skill)
+    names = list(dict.fromkeys([*found.then, *found.now]))
+    marks = {name: "differs" if name in found.changed else "" for name in names}
+    table(
+        ["column", "campaign", "replay", ""],
+        [[n, found.then.get(n, ""), found.now.get(n, ""), marks[n]] for n in names],
+    )
+    if out is not None and found.trace is not None:
+        write_bytes(out, found.trace)
+        click.echo(f"trace: {out}")
+    for line in found.environment:
+        click.echo(f"not as in the campaign: {line}", err=True)
+    click.echo("identical to the last bit" if not found.changed else f"differs in {', '.join(found.changed)}")
+    return 1 if found.changed else 0
+
+
+def _options(settings: dict[str, Any]) -> Options:
+    from skillframe.campaign.runner import Options
+
+    if settings["workers"] and settings["scheduler"]:
+        raise click.UsageError("give --workers or --scheduler, not both")
+    return Options(**{name: value for name, value in settings.items() if value is not None})
+
+
+def _go_on(folder: Path, options: Options) -> int:
+    """Run what is missing and tell the outcome."""
+    from skillframe.campaign import evaluate
+    from skillframe.campaign.folder import load
+    from skillframe.campaign.runner import run_campaign
+
+    spec = load(folder)
+    try:
+        with _progress() as notify:
+            summary = run_campaign(folder, evaluate.evaluate, options, notify)
+    except KeyboardInterrupt:
+        click.echo(f"interrupted; finished rows are kept, to go on: skillframe campaign resume {folder}", err=True)
+        return INTERRUPTED
+    return _conclude(folder, spec, summary)
+
+
+def _conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any]) -> int:
+    from skillframe.campaign.summary import below_bar
+
+    _show_rates(summary["skills"])
+    for pair in summary["comparisons"]:
+        click.echo(
+            f"{pair['first']} against {pair['second']} on the same {pair['trials']} draws: only the first succeeds in "
+            f"{pair['only_first']}, only the second in {pair['only_second']} (p = {pair['p_value']:.2g}, {pair['method']})"
+        )
+    if summary["stopped_after_trial"] is not None:
+        click.echo(f"stopped early after trial {summary['stopped_after_trial']}: the intervals are narrow enough")
+    click.echo(f"results: {folder / 'results.csv'}")
+    short = below_bar(spec, summary)
+    if short:
+        click.echo(short, err=True)
+    return 1 if short else 0
+
+
+def _show_rates(skills: dict[str, dict[str, Any]]) -> None:
+    from skillframe.cli.output import table
+
+    rows = [
+        [
+            label, s["trials"], s["successes"], "-" if s["rate"] is None else f"{s['rate']:.3f}",
+            f"{s['interval_95'][0]:.3f} .. {s['interval_95'][1]:.3f}", s["method"],
+        ]
+        for label, s in skills.items()
+    ]  # fmt: skip
+    table(["skill", "trials", "successes", "rate", "95 % interval", "method"], rows)
+    for label, s in skills.items():
+        for text, count in sorted(s["failures"].items(), key=lambda item: -item[1])[:3]:
+            click.echo(f"  {label}: {count} x {text}")
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[Progress], None]]:
+    """A bar on a terminal, a line per tenth of the work in a pipe; both on stderr."""
+    import sys
+
+    if not sys.stderr.isatty():
+        yield _lines()
+        return
+    from rich.console import Console
+    from rich.progress import Progress as Bar
+
+    console = Console(stderr=True)
+    with Bar(console=console, transient=True) as bar:
+        task = bar.add_task("trials", total=None)
+
+        def show(progress: Progress) -> None:
+            bar.update(task, completed=progress.done, total=progress.total)
+            if progress.note:
+                console.print(progress.note, markup=False)
+
+        yield show
+
+
+def _lines() -> Callable[[Progress], None]:
+    shown = -1
+
+    def show(progress: Progress) -> None:
+        nonlocal shown
+        tenth = 10 * progress.done // progress.total
+        if tenth != shown:
+            shown = tenth
+            click.echo(f"{progress.done} of {progress.total} rows", err=True)
+        if progress.note:
+            click.echo(progress.note, err=True)
+
+    return show
