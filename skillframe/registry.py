@@ -31,7 +31,7 @@ KINDS: Mapping[str, str] = {
     "world": "skillframe_worlds",
     "reader": "skillframe_readers",
 }
-RECORDS: Mapping[str, type] = {
+RECORDS: Mapping[str, type[Any]] = {
     "skill": SkillType,
     "segmenter": SegmenterType,
     "coordinator": CoordinatorType,
@@ -195,11 +195,14 @@ def _hook_problems(module: object) -> Iterator[BadPlugin]:
         function = getattr(module, name, None)
         marker = getattr(function, f"{hookspecs.GROUP}_impl", None)
         marked = isinstance(marker, dict)
+        optional = isinstance(marker, dict) and marker["optionalhook"]  # a hook of a newer core, declared as such
         if name not in KINDS.values() and callable(function) and (marked or name.startswith("skillframe_")):
-            if not (marked and marker["optionalhook"]):  # a hook of a newer core, declared as such
+            if not optional:
                 yield BadPlugin(str(UnknownName("hook", name, KINDS.values())))
         elif name in KINDS.values() and not marked:
-            yield BadPlugin(f"{name} lacks @hookimpl and would never be called; add it (from skillframe import hookimpl)")
+            yield BadPlugin(
+                f"{name} lacks @hookimpl and would never be called; add it (from skillframe import hookimpl)"
+            )
 
 
 def _checked(kind: str, answer: object) -> list[Any]:

@@ -1,7 +1,7 @@
 """Skills as they are named on the command line and in campaigns: a skill file, or a kind of skill and demonstrations.
 
-"peg.skill.json" is a skill file. "replay:demo1.npz" learns the kind `replay` from that file in memory; more files and the
-learner's settings follow after commas: "lmc:a.npz,b.npz", "replay:demo1.npz,mode=absolute".
+"peg.skill.json" is a skill file. "replay:demo1.npz" learns the kind `replay` from that file in memory; more files and
+the learner's settings follow after commas: "lmc:a.npz,b.npz", "replay:demo1.npz,mode=absolute".
 """
 
 from __future__ import annotations
@@ -16,9 +16,7 @@ from skillframe.errors import InputError
 from skillframe.records import Document, LearnOptions, SkillType
 
 
-def learned(
-    skill: SkillType, demonstrations: Sequence[Demonstration], options: LearnOptions | None = None
-) -> Document:
+def learned(skill: SkillType, demonstrations: Sequence[Demonstration], options: LearnOptions | None = None) -> Document:
     """A whole skill document, learned from demonstrations.
 
     Raises:
@@ -27,7 +25,9 @@ def learned(
     from skillframe.skillfile import new_document
 
     if skill.learn is None:
-        raise InputError(f"skill type {skill.name}", "is not learned from demonstrations", "write its skill file by hand")
+        raise InputError(
+            f"skill type {skill.name}", "is not learned from demonstrations", "write its skill file by hand"
+        )
     body = skill.learn(demonstrations, options or LearnOptions())
     return new_document(skill, body, demonstrations)
 

@@ -57,8 +57,8 @@ class SkillConformance:
     Attributes:
         skill_type: the name it is registered under.
         document: a skill document to try it with, or None.
-        demonstrations: demonstrations to learn the document from, or None: the type's own `example`, or else the example
-            demonstrations.
+        demonstrations: demonstrations to learn the document from, or None: the type's own `example`, or else the
+            example demonstrations.
     """
 
     skill_type: ClassVar[str] = ""

@@ -1,4 +1,4 @@
-"""Shared by every test: tests of plug-ins are skipped where no plug-in may load, and each test sees a fresh registry."""
+"""Shared by every test: what needs plug-ins is skipped where none may load; a registry can be loaded anew."""
 
 from __future__ import annotations
 

@@ -6,6 +6,7 @@ its command is used, so that `skillframe --help` loads no scientific library.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -36,19 +37,33 @@ class LazyGroup(click.Group):
     """A group whose commands live in `skillframe.cli.<name>`, imported on use; absent modules are not listed."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names of the commands whose module is there."""
         return [name for name in COMMANDS if find_spec(f"skillframe.cli.{name}") is not None]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command of that name, its module imported now."""
         if cmd_name not in self.list_commands(ctx):
             return None
         command: click.Command = import_module(f"skillframe.cli.{cmd_name}").command
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, COMMANDS[name]) for name in self.list_commands(ctx)])
+        """The list in `--help`, made without importing a command."""
+        rows = [(name, COMMANDS[name]) for name in self.list_commands(ctx)]
+        if rows:
+            with formatter.section("Commands"):
+                formatter.write_dl(rows)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """As click does; that the reader of our output has left, as `head` does, is no error."""
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 0
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        """As click does, but an unknown name is answered with the nearest one."""
         if args and not args[0].startswith("-") and args[0] not in self.list_commands(ctx):
             from skillframe.errors import UnknownName
 
@@ -91,14 +106,21 @@ def run(arguments: Sequence[str], debug: bool = False) -> int:
     except (KeyboardInterrupt, click.Abort):
         click.echo("interrupted; what was finished is kept", err=True)
         return 130
-    except BrokenPipeError:
-        return 0
+    except OSError as error:
+        if debug or error.filename is None:
+            return _internal(error, debug)
+        click.echo(f"error: {error.filename}: {error.strerror}", err=True)
+        return 2
     except Exception as error:
-        if debug:
-            raise
-        click.echo(f"internal error: {type(error).__name__}: {error} (run again with --debug for the traceback)", err=True)
-        return 3
+        return _internal(error, debug)
     return result if isinstance(result, int) else 0
+
+
+def _internal(error: Exception, debug: bool) -> int:
+    if debug:
+        raise error
+    click.echo(f"internal error: {type(error).__name__}: {error} (run again with --debug for the traceback)", err=True)
+    return 3
 
 
 if __name__ == "__main__":

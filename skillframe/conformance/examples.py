@@ -1,7 +1,7 @@
 r"""Inputs to try plug-ins with: two demonstrations of sliding into a valley, and random observations.
 
-The demonstrations are written down from the statics of a point that slides on a plane with Coulomb friction, so that they
-need no simulator: a tool that moves along the unit vector \(t\) on a plane with normal \(n\) feels the wrench force
+The demonstrations are written down from the statics of a point that slides on a plane with Coulomb friction, so that
+they need no simulator: a tool that moves along the unit vector \(t\) on a plane with normal \(n\) feels the force
 \(f = N (n - \mu t)\). They are there to exercise a learner, not to judge what it learns.
 """
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 from typing import Any
 
 from skillframe.conformance.examples import example_demonstrations
@@ -42,7 +43,7 @@ def segmentation_problems(document: Document, demos: Sequence[Demonstration], co
     for i, (row, demo) in enumerate(zip(rows, demos, strict=True)):
         cuts, labels = row["boundaries"], row["labels"]
         inside = all(demo.time[0] < cut < demo.time[-1] for cut in cuts)
-        if not inside or any(b <= a for a, b in zip(cuts, cuts[1:], strict=False)):
+        if not inside or any(b <= a for a, b in pairwise(cuts)):
             yield f"demonstration {i}: boundaries {cuts} are not inner times in increasing order"
         if len(labels) != len(cuts) + 1:
             yield f"demonstration {i}: {len(labels)} labels for {len(cuts) + 1} intervals"

@@ -97,5 +97,8 @@ def _geoms(scene: Scene) -> list[Geom]:
 
 def _fingerprint(scene: Scene) -> str:
     """Geometry and numbers of a scene as text; predicates are left out."""
-    rows = [{k: np.asarray(v).tolist() for k, v in dataclasses.asdict(geom).items() if v is not None} for geom in _geoms(scene)]
+    rows = [
+        {k: np.asarray(v).tolist() for k, v in dataclasses.asdict(geom).items() if v is not None}
+        for geom in _geoms(scene)
+    ]
     return json.dumps([rows, scene.start_tip, scene.start_quaternion, scene.friction, scene.tool.mass, scene.analytic])

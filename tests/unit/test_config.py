@@ -3,7 +3,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import given
+from hypothesis import strategies as st
 
 from skillframe.config import build, coerce, parse_setting, read_toml
 from skillframe.errors import InputError
@@ -40,8 +41,8 @@ def refusal(values):
 def test_plain_values_become_the_annotated_types():
     made = build(
         Outer,
-        {"name": "peg", "friction": 1, "inner": {"segments": 8}, "limits": [0, 2], "names": ["a"], "many": [{}, {"clearance": 1}],
-         "table": {"x": 1}, "note": "n", "file": "b.urdf", "flag": True},
+        {"name": "peg", "friction": 1, "inner": {"segments": 8}, "limits": [0, 2], "names": ["a"],
+         "many": [{}, {"clearance": 1}], "table": {"x": 1}, "note": "n", "file": "b.urdf", "flag": True},
         "peg.toml",
     )  # fmt: skip
     assert made == Outer(
@@ -99,7 +100,15 @@ def test_a_number_set_on_the_command_line_arrives_exactly(value, key):
 
 @pytest.mark.parametrize(
     ("text", "value"),
-    [("k=true", True), ("k=[1, 2]", [1, 2]), ('k="3"', "3"), ("k=panda", "panda"), ("k=a=b", "a=b"), ("k=", ""), ("k=7", 7)],
+    [
+        ("k=true", True),
+        ("k=[1, 2]", [1, 2]),
+        ('k="3"', "3"),
+        ("k=panda", "panda"),
+        ("k=a=b", "a=b"),
+        ("k=", ""),
+        ("k=7", 7),
+    ],
 )
 def test_settings_are_read_as_toml_or_kept_as_text(text, value):
     assert parse_setting(text) == ("k", value)

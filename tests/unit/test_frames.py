@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import given
+from hypothesis import strategies as st
 
 from skillframe import frames
 from skillframe.frames import Pose
@@ -43,7 +44,9 @@ def test_composing_with_the_inverse_gives_the_identity_from_both_sides():
 
 
 def test_rotations_are_orthonormal_and_right_handed():
-    np.testing.assert_allclose(ROTATIONS @ np.swapaxes(ROTATIONS, -1, -2), np.broadcast_to(np.eye(3), (64, 3, 3)), atol=ROUNDING)
+    np.testing.assert_allclose(
+        ROTATIONS @ np.swapaxes(ROTATIONS, -1, -2), np.broadcast_to(np.eye(3), (64, 3, 3)), atol=ROUNDING
+    )
     np.testing.assert_allclose(np.linalg.det(ROTATIONS), 1.0, atol=ROUNDING)
 
 
@@ -64,7 +67,9 @@ def test_logarithm_undoes_exponential_below_pi(axis, angle):
 def test_logarithm_undoes_exponential_near_zero_to_relative_precision(angle):
     for axis in (unit([1, 2, 3]), unit([0, 0, 1]), unit([-1, 1, 0])):
         # sine - asymmetric part cancels at 1e-16 absolute: relative to the angle plus that rounding
-        np.testing.assert_allclose(frames.rotation_vector(frames.rotation_matrix(angle * axis)), angle * axis, atol=3e-16)
+        np.testing.assert_allclose(
+            frames.rotation_vector(frames.rotation_matrix(angle * axis)), angle * axis, atol=3e-16
+        )
 
 
 @pytest.mark.parametrize("gap", [0.0, 1e-12, 1e-8, 1e-6, 1e-5, 9e-5, 1.1e-4, 1e-3])

@@ -32,7 +32,9 @@ def install(tmp_path, monkeypatch):
         info = tmp_path / f"{name}-{version}.dist-info"
         info.mkdir()
         if metadata is not False:
-            (info / "METADATA").write_text(metadata or f"Metadata-Version: 2.1\nName: dist-{name}\nVersion: {version}\n")
+            (info / "METADATA").write_text(
+                metadata or f"Metadata-Version: 2.1\nName: dist-{name}\nVersion: {version}\n"
+            )
         (info / "entry_points.txt").write_text(entry_points or f"[skillframe]\n{name} = {name}\n")
         made.append(name)
         monkeypatch.setenv("SKILLFRAME_PLUGINS", ",".join(made))
@@ -56,30 +58,31 @@ def test_a_plugin_on_the_path_is_found_with_its_distribution_and_version(install
     assert found.error is None
 
 
+HOOK = "from skillframe import hookimpl\n@hookimpl\ndef skillframe_skills():\n    "
 BROKEN = {
     "fails to import": ("import no_such_module", "ModuleNotFoundError: No module named 'no_such_module'"),
     "does not parse": ("def (", "SyntaxError"),
     "leaves on import": ("raise SystemExit('bye')", "SystemExit: bye"),
     "raises in a hook": (
-        "from skillframe import hookimpl\n@hookimpl\ndef skillframe_skills():\n    raise ZeroDivisionError('oh')\n    yield",
+        HOOK + "raise ZeroDivisionError('oh')\n    yield",
         "ZeroDivisionError: oh",
     ),
     "yields no record": (
-        "from skillframe import hookimpl\n@hookimpl\ndef skillframe_skills():\n    yield 'slide'",
+        HOOK + "yield 'slide'",
         "skillframe_skills yielded 'slide', not a SkillType",
     ),
     "yields a record of another kind": (
-        "from skillframe import hookimpl\nfrom skillframe.records import ReaderType\n@hookimpl\ndef skillframe_skills():\n"
-        "    yield ReaderType(name='x', summary='', suffixes=('.x',), read=print)",
+        "from skillframe.records import ReaderType\n"
+        + HOOK
+        + "yield ReaderType(name='x', summary='', suffixes=('.x',), read=print)",
         "not a SkillType",
     ),
     "gives nothing": (
-        "from skillframe import hookimpl\n@hookimpl\ndef skillframe_skills():\n    pass",
+        HOOK + "pass",
         "gave None instead of yielding SkillType",
     ),
     "forgets a field": (
-        "from skillframe import hookimpl\nfrom skillframe.records import SkillType\n@hookimpl\ndef skillframe_skills():\n"
-        "    yield SkillType(name='x')",
+        "from skillframe.records import SkillType\n" + HOOK + "yield SkillType(name='x')",
         "missing 2 required keyword-only arguments",
     ),
     "has a nameless record": (GOOD.format(name=""), "with the name ''"),
@@ -95,7 +98,10 @@ BROKEN = {
         "from skillframe import hookimpl\n@hookimpl\ndef skilframe_skills():\n    yield 1",
         "unknown hook 'skilframe_skills'",
     ),
-    "misspells a hook without the marker": ("def skillframe_wrlds():\n    yield 1", "did you mean 'skillframe_worlds'?"),
+    "misspells a hook without the marker": (
+        "def skillframe_wrlds():\n    yield 1",
+        "did you mean 'skillframe_worlds'?",
+    ),
     "forgets the marker": ("def skillframe_skills():\n    yield 1", "skillframe_skills lacks @hookimpl"),
     "asks for an argument that the hook does not give": (
         "from skillframe import hookimpl\n@hookimpl\ndef skillframe_skills(config):\n    yield 1",
@@ -147,7 +153,9 @@ def test_strict_loading_raises_instead_of_isolating(install, monkeypatch):
 
 def test_a_name_that_two_plugins_have_is_an_error_that_names_both(install):
     install("one", GOOD.format(name="slide"))
-    install("two", GOOD.format(name="slide") + "    yield SkillType(name='turn', summary='own', build=print)", version="3.1")
+    install(
+        "two", GOOD.format(name="slide") + "    yield SkillType(name='turn', summary='own', build=print)", version="3.1"
+    )
     registry = load_registry()
     with pytest.raises(PluginConflict) as caught:
         registry.skill("slide")
@@ -159,7 +167,9 @@ def test_a_name_that_two_plugins_have_is_an_error_that_names_both(install):
 
 
 def test_a_hook_of_a_newer_core_is_allowed_where_the_plugin_says_so(install):
-    code = "from skillframe import hookimpl\n@hookimpl(optionalhook=True)\ndef skillframe_report_sections():\n    yield 1"
+    code = (
+        "from skillframe import hookimpl\n@hookimpl(optionalhook=True)\ndef skillframe_report_sections():\n    yield 1"
+    )
     install("newer", code)
     assert plugin(load_registry(), "newer").error is None
 
@@ -244,9 +254,12 @@ def test_a_plugin_installed_with_pip_is_found_and_leaves_when_uninstalled(tmp_pa
         """)
     )
     subprocess.run(
-        [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", site, source], check=True, timeout=300
+        [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", site, source],
+        check=True,
+        timeout=300,
     )
-    ask = "from skillframe.registry import load_registry as l; p = l().provider('skill', 'pip_slide'); print(p.distribution, p.version)"
+    ask = "from skillframe.registry import load_registry\np = load_registry().provider('skill', 'pip_slide')\n"
+    ask += "print(p.distribution, p.version)"
     environment = {**os.environ, "PYTHONPATH": str(site), "SKILLFRAME_PLUGINS": "pip_made"}
     found = subprocess.run([sys.executable, "-c", ask], env=environment, capture_output=True, text=True, check=True)
     assert found.stdout.split() == ["pip-made", "4.5"]

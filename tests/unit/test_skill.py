@@ -32,9 +32,11 @@ class Wander(Skill):
 
 
 def assert_equal(a, b):
-    for x, y in zip((*a.pose, a.twist, a.feedforward, a.status, a.reason), (*b.pose, b.twist, b.feedforward, b.status, b.reason)):
+    for name in ("twist", "feedforward", "status", "reason"):
+        assert np.array_equal(getattr(a, name), getattr(b, name))
+    for x, y in zip(a.pose, b.pose, strict=True):
         assert np.array_equal(x, y)
-    for x, y in zip(a.impedance, b.impedance):
+    for x, y in zip(a.impedance, b.impedance, strict=True):
         assert np.array_equal(np.broadcast_to(x, (6, 6, 6)), np.broadcast_to(y, (6, 6, 6)))
 
 

@@ -17,6 +17,7 @@ def skillframe_skills() -> Iterable[SkillType]:
         name="replay",
         summary="Plays one demonstration again, from where the tool is now or at its recorded place.",
         build=replay.build,
+        check=replay.check,
         learn=document.learn,
         describe=document.describe,
         example=document.example,

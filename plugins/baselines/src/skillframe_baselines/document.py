@@ -7,7 +7,7 @@ follow free motion within a millimetre at hand speeds, and slow enough for a fil
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -42,42 +42,81 @@ class ReplaySettings:
     blend: float = 0.5
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stiffness:
+    """Of translation [N/m] and rotation [Nm/rad], the same in every direction."""
+
+    translation: float
+    rotation: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stop:
+    """When it ends: after so many seconds."""
+
+    time: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Phase:
+    """The one phase of a replay's document; the fields are those of `ReplaySettings`."""
+
+    name: str = "replay"
+    mode: Literal["shifted", "absolute"]
+    stiffness: Stiffness
+    feedforward: bool
+    blend: float
+    stop: Stop
+
+
+def phase_of(document: Document) -> Phase:
+    """The phase of a replay's document, checked.
+
+    Raises:
+        InputError: not one phase, or a key that is missing, unknown or of no use.
+    """
+    phases = document["phases"]
+    if len(phases) != 1:
+        raise InputError("phases", f"a replay has one phase, got {len(phases)}", "learn the skill again")
+    phase = build(Phase, phases[0], "phases[0]")
+    if min(phase.stiffness.translation, phase.stiffness.rotation, phase.blend) <= 0.0:
+        raise InputError("phases[0]", "stiffness and blend must be positive", "give values above zero")
+    return phase
+
+
 def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
     """The body of a replay's document.
 
     Raises:
-        InputError: not exactly one demonstration, an unknown setting, or a stiffness or blending time that is not
-            positive.
+        InputError: not exactly one demonstration, an unknown setting, or a stiffness or blend that is not positive.
     """
     if len(demonstrations) != 1:
         raise InputError("replay", f"repeats one demonstration, got {len(demonstrations)}", "give one file")
     demonstration = demonstrations[0]
     settings = build(ReplaySettings, options.settings, "replay settings")
-    if min(settings.stiffness_translation, settings.stiffness_rotation, settings.blend) <= 0.0:
-        raise InputError("replay settings", "stiffness and blend must be positive", "give values above zero")
-    at = demonstration.point(options.at)
-    hand = options.hand or demonstration.meta.get("hand")
-    work_at = demonstration.point(hand) if isinstance(hand, str) else np.asarray(at if hand is None else hand, dtype=float)
     trajectory = resampled(demonstration)
-    duration = trajectory["time"][-1]
+    phase = Phase(
+        mode=settings.mode,
+        stiffness=Stiffness(translation=settings.stiffness_translation, rotation=settings.stiffness_rotation),
+        feedforward=settings.feedforward,
+        blend=settings.blend,
+        stop=Stop(time=trajectory["time"][-1] + SETTLE),
+    )
+    body = {"frame": _frame(demonstration, options), "phases": [asdict(phase)], "trajectory": trajectory}
+    phase_of(body)
+    return body
+
+
+def _frame(demonstration: Demonstration, options: LearnOptions) -> Document:
+    """The points of the contract; a replay takes no work anywhere, so that `work_at` is for the record only."""
+    at = demonstration.point(options.at).tolist()
+    hand = options.hand or demonstration.meta.get("hand")
     return {
-        "frame": {
-            "learned_at": at.tolist(),
-            "work_at": work_at.tolist(),
-            "center_of_compliance": at.tolist(),
-            "axes": options.axes,
-        },
-        "phases": [
-            {
-                "name": "replay",
-                "mode": settings.mode,
-                "stiffness": {"translation": settings.stiffness_translation, "rotation": settings.stiffness_rotation},
-                "feedforward": settings.feedforward,
-                "blend": settings.blend,
-                "stop": {"time": duration + SETTLE},
-            }
-        ],
-        "trajectory": trajectory,
+        "learned_at": at,
+        "work_at": demonstration.point(hand).tolist() if isinstance(hand, str) else list(hand or at),
+        "center_of_compliance": at,
+        "axes": options.axes,
+        "frames": demonstration.meta.get("frames", {}),
     }
 
 
@@ -120,19 +159,19 @@ def _continuous(quaternion: Float) -> Float:
 
 def describe(document: Document) -> list[str]:
     """A replay in words."""
-    phase, trajectory = document["phases"][0], document["trajectory"]
+    phase, trajectory = phase_of(document), document["trajectory"]
     path = np.asarray(trajectory["position"])
-    length, way = norm(np.diff(path, axis=0)).sum(), path[-1] - path[0]
+    length, (x, y, z) = norm(np.diff(path, axis=0)).sum(), 1e3 * (path[-1] - path[0])
     how = {
         "shifted": "from wherever the tool is at the start, knowing nothing of the fixture",
         "absolute": "at the recorded place; the error of the start is blended away",
-    }[phase["mode"]]
+    }[phase.mode]
     lines = [
         f"replay {trajectory['time'][-1]:.2f} s of recorded motion, {how}",
-        f"path {1e3 * length:.0f} mm, ending {1e3 * way[0]:+.0f}, {1e3 * way[1]:+.0f}, {1e3 * way[2]:+.0f} mm from its start",
-        f"stiff in every direction: {phase['stiffness']['translation']:g} N/m, {phase['stiffness']['rotation']:g} Nm/rad",
+        f"path {1e3 * length:.0f} mm, ending at {x:+.0f}, {y:+.0f}, {z:+.0f} mm from its start",
+        f"stiff in every direction: {phase.stiffness.translation:g} N/m, {phase.stiffness.rotation:g} Nm/rad",
     ]
-    return [*lines, "exert the recorded wrench as well"] if phase["feedforward"] else lines
+    return [*lines, "exert the recorded wrench as well"] if phase.feedforward else lines
 
 
 def example() -> Document:

@@ -1,7 +1,7 @@
 r"""Replay: the recorded motion as a desired motion, with stiff impedance and the recorded wrench as feed-forward.
 
-With \(p(t), R(t)\) the recorded pose of the centre of compliance, \(p_0, R_0\) its first value, and \(p_m, R_m\) the pose
-measured at the start of the run, the desired pose is
+With \(p(t), R(t)\) the recorded pose of the centre of compliance, \(p_0, R_0\) its first value, and \(p_m, R_m\) the
+pose measured at the start of the run, the desired pose is
 
     shifted, base axes          p_m + p(t) - p_0                     R(t) R_0^T R_m
     shifted, axes of the start  p_m + R_m R_0^T (p(t) - p_0)         R_m R_0^T R(t)
@@ -13,7 +13,7 @@ published work compares compliant skills with.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,6 +24,7 @@ from skillframe.frames import (
     Pose,
     matrix_from_quaternion,
     move_wrench,
+    norm,
     rotate,
     rotate_spatial,
     rotation_matrix,
@@ -31,6 +32,7 @@ from skillframe.frames import (
 )
 from skillframe.records import Document
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
+from skillframe_baselines.document import phase_of
 
 
 class Motion(NamedTuple):
@@ -67,7 +69,7 @@ class Motion(NamedTuple):
         return Pose(position, rotation), twist, wrench
 
 
-def motion(trajectory: dict[str, Any], point: Float) -> Motion:
+def motion(trajectory: Mapping[str, Any], point: Float) -> Motion:
     """The recorded motion of a point of the tool frame, from the tool point's trajectory in a document.
 
     Raises:
@@ -78,10 +80,14 @@ def motion(trajectory: dict[str, Any], point: Float) -> Motion:
             np.asarray(trajectory[name], dtype=float) for name in ("time", "position", "quaternion", "wrench")
         )
     except (KeyError, TypeError, ValueError) as error:
-        raise InputError("replay document", f"its trajectory cannot be read ({error})", "learn it again") from None
+        raise InputError(
+            "trajectory", f"cannot be read ({type(error).__name__}: {error})", "learn the skill again"
+        ) from None
     n = len(time)
     if n < 2 or (position.shape, quaternion.shape, wrench.shape) != ((n, 3), (n, 4), (n, 6)):
-        raise InputError("replay document", "its trajectory's columns do not fit each other", "learn it again")
+        raise InputError("trajectory", "its columns do not fit each other", "learn the skill again")
+    if float(time[-1]) <= 0.0 or np.any(norm(quaternion) == 0.0):
+        raise InputError("trajectory", "holds no motion over time", "learn the skill again")
     tool = Pose(position, matrix_from_quaternion(quaternion))
     pose, step = tool.at(point), float(time[-1]) / (n - 1)
     turn = rotation_vector(pose.rotation[1:] @ np.swapaxes(pose.rotation[:-1], -1, -2))
@@ -162,19 +168,18 @@ def build(document: Document) -> Skill:
     Raises:
         InputError: the document holds no usable trajectory or phase.
     """
-    try:
-        frame, phase = document["frame"], document["phases"][0]
-        stiffness = np.diag(np.repeat([phase["stiffness"]["translation"], phase["stiffness"]["rotation"]], 3).astype(float))
-        point = np.asarray(frame["center_of_compliance"], dtype=float)
-        return Replay(
-            motion(document["trajectory"], point),
-            absolute=phase["mode"] == "absolute",
-            turned=frame["axes"] == "phase_start",
-            stiffness=stiffness,
-            feedforward=phase["feedforward"],
-            blend=phase["blend"],
-            stop=phase["stop"]["time"],
-        )
-    except (KeyError, IndexError, TypeError) as error:
-        problem = f"{type(error).__name__} {error}"
-        raise InputError("replay document", f"is not complete ({problem})", "learn it again") from None
+    phase, frame = phase_of(document), document["frame"]
+    return Replay(
+        motion(document.get("trajectory", {}), np.asarray(frame["center_of_compliance"], dtype=float)),
+        absolute=phase.mode == "absolute",
+        turned=frame["axes"] == "phase_start",
+        stiffness=np.diag(np.repeat([phase.stiffness.translation, phase.stiffness.rotation], 3)),
+        feedforward=phase.feedforward,
+        blend=phase.blend,
+        stop=phase.stop.time,
+    )
+
+
+def check(document: Document) -> None:
+    """Refuse a document that cannot be built, naming the key; raises `InputError`."""
+    build(document)

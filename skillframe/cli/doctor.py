@@ -1,0 +1,148 @@
+"""`skillframe doctor`: what is installed, what is missing, and what to type."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from importlib import metadata
+from importlib.util import find_spec
+
+import click
+
+from skillframe.cli.output import emit_json, table
+
+GL_PROBE = "import os; os.environ['MUJOCO_GL'] = 'egl'; import mujoco; mujoco.GLContext(16, 16).free()"
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+COMPILERS = ("cc", "gcc", "clang")
+LOWEST_PYTHON = (3, 11)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """One thing that skillframe uses.
+
+    Attributes:
+        name: what it is.
+        found: version or place; empty if it is missing.
+        needed_for: what does not work without it.
+        required: whether the core needs it.
+        fix: what to type; empty if it is there.
+    """
+
+    name: str
+    found: str
+    needed_for: str
+    required: bool = False
+    fix: str = ""
+
+
+@click.command()
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def command(as_json: bool) -> int:
+    """Say what is installed, what is missing and what to type. Exits 1 if something required is missing.
+
+    \b
+    Example:
+      skillframe doctor
+      skillframe doctor --json
+    """
+    findings = list(examine())
+    if as_json:
+        emit_json([asdict(finding) for finding in findings])
+    else:
+        table(("what", "found", "needed for"), [[f.name, f.found or "MISSING", f.needed_for] for f in findings])
+        for finding in findings:
+            if finding.fix:
+                click.echo(f"{finding.name}: {finding.fix}")
+    return int(any(finding.required and finding.fix for finding in findings))
+
+
+def examine() -> Iterator[Finding]:
+    """Everything that skillframe uses, the required first."""
+    yield _python()
+    yield from _libraries()
+    yield _compiler()
+    yield _opengl()
+    yield _browser()
+    yield _recordings()
+    yield from _plugins()
+
+
+def _python() -> Finding:
+    version = ".".join(map(str, sys.version_info[:3]))
+    old = sys.version_info[:2] < LOWEST_PYTHON
+    fix = f"install Python {'.'.join(map(str, LOWEST_PYTHON))} or newer, then: make install" if old else ""
+    return Finding(name="python", found=version, needed_for="everything", required=True, fix=fix)
+
+
+def _libraries() -> Iterator[Finding]:
+    """The core's declared dependencies against what is installed; nothing is imported."""
+    for requirement in metadata.requires("skillframe") or []:
+        match = re.match(r"([\w.-]+)\s*(?:>=\s*([\d.]+))?", requirement)
+        if match is None or "extra ==" in requirement:
+            continue
+        name, lowest = match.group(1), match.group(2) or "0"
+        try:
+            found = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found = ""
+        enough = bool(found) and _numbers(found) >= _numbers(lowest)
+        fix = "" if enough else f"{sys.executable} -m pip install '{name}>={lowest}'"
+        yield Finding(name=name, found=found, needed_for="the core", required=True, fix=fix)
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in re.findall(r"\d+", version)[:3])
+
+
+def _compiler() -> Finding:
+    path = next((found for name in COMPILERS if (found := shutil.which(name))), "")
+    if not path and find_spec("ziglang") is not None:
+        path = "ziglang"
+    fix = "" if path else "sudo apt install build-essential (or: pip install ziglang)"
+    return Finding(name="C compiler", found=path, needed_for="building FMUs", fix=fix)
+
+
+def _opengl() -> Finding:
+    """Tried in a process of its own, because a broken driver can end the process."""
+    try:
+        done = subprocess.run([sys.executable, "-c", GL_PROBE], capture_output=True, timeout=60, check=False)
+        works = done.returncode == 0
+    except subprocess.TimeoutExpired:
+        works = False
+    fix = "" if works else "sudo apt install libegl1 libgl1-mesa-dri (without it, stills are plain wireframes)"
+    return Finding(name="OpenGL (EGL)", found="works" if works else "", needed_for="rendered stills", fix=fix)
+
+
+def _browser() -> Finding:
+    path = next((found for name in BROWSERS if (found := shutil.which(name))), "")
+    fix = "" if path else "sudo apt install chromium (only the tests that open reports need it)"
+    return Finding(name="browser", found=path, needed_for="tests that open reports", fix=fix)
+
+
+def _recordings() -> Finding:
+    setting = os.environ.get("SKILLFRAME_RECORDINGS", "")
+    found = setting if setting and os.path.isdir(setting) else ""
+    problem = f"{setting} is no folder; " if setting and not found else ""
+    fix = (
+        "" if found else f"{problem}export SKILLFRAME_RECORDINGS=FOLDER (only tests on third-party recordings need it)"
+    )
+    return Finding(name="recordings", found=found, needed_for="tests on real recordings", fix=fix)
+
+
+def _plugins() -> Iterator[Finding]:
+    from skillframe.registry import registry
+
+    for plugin in registry().plugins:
+        fix = f"{plugin.error}; {sys.executable} -m pip install --upgrade {plugin.distribution}" if plugin.error else ""
+        yield Finding(
+            name=f"plug-in {plugin.name}",
+            found=f"{plugin.distribution} {plugin.version}",
+            needed_for=" ".join(plugin.provides) or "nothing",
+            fix=fix,
+        )

@@ -1,0 +1,38 @@
+"""Listings: aligned columns for people, colours on a terminal only, and JSON alone on stdout for scripts."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import click
+
+
+def emit_json(value: Any) -> None:
+    """Print a value as JSON, keys sorted; numbers that are not finite are a mistake of the caller."""
+    click.echo(json.dumps(value, indent=2, sort_keys=True, allow_nan=False, ensure_ascii=False))
+
+
+def table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
+    """Print rows under headings: a drawn table on a terminal, plain aligned columns in a pipe."""
+    texts = [[str(cell) for cell in row] for row in rows]
+    if sys.stdout.isatty():
+        _drawn(columns, texts)
+        return
+    widths = [max(len(line[i]) for line in [columns, *texts]) for i in range(len(columns))]
+    for line in [columns, *texts]:
+        click.echo("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip())
+
+
+def _drawn(columns: Sequence[str], texts: Sequence[Sequence[str]]) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    drawn = Table(*columns, box=box.SIMPLE_HEAD, header_style="bold")
+    for line in texts:
+        drawn.add_row(*(Text(cell) for cell in line))
+    Console().print(drawn)

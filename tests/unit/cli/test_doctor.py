@@ -1,0 +1,105 @@
+import json
+import re
+import sys
+from importlib import metadata
+
+import pytest
+
+from skillframe.cli import doctor
+from skillframe.cli.main import run
+
+
+@pytest.fixture(autouse=True)
+def no_driver(monkeypatch):
+    """The OpenGL probe starts a process that imports the simulator; one test below runs it."""
+    monkeypatch.setattr(doctor, "GL_PROBE", "pass")
+
+
+def findings(capsys, code=0):
+    assert run(["doctor", "--json"]) == code
+    return {row["name"]: row for row in json.loads(capsys.readouterr().out)}
+
+
+def test_json_is_alone_on_stdout_and_every_missing_thing_has_what_to_type(capsys):
+    rows = findings(capsys)
+    for row in rows.values():
+        assert row.keys() == {"name", "found", "needed_for", "required", "fix"}
+        assert row["found"] or row["fix"]
+
+
+def test_every_declared_dependency_is_looked_at(capsys):
+    declared = {re.match(r"[\w.-]+", r).group() for r in metadata.requires("skillframe")}
+    assert declared <= findings(capsys).keys()
+
+
+def test_a_missing_library_is_required_and_exits_1(capsys, monkeypatch):
+    real = metadata.version
+
+    def version(name):
+        if name == "mujoco":
+            raise metadata.PackageNotFoundError(name)
+        return real(name)
+
+    monkeypatch.setattr(metadata, "version", version)
+    row = findings(capsys, code=1)["mujoco"]
+    assert row["found"] == ""
+    assert row["fix"].startswith(sys.executable) and "mujoco>=4.0" in row["fix"]
+
+
+def test_a_library_that_is_too_old_is_told_with_both_versions(capsys, monkeypatch):
+    real = metadata.version
+    monkeypatch.setattr(metadata, "version", lambda name: "3.9.9" if name == "mujoco" else real(name))
+    row = findings(capsys, code=1)["mujoco"]
+    assert row["found"] == "3.9.9" and "mujoco>=4.0" in row["fix"]
+
+
+def test_versions_are_compared_as_numbers():
+    assert doctor._numbers("2025.10.1") > doctor._numbers("2025.9.30")
+    assert doctor._numbers("4.0.0rc1") >= doctor._numbers("4.0")
+
+
+def test_nothing_but_the_core_is_required(capsys, monkeypatch):
+    monkeypatch.setattr(doctor.shutil, "which", lambda name: None)
+    monkeypatch.setattr(doctor, "find_spec", lambda name: None)
+    monkeypatch.setattr(doctor, "GL_PROBE", "raise SystemExit(1)")
+    monkeypatch.delenv("SKILLFRAME_RECORDINGS", raising=False)
+    rows = findings(capsys, code=0)
+    for name in ("C compiler", "OpenGL (EGL)", "browser", "recordings"):
+        assert rows[name]["found"] == "" and rows[name]["fix"] and not rows[name]["required"]
+    assert "pip install ziglang" in rows["C compiler"]["fix"]
+    assert "wireframe" in rows["OpenGL (EGL)"]["fix"]
+
+
+def test_ziglang_counts_as_a_compiler(monkeypatch):
+    monkeypatch.setattr(doctor.shutil, "which", lambda name: None)
+    monkeypatch.setattr(doctor, "find_spec", lambda name: object())
+    assert doctor._compiler().found == "ziglang"
+
+
+def test_a_recordings_folder_that_is_not_there_is_told(monkeypatch, tmp_path):
+    monkeypatch.setenv("SKILLFRAME_RECORDINGS", str(tmp_path / "gone"))
+    assert "is no folder" in doctor._recordings().fix
+    monkeypatch.setenv("SKILLFRAME_RECORDINGS", str(tmp_path))
+    assert doctor._recordings().found == str(tmp_path)
+
+
+def test_a_broken_plugin_is_told_with_its_error(monkeypatch, fresh_registry):
+    from skillframe.registry import registry
+
+    registry().plugins[0].error = "ValueError: oh"
+    assert "ValueError: oh" in next(doctor._plugins()).fix
+
+
+def test_for_people_there_is_a_table_and_a_line_for_each_missing_thing(capsys, monkeypatch):
+    monkeypatch.delenv("SKILLFRAME_RECORDINGS", raising=False)
+    assert run(["doctor"]) == 0
+    text = capsys.readouterr().out
+    assert text.startswith("what") and "numpy" in text
+    assert "recordings: export SKILLFRAME_RECORDINGS=FOLDER" in text
+
+
+@pytest.mark.slow
+def test_the_opengl_probe_answers_whatever_the_driver(monkeypatch):
+    monkeypatch.undo()
+    finding = doctor._opengl()
+    assert bool(finding.found) != bool(finding.fix)

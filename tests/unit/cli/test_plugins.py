@@ -1,0 +1,192 @@
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from skillframe.cli.main import run
+from skillframe.cli.template import plugin_name
+from skillframe.errors import InputError
+from skillframe.records import SkillType
+from skillframe.registry import Plugin, Registry, load_registry, registry
+from skillframe.testing import HoldSkill
+
+BROKEN = """
+from skillframe import hookimpl
+from skillframe.records import SkillType
+@hookimpl
+def skillframe_skills():
+    yield SkillType(name="nothing", summary="does nothing", build=lambda document: None, example=dict)
+"""
+
+
+@pytest.fixture
+def made(tmp_path, monkeypatch, fresh_registry):
+    """A plug-in from the template, on the path as an installed one is; its folder."""
+    folder = tmp_path / "glide"
+    assert run(["plugins", "new", "glide_slowly", "--out", str(folder)]) == 0
+    info = tmp_path / "site" / "skillframe_glide_slowly-0.1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: skillframe-glide-slowly\nVersion: 0.1.0\n")
+    (info / "entry_points.txt").write_text("[skillframe]\nglide_slowly = skillframe_glide_slowly\n")
+    for path in (tmp_path / "site", folder / "src"):
+        monkeypatch.syspath_prepend(path)
+    monkeypatch.setenv("SKILLFRAME_PLUGINS", "glide_slowly")
+    yield folder
+    for name in [n for n in sys.modules if n.startswith("skillframe_glide_slowly")]:
+        del sys.modules[name]
+
+
+def listed(capsys):
+    capsys.readouterr()
+    assert run(["plugins", "list", "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_json_is_alone_on_stdout_and_has_the_contract_s_keys(capsys, fresh_registry, monkeypatch):
+    monkeypatch.setenv("SKILLFRAME_PLUGINS", "no_such_plugin")
+    rows = listed(capsys)
+    for row in rows:
+        assert row.keys() == {"name", "distribution", "version", "provides", "error"}
+        assert isinstance(row["distribution"], str)
+        assert row["error"] is None or isinstance(row["error"], str)
+    assert rows[0]["distribution"] == "skillframe"
+    assert "world:valley" in rows[0]["provides"]
+
+
+def test_a_plugin_that_is_asked_for_and_missing_is_told_on_stderr(capsys, fresh_registry, monkeypatch):
+    monkeypatch.setenv("SKILLFRAME_PLUGINS", "no_such_plugin")
+    assert run(["plugins", "list"]) == 0
+    assert "'no_such_plugin', which is not installed" in capsys.readouterr().err
+
+
+def test_a_distribution_with_two_plugins_is_one_row():
+    from skillframe.cli.plugins import distribution_rows
+
+    known = Registry()
+    for name in ("a", "b"):
+        known.plugins.append(
+            Plugin(name=name, distribution="both", version="1", provides=[f"skill:{name}"], error=name)
+        )
+    assert distribution_rows(known) == [
+        {"name": "a,b", "distribution": "both", "version": "1", "provides": ["skill:a", "skill:b"], "error": "a; b"}
+    ]
+
+
+def test_a_plugin_made_by_new_is_found_and_passes_its_checks(made, capsys):
+    row = next(r for r in listed(capsys) if r["name"] == "glide_slowly")
+    assert row == {
+        "name": "glide_slowly", "distribution": "skillframe-glide-slowly", "version": "0.1.0",
+        "provides": ["skill:glide_slowly"], "error": None,
+    }  # fmt: skip
+    assert run(["plugins", "check", "glide_slowly"]) == 0
+    assert "skill:glide_slowly: passes" in capsys.readouterr().out
+
+
+def test_a_plugin_made_by_new_passes_its_own_tests(made):
+    code = f"import sys; sys.path[:0] = {[str(made / 'src'), str(made.parent / 'site')]}\nimport pytest\n"
+    code += "sys.exit(pytest.main(['-q', '-p', 'no:cacheprovider', 'tests']))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=made, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_a_plugin_made_by_new_leaves_no_placeholder_behind(made):
+    files = [p for p in made.rglob("*") if p.is_file() and p.suffix != ".pyc"]
+    assert {p.name for p in files} >= {"pyproject.toml", "README.md", "__init__.py", "skill.py", "test_glide_slowly.py"}
+    assert not [p for p in files if "@" in p.name or "@PACKAGE@" in p.read_text() or "@NAME@" in p.read_text()]
+
+
+def test_check_exits_1_and_says_what_fails(made, capsys):
+    (made / "src" / "skillframe_glide_slowly" / "__init__.py").write_text(BROKEN)
+    assert run(["plugins", "check", "glide_slowly"]) == 1
+    text = capsys.readouterr().out
+    assert "skill:nothing: FAILS" in text
+    assert "build gave NoneType, not a skillframe.Skill" in text
+
+
+def test_check_fails_a_plugin_that_does_not_load(made, capsys):
+    (made / "src" / "skillframe_glide_slowly" / "__init__.py").write_text("import no_such_module")
+    assert run(["plugins", "check", "glide_slowly", "--json"]) == 1
+    rows = json.loads(capsys.readouterr().out)
+    assert rows[0]["subject"] == "plug-in"
+    assert "no_such_module" in rows[0]["problems"][0]
+
+
+def test_check_refuses_a_name_that_is_not_installed(made, capsys):
+    assert run(["plugins", "check", "glide_slowli"]) == 2
+    assert "did you mean 'glide_slowly'?" in capsys.readouterr().err
+
+
+def test_a_plugin_can_be_checked_by_the_name_of_its_distribution(made):
+    assert run(["plugins", "check", "skillframe-glide-slowly"]) == 0
+
+
+def test_new_refuses_a_folder_that_holds_something(made, capsys):
+    assert run(["plugins", "new", "other", "--out", str(made)]) == 2
+    assert "not an empty folder" in capsys.readouterr().err
+
+
+def test_new_writes_beside_where_one_stands_unless_told(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert run(["plugins", "new", "My-Skill"]) == 0
+    assert (tmp_path / "skillframe-my-skill" / "src" / "skillframe_my_skill" / "skill.py").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [("my_skill", "my_skill"), ("My-Skill", "my_skill"), ("skillframe-x", "x"), ("a b", "a_b"), ("p2", "p2")],
+)
+def test_names_become_what_python_and_file_systems_like(text, name):
+    assert plugin_name(text) == name
+
+
+@pytest.mark.parametrize("text", ["", "2p", "class", "a/b", "..", "ä", "skillframe_"])
+def test_what_cannot_name_a_module_is_refused(text):
+    with pytest.raises(InputError, match="is not a name"):
+        plugin_name(text)
+
+
+def test_a_skill_that_conforms_passes_in_a_registry_made_by_hand():
+    from skillframe.conformance import check_plugin
+
+    module = type("module", (), {})
+    known = Registry()
+    plugin = known.add(Plugin(name="hand", distribution="hand", version="1"), lambda: module)
+    hold = SkillType(
+        name="hold", summary="holds", build=lambda d: HoldSkill(), describe=lambda d: ["hold"], example=dict
+    )
+    known._keep("skill", hold, plugin)
+    assert [f.problems for f in check_plugin(known, plugin)] == [[], []]
+
+
+def test_the_core_s_own_plugin_conforms():
+    from skillframe.conformance import check_plugin
+
+    known = load_registry()
+    problems = {f.subject: f.problems for f in check_plugin(known, known.plugins[0]) if f.problems}
+    assert not problems
+
+
+@pytest.mark.needs_plugins
+def test_every_installed_plugin_conforms(fresh_registry):
+    from skillframe.conformance import check_plugin
+
+    known = registry()
+    problems = {f.subject: f.problems for p in known.plugins for f in check_plugin(known, p) if f.problems}
+    assert not problems
+
+
+@pytest.mark.slow
+def test_a_plugin_made_by_new_and_installed_with_pip_passes_its_suite_without_an_edit(tmp_path):
+    folder, site = tmp_path / "plugin", tmp_path / "site"
+    assert run(["plugins", "new", "glide_slowly", "--out", str(folder)]) == 0
+    install = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", site, folder]
+    subprocess.run(install, check=True, timeout=300)
+    environment = {**os.environ, "PYTHONPATH": str(site)}
+    environment.pop("SKILLFRAME_PLUGINS", None)
+    tests = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", folder / "tests"]
+    done = subprocess.run(tests, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    check = [sys.executable, "-m", "skillframe.cli.main", "plugins", "check", "glide_slowly"]
+    assert subprocess.run(check, cwd=tmp_path, env=environment, check=False, capture_output=True).returncode == 0

@@ -1,0 +1,324 @@
+"""The import rules of the architecture, read from syntax trees; modules that do not exist yet are not visited."""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import click
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = ROOT / "skillframe"
+PLUGINS = sorted(p for p in (ROOT / "plugins").iterdir() if (p / "src").is_dir())
+
+FLOORS = [
+    {"errors", "paths", "frames", "config"},
+    {"demonstration", "conditioning", "skill", "records", "hookspecs"},
+    {"sequence", "skillfile", "robot", "registry", "skillsource"},
+    {"control", "actuation"},
+    {"cosim", "world"},
+    {"executor", "recorder", "trace", "prepare"},
+    {"teacher", "metrics", "campaign"},
+    {"report", "demonstrate"},
+    {"conformance", "testing", "quickstart"},
+    {"cli"},
+]
+FLOOR = {name: i for i, names in enumerate(FLOORS) for name in names}
+FREE = {"__init__", "builtin"}  # builtin is the core's own plug-in: it names what the core ships, inside its hooks
+ASKED_WHEN_CALLED = {  # uphill, and only inside the function that needs it
+    ("registry", "builtin"),  # loads it as it loads any plug-in
+    ("demonstration", "registry"),  # which format reads this file?
+}
+LOOP = {"skill", "sequence", "teacher", "control", "world", "actuation", "cosim", "executor"}
+HEAVY = {"scipy", "casadi", "fmpy", "filterpy", "mujoco", "matplotlib", "pinocchio"}
+
+
+def top(path):
+    """Name of the module or package directly under skillframe/."""
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def core_files():
+    return sorted(p for p in PACKAGE.rglob("*.py") if "_data" not in p.parts and "template" not in p.parts)
+
+
+def loop_files():
+    return [p for p in core_files() if top(p) in LOOP]
+
+
+@cache
+def tree(path):
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def relative(path):
+    return path.relative_to(ROOT).as_posix()
+
+
+def only_for_types(node):
+    return isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+
+
+def run_time_nodes(node):
+    """Every node under one, without what stands under `if TYPE_CHECKING`."""
+    for child in ast.iter_child_nodes(node):
+        if not only_for_types(child):
+            yield child
+            yield from run_time_nodes(child)
+
+
+def loading_nodes(node):
+    """Every node under one that runs when the module is imported."""
+    for child in ast.iter_child_nodes(node):
+        if not only_for_types(child) and not isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            yield child
+            yield from loading_nodes(child)
+
+
+def imports(path, at_run_time=True, when_loading=False):
+    """(line, module) of every import, wherever it stands; `from a import b` gives a.b."""
+    nodes = (
+        loading_nodes(tree(path))
+        if when_loading
+        else run_time_nodes(tree(path))
+        if at_run_time
+        else ast.walk(tree(path))
+    )
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{relative(path)}:{node.lineno}: relative import; write the whole name"
+            yield from ((node.lineno, f"{node.module}.{alias.name}") for alias in node.names)
+
+
+def own(module):
+    """The part of a dotted name directly under skillframe, or None."""
+    parts = module.split(".")
+    return parts[1] if parts[0] == "skillframe" and len(parts) > 1 else None
+
+
+def calls(path):
+    """(line, dotted name) of every call whose target is a plain dotted name."""
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name | ast.Attribute):
+            yield node.lineno, ast.unparse(node.func)
+
+
+def test_every_module_of_the_core_has_a_floor():
+    unknown = {top(p) for p in core_files()} - set(FLOOR) - FREE
+    assert not unknown, f"say in FLOORS who may import {sorted(unknown)}"
+
+
+def test_the_core_never_imports_a_plugin():
+    found = [
+        f"{relative(p)}:{line} {m}"
+        for p in core_files()
+        for line, m in imports(p, False)
+        if m.startswith("skillframe_")
+    ]
+    assert not found
+
+
+def test_imports_go_downhill_only():
+    uphill = []
+    for path in core_files():
+        here = top(path)
+        for line, module in imports(path):
+            there = own(module)
+            if (
+                here not in FREE
+                and there in FLOOR
+                and FLOOR[there] > FLOOR.get(here, 0)
+                and (here, there) not in ASKED_WHEN_CALLED
+            ):
+                uphill.append(f"{relative(path)}:{line}: {here} imports {there}, which stands above it")
+    assert not uphill, "\n".join(uphill)
+
+
+def test_what_may_be_asked_uphill_is_asked_inside_a_function():
+    found = [
+        f"{relative(p)}:{line} {m}" for p in core_files() for line, m in imports(p, when_loading=True)
+        if (top(p), own(m)) in ASKED_WHEN_CALLED
+    ]  # fmt: skip
+    assert not found
+
+
+def test_only_the_registry_names_the_core_s_own_plugin():
+    found = [relative(p) for p in core_files() for _, m in imports(p) if own(m) == "builtin"]
+    assert set(found) <= {"skillframe/registry.py"}
+
+
+def test_reports_are_made_from_files_and_never_from_a_world():
+    above = FLOORS[3] | FLOORS[4] | {"executor", "teacher", "demonstrate", "robot"}
+    found = [
+        f"{relative(p)}:{line} {m}"
+        for p in core_files()
+        if top(p) == "report"
+        for line, m in imports(p)
+        if own(m) in above
+    ]
+    assert not found
+
+
+@pytest.mark.parametrize("plugin", PLUGINS, ids=lambda p: p.name)
+def test_a_plugin_imports_public_names_of_the_core_and_no_other_plugin(plugin):
+    packages = {p.name.removesuffix(".py") for p in (plugin / "src").iterdir()}
+    wrong = []
+    for path in sorted((plugin / "src").rglob("*.py")):
+        for line, module in imports(path, False):
+            first = module.split(".")[0]
+            other = first.startswith("skillframe_") and first not in packages
+            private = first == "skillframe" and any(part.startswith("_") for part in module.split("."))
+            if other or private or own(module) == "cli":
+                wrong.append(f"{relative(path)}:{line} {module}")
+    assert not wrong, "a plug-in asks the registry, and never the command line: " + "; ".join(wrong)
+
+
+BANNED_IMPORTS = {
+    "logging",
+    "pluggy",
+    "rich",
+    "click",
+    "time",
+    "datetime",
+    "random",
+    "io",
+    "json",
+    "csv",
+    "tomllib",
+    "shutil",
+}
+BANNED_IMPORTS |= {"tempfile", "subprocess", "warnings"}
+BANNED_CALLS = re.compile(
+    r"^(print|open|input)$|\.(open|read_text|write_text|read_bytes|write_bytes)$|^(np|numpy)\.(load|save|savez\w*|loadtxt|savetxt)$"
+    r"|^sys\.(stdout|stderr)\.write$"
+)
+HANDED_IN = {"Generator", "SeedSequence", "default_rng"}
+
+
+@pytest.mark.parametrize("path", loop_files(), ids=relative)
+def test_what_runs_in_the_loop_prints_logs_reads_and_asks_nothing(path):
+    found = [f"line {line}: import {m}" for line, m in imports(path) if m.split(".")[0] in BANNED_IMPORTS]
+    found += [f"line {line}: {name}(...)" for line, name in calls(path) if BANNED_CALLS.search(name)]
+    found += [f"line {line}: asks the registry" for line, m in imports(path) if own(m) == "registry"]
+    assert not found, f"{relative(path)}: {'; '.join(found)}"
+
+
+@pytest.mark.parametrize("path", loop_files(), ids=relative)
+def test_chance_in_the_loop_comes_from_a_generator_only(path):
+    used = {m.group(1) for m in re.finditer(r"\bnp\.random\.(\w+)", path.read_text())}
+    assert used <= HANDED_IN, f"{relative(path)} uses numpy's global generator: {used - HANDED_IN}"
+
+
+@pytest.mark.parametrize("path", loop_files(), ids=relative)
+def test_slow_calls_stay_out_of_the_loop(path):
+    slow = [f"line {line}: {m}" for line, m in imports(path) if m.startswith("scipy.spatial")]
+    slow += [f"line {line}: {name}; see skillframe.frames" for line, name in calls(path) if name in SLOW]
+    assert not slow, f"{relative(path)}: {'; '.join(slow)}"
+
+
+SLOW = {"np.cross", "numpy.cross", "np.linalg.norm", "numpy.linalg.norm", "Rotation.from_matrix", "Rotation.from_quat"}
+
+
+def loaded_by(code):
+    """Modules at top level that a fresh interpreter has loaded after some code, with no plug-in."""
+    code += "\nimport sys; print(' '.join({m.partition('.')[0] for m in sys.modules}))"
+    environment = {**os.environ, "SKILLFRAME_PLUGINS": ""}
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+    return set(run.stdout.splitlines()[-1].split())
+
+
+def test_importing_skillframe_loads_no_scientific_library():
+    assert not loaded_by("import skillframe") & (HEAVY | {"numpy", "pluggy", "click"})
+
+
+def test_help_loads_no_scientific_library():
+    assert not loaded_by("from skillframe.cli.main import run; assert run(['--help']) == 0") & HEAVY
+
+
+def test_an_entry_module_of_a_plugin_loads_nothing_heavy():
+    for plugin in PLUGINS:
+        package = next((plugin / "src").iterdir()).name.removesuffix(".py")
+        code = f"from importlib import import_module as i\ntry: i({package!r})\nexcept ModuleNotFoundError: pass"
+        assert not loaded_by(code) & HEAVY, package
+
+
+def tracked(pattern):
+    """Files in version control, and new ones that are not ignored; every file where git is missing."""
+    try:
+        command = ["git", "ls-files", "--cached", "--others", "--exclude-standard", "--", pattern]
+        listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
+    except (OSError, subprocess.CalledProcessError):
+        pytest.skip("not a git checkout")
+    return [ROOT / name for name in listed if (ROOT / name).is_file()]
+
+
+def test_no_python_file_is_longer_than_400_lines():
+    long = {relative(p): n for p in tracked("*.py") if (n := len(p.read_text(encoding="utf-8").splitlines())) > 400}
+    assert not long
+
+
+def test_no_file_names_a_machine_path_or_a_package_registry():
+    places = "|".join(("/" + "work/", "/" + "root/", "/" + "tmp/", "/" + "home/"))
+    hosts = "|".join(("pypi" + r"\.org", "python" + r"hosted\.org", "npm" + r"js\.org", "deb" + r"ian\.org"))
+    forbidden = re.compile(rf"(?<![\w.$~}}])({places})|{hosts}")
+    found = []
+    for path in tracked("*"):
+        content = path.read_bytes()
+        if b"\0" not in content[:8000]:
+            lines = content.decode("utf-8", errors="replace").splitlines()
+            found += [
+                f"{relative(path)}:{i}: {line[:120]}" for i, line in enumerate(lines, 1) if forbidden.search(line)
+            ]
+    assert not found, "\n".join(found)
+
+
+def every_command():
+    """(words, command) of every command and subcommand."""
+    from skillframe.cli.main import cli
+
+    def below(words, command):
+        yield words, command
+        if isinstance(command, click.Group):
+            context = click.Context(command)
+            for name in command.list_commands(context):
+                yield from below([*words, name], command.get_command(context, name))
+
+    return list(below([], cli))
+
+
+def test_every_command_has_help_with_an_example():
+    lacking = [" ".join(["skillframe", *words]) for words, c in every_command() if "Example" not in (c.help or "")]
+    assert not lacking
+
+
+def test_every_listing_command_has_json():
+    lacking = [
+        " ".join(words) for words, c in every_command()
+        if words and words[-1] == "list" and "--json" not in {o for p in c.params for o in p.opts}
+    ]  # fmt: skip
+    assert not lacking
+
+
+def test_every_example_in_help_names_a_command_and_options_that_exist():
+    known = {" ".join(words): command for words, command in every_command()}
+    wrong = []
+    for words, command in known.items():
+        for line in re.findall(r"^\s*(?:\$ )?skillframe (.+)$", command.help or "", re.MULTILINE):
+            wrong += _problems_of_example(line.split(), words, known)
+    assert not wrong, "\n".join(wrong)
+
+
+def _problems_of_example(parts, words, known):
+    name = ""
+    while parts and f"{name} {parts[0]}".strip() in known:
+        name = f"{name} {parts.pop(0)}".strip()
+    options = {o for p in known[name].params for o in [*p.opts, *p.secondary_opts]}
+    unknown = [part for part in parts if part.startswith("--") and part.partition("=")[0] not in options]
+    problems = [f"help of '{words}': its example gives '{name}' {option}, which does not exist" for option in unknown]
+    return problems + ([f"help of '{words}': no command in '{' '.join(parts)}'"] if not name else [])
