@@ -1,0 +1,127 @@
+"""`skillframe quickstart`: the whole way in a few minutes, as the commands a person would type.
+
+Each step is a command of this program, echoed before it runs, so that the log doubles as a tutorial: two demonstrations
+of each task, learning, one run, a campaign over errors of the fixture's pose beside plain replay, and one report.
+"""
+
+from __future__ import annotations
+
+import shlex
+import shutil
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+
+MARKER = ".skillframe-quickstart"
+VALLEY = """\
+# Where does the learned slide work, when the valley is tipped and its friction is not what it was?
+name = "Valley: tipped, with other friction"
+seed = 11
+trials = {trials}
+robot = "{robot}"
+world = "valley"
+skills = ["valley.skill.json", "replay:demonstrations/valley1.npz"]
+duration_s = 6.0
+[set]
+"start.offset_x" = 0.02
+[vary]
+"fixture.tilt_y" = {{ sobol = [-0.05, 0.9] }}
+"world.friction" = {{ sobol = [0.05, 0.6] }}
+"""
+PEG = """\
+# Where does the learned insertion work, when the hole is shifted and tilted and nobody tells the robot?
+name = "Peg in hole: the hole shifted and tilted"
+seed = 12
+trials = {trials}
+robot = "{robot}"
+world = "peg_in_hole"
+coc = "tip"
+skills = ["peg.skill.json", "replay:demonstrations/peg1.npz"]
+duration_s = 8.0
+[vary]
+"fixture.offset_x" = {{ sobol = [-0.008, 0.008] }}
+"fixture.tilt_y" = {{ sobol = [-0.12, 0.12] }}
+"""
+TASKS = (("valley", "valley", VALLEY, None), ("peg", "peg_in_hole", PEG, "tip"))
+
+
+@click.command(name="quickstart")
+@click.option("--out", default="demo", show_default=True, type=click.Path(path_type=Path), help="Folder to make.")
+@click.option("--robot", default="panda", show_default=True, help="Robot to teach.")
+@click.option("--trials", default=96, show_default=True, help="Trials per skill and campaign.")
+@click.option("--workers", default=2, show_default=True, help="Worker processes of the campaigns.")
+@click.option("--seed", default=1, show_default=True, help="Seed of the demonstrations.")
+def command(out: Path, robot: str, trials: int, workers: int, seed: int) -> int:
+    """Demonstrate, learn, run and prove two skills, and write a report.
+
+    A simulated person shows a robot twice how to slide into a valley, and how to put a peg into a hole with 0.25 mm of
+    play.
+
+    \b
+    Example:
+      skillframe quickstart --out demo
+    """
+    _make_room(out)
+    began = time.perf_counter()
+    for name, _, template, _ in TASKS:
+        text = template.format(trials=trials, robot=robot)
+        (out / f"{name}.campaign.toml").write_text(text, encoding="utf-8")
+    for step in _steps(out, robot, workers, seed):
+        code = _type(step)
+        if code:
+            return code
+    click.echo(f"\nDone in {time.perf_counter() - began:.0f} s. Open {out / 'report.html'} in a browser.")
+    return 0
+
+
+def _make_room(out: Path) -> None:
+    """An empty folder; an earlier quickstart's is cleared, anything else is left alone.
+
+    Raises:
+        InputError: the folder holds something that no quickstart made.
+    """
+    from skillframe.errors import InputError
+
+    if out.exists() and (not out.is_dir() or (any(out.iterdir()) and not (out / MARKER).exists())):
+        raise InputError(out, "is there already and was not made by quickstart", "choose another --out")
+    if out.exists():
+        shutil.rmtree(out)
+    (out / "demonstrations").mkdir(parents=True)
+    (out / MARKER).write_text("made by skillframe quickstart, which clears this folder\n", encoding="utf-8")
+
+
+def _steps(out: Path, robot: str, workers: int, seed: int) -> Iterator[list[str]]:
+    """The commands, in order."""
+    for name, world, _, coc in TASKS:
+        demos = [str(out / "demonstrations" / f"{name}{i}.npz") for i in (1, 2)]
+        skill = str(out / f"{name}.skill.json")
+        yield [
+            "demonstration", "record", "--world", world, "--robot", robot, "--count", "2", "--seed", str(seed),
+            "--out", str(out / "demonstrations" / f"{name}.npz"),
+        ]  # fmt: skip
+        yield ["learn", *demos, "--out", skill]
+        yield ["skill", "show", skill]
+        where = [] if coc is None else ["--coc", coc]
+        start = "start.offset_x=0.02" if name == "valley" else "fixture.tilt_y=0.08"
+        trace, plan = str(out / f"{name}.npz"), str(out / f"{name}.campaign.toml")
+        yield ["run", skill, "--world", world, "--robot", robot, *where, "--set", start, "--out", trace]
+        yield ["campaign", "run", plan, "--out", str(out / name), "--workers", str(workers)]
+        _copy(demos, out / name / "demonstrations")
+        _copy([trace], out / name / "traces")
+    yield ["report", *(str(out / name) for name, *_ in TASKS), "--out", str(out / "report.html")]
+
+
+def _copy(files: list[str], folder: Path) -> None:
+    folder.mkdir(exist_ok=True)
+    for file in files:
+        shutil.copy(file, folder)
+
+
+def _type(step: list[str]) -> int:
+    """Echo a command and run it."""
+    from skillframe.cli.main import run
+
+    click.secho(f"\n$ skillframe {shlex.join(step)}", bold=True)
+    return run(step)
