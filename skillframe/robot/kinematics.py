@@ -1,10 +1,10 @@
 r"""Kinematics and dynamics of a robot at a state, and inverse kinematics.
 
-Everything is in base axes at a point of interest (Pinocchio's LOCAL_WORLD_ALIGNED): for a point fixed in frame f at
+Everything is in base axes at a point of interest (Pinocchio's LOCAL_WORLD_ALIGNED): for a point fixed in frame f at an
 offset r, \(J_r = [J_v - [R r]_\times J_\omega;\; J_\omega]\).
 
 Inverse kinematics minimises the error \(e = [p_d - p;\ \log(R_d R^T)]\) by the Levenberg-Marquardt step
-\(\Delta = (J^T W J + \lambda I)^{-1} J^T W e\) with \(\lambda = e^T W e / 2 + 10^{-10}\): damping that vanishes with the
+\(\Delta = J^T (J J^T + \lambda I)^{-1} e\) with \(\lambda = e^T e / 2 + 10^{-10}\): damping that vanishes with the
 error (Sugihara, "Solvability-Unconcerned Inverse Kinematics by the Levenberg-Marquardt Method", IEEE T-RO 27(5), 2011).
 Joint limits by clipping each step and leaving clipped joints out of the next, and seeded restarts are our choice.
 """
@@ -15,10 +15,13 @@ from collections.abc import Iterator
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from skillframe.errors import SkillframeError
 from skillframe.frames import Float, Pose, rotation_vector, skew
 from skillframe.robot.model import RobotModel
+
+Flags = NDArray[np.bool_]
 
 _TOLERANCE = 1e-9  # m and rad: far below any clearance, far above rounding
 _STEPS = 60
@@ -138,7 +141,7 @@ def _error(wanted: Pose, now: Pose) -> Float:
 
 
 def _place_base(model: pin.Model, frame: int, pose: Pose, q0: Float) -> Float:
-    """q with the free-flying base placed so that the frame is at the pose: base = pose (base^-1 frame)^-1."""
+    """Q with the free-flying base placed so that the frame is at the pose: base = pose (base^-1 frame)^-1."""
     q = np.array(q0)
     base = pin.XYZQUATToSE3(q[:7])
     now = tool_pose(model, q, frame)
@@ -147,12 +150,13 @@ def _place_base(model: pin.Model, frame: int, pose: Pose, q0: Float) -> Float:
     return q
 
 
-def _bounds(model: pin.Model) -> tuple[Float, Float, np.ndarray[tuple[int], np.dtype[np.bool_]]]:
+def _bounds(model: pin.Model) -> tuple[Float, Float, Flags]:
     """Limits (nq,) and which coordinates they bound: those of joints with one coordinate and a range."""
     low, high = np.array(model.lowerPositionLimit), np.array(model.upperPositionLimit)
     single = np.zeros(model.nq, dtype=bool)
     for joint in list(model.joints)[1:]:
-        single[joint.idx_q] = joint.nq == 1
+        if joint.nq == 1:  # a joint that follows another has none, and another's index
+            single[joint.idx_q] = True
     return low, high, single & (low < high)
 
 
@@ -185,13 +189,13 @@ def _descend(model: pin.Model, frame: int, pose: Pose, q0: Float) -> tuple[Float
     return q, error
 
 
-def _columns(model: pin.Model, bounded: Float) -> tuple[list[int], list[int]]:
+def _columns(model: pin.Model, bounded: Flags) -> tuple[list[int], list[int]]:
     """Coordinates and velocities of the joints that limits bound."""
     pairs = [(j.idx_q, j.idx_v) for j in list(model.joints)[1:] if j.nq == 1 and bounded[j.idx_q]]
     return [p[0] for p in pairs], [p[1] for p in pairs]
 
 
-def _step(jacobian: Float, error: Float, held: Float) -> Float:
+def _step(jacobian: Float, error: Float, held: Flags) -> Float:
     """Levenberg-Marquardt step; joints that stand at a limit are left out."""
     jacobian = np.where(held, 0.0, jacobian)
     damping = 0.5 * float(error @ error) + 1e-10

@@ -1,8 +1,9 @@
 """`RobotModel`: the nominal `pinocchio.Model` of a robot, its home and its tool frames.
 
 The model is built from a bare tree (links with their inertia, joints), written anew from the checked URDF with the
-overlay of robot.toml in it; geometry plays no part, so meshes may be missing. A revolute joint that declares no limits
-turns within +-2 pi, a prismatic one within +-10 m (our choice; the audit warns); no effort limit means unlimited.
+overlay of robot.toml in it; geometry plays no part, so meshes may be missing. A revolute joint without limits (or with
+equal or reversed ones) turns within +-2 pi, a prismatic one slides within +-10 m (our choice; the audit warns); no
+effort limit means unlimited.
 """
 
 from __future__ import annotations
@@ -180,7 +181,7 @@ def _bare_joint(joint: Joint) -> ET.Element:
             bare.append(element)
     limit = joint.element.find("limit")
     given = {"effort": "0", "velocity": "0", **(limit.attrib if limit is not None else {})}
-    if limit is None and joint.type in _FREE_RANGE:
+    if joint.type in _FREE_RANGE and float(given.get("lower", 0.0)) >= float(given.get("upper", 0.0)):
         given |= {"lower": repr(-_FREE_RANGE[joint.type]), "upper": repr(_FREE_RANGE[joint.type])}
     if limit is not None or joint.type in _FREE_RANGE:
         ET.SubElement(bare, "limit", {k: v for k, v in given.items() if k in ("effort", "velocity", "lower", "upper")})
@@ -223,8 +224,12 @@ def _home(model: pin.Model, spec: RobotSpec, followers: tuple[str, ...]) -> Floa
 def _silent() -> Iterator[list[str]]:
     """Catch what C++ parsers write to the process's stderr, so that the user reads one sentence."""
     lines: list[str] = []
+    try:
+        saved = os.dup(2)
+    except OSError:  # a process without stderr has nothing to catch
+        yield lines
+        return
     sys.stderr.flush()
-    saved = os.dup(2)
     with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as catch:
         os.dup2(catch.fileno(), 2)
         try:

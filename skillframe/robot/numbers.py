@@ -64,7 +64,8 @@ def check_joint_numbers(path: Path, name: str, joint: ET.Element) -> None:
     if axis is not None:
         _check(f"{where} axis", axis, "xyz", 3, required=True)
     for tag, attributes in _JOINT_NUMBERS.items():
-        for attribute in attributes if (element := joint.find(tag)) is not None else ():
+        element = joint.find(tag)
+        for attribute in attributes if element is not None else ():
             _check(f"{where} {tag}", element, attribute, 1)
     mimic = joint.find("mimic")
     if mimic is not None and not mimic.get("joint"):
@@ -86,13 +87,12 @@ def _required(where: str, parent: ET.Element, tag: str, attributes: tuple[str, .
         _check(f"{where} {tag}", element, attribute, 1, required=True)
 
 
-def _check(where: str, element: ET.Element, attribute: str, count: int, required: bool = False) -> None:
-    if required and element.get(attribute) is None:
+def _check(where: str, element: ET.Element | None, attribute: str, count: int, required: bool = False) -> None:
+    given = element.get(attribute) if element is not None else None
+    if required and given is None:
         raise InputError(where, f"has no {attribute!r}", "add it")
     try:
         numbers(element, attribute, count, ())
     except ValueError:
         wanted = "one finite number" if count == 1 else f"{count} finite numbers"
-        raise InputError(
-            f"{where}: {attribute}", f"expected {wanted}, got {element.get(attribute)!r}", "correct it"
-        ) from None
+        raise InputError(f"{where}: {attribute}", f"expected {wanted}, got {given!r}", "correct it") from None

@@ -160,7 +160,7 @@ def load_robot(name_or_path: str | Path) -> RobotSpec:
     """
     path = Path(name_or_path)
     bare_name = isinstance(name_or_path, str) and path.parts == (name_or_path,) and not path.suffix
-    if bare_name and (found := robot_names().get(name_or_path)):
+    if bare_name and (found := robot_names().get(str(name_or_path))):
         return _from_toml(found / "robot.toml")
     if path.is_dir():
         return _from_toml(path / "robot.toml")

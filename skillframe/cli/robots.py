@@ -1,0 +1,114 @@
+"""`skillframe robots`: which robots there are, whether a URDF is usable for dynamics, what a robot is like."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from skillframe.robot.audit import Audit
+
+
+@click.group()
+def command() -> None:
+    """List, check and show robots.
+
+    \b
+    Example:
+      skillframe robots check my_robot.urdf
+    """
+
+
+@command.command("list")
+@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
+def list_robots(as_json: bool) -> int:
+    """Robots that can be named: the shipped ones, and those in $SKILLFRAME_PATH/robots.
+
+    \b
+    Example:
+      skillframe robots list --json
+    """
+    from skillframe.errors import SkillframeError
+    from skillframe.robot.spec import load_robot, robot_names
+
+    rows = []
+    for name, folder in sorted(robot_names().items()):
+        try:
+            spec = load_robot(folder)
+            about = {"summary": spec.summary, "base": spec.base, "arms": [a.name for a in spec.arm], "error": None}
+        except SkillframeError as error:
+            about = {"summary": "", "base": None, "arms": [], "error": str(error)}
+        rows.append({"name": name, "path": str(folder), **about})
+    if as_json:
+        click.echo(json.dumps(rows, indent=2))
+        return 0
+    for row in rows:
+        click.echo(f"{row['name']:<14} {row['error'] or row['summary']}")
+    return 0
+
+
+@command.command()
+@click.argument("robot", metavar="URDF|NAME")
+@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
+def check(robot: str, as_json: bool) -> int:
+    """Is a robot usable for dynamics? A URDF, a robot.toml, or a name.
+
+    Exit code 0: usable; 1: it loads and is not; 2: it does not load.
+
+    \b
+    Example:
+      skillframe robots check my_robot.urdf --json
+    """
+    from skillframe.errors import SkillframeError
+    from skillframe.robot.audit import audit
+    from skillframe.robot.spec import load_robot
+
+    try:
+        result = audit(load_robot(robot))
+    except SkillframeError as error:
+        if as_json:
+            click.echo(json.dumps(_not_loaded(robot, str(error)), indent=2))
+        raise
+    if as_json:
+        click.echo(json.dumps(_plain(result), indent=2))
+    else:
+        _print_audit(robot, result)
+    return 0 if result.usable else 1
+
+
+@command.command()
+@click.argument("robot", metavar="NAME|URDF")
+def show(robot: str) -> None:
+    """What a robot is like: joints, limits, home, mass, tool frames.
+
+    \b
+    Example:
+      skillframe robots show panda
+    """
+    from skillframe.robot.describe import describe
+    from skillframe.robot.model import load_model
+    from skillframe.robot.spec import load_robot
+
+    click.echo(describe(load_model(load_robot(robot))))
+
+
+def _plain(result: Audit) -> dict[str, object]:
+    from dataclasses import asdict
+
+    return {**asdict(result), "problems": [asdict(p) for p in result.problems]}
+
+
+def _not_loaded(robot: str, message: str) -> dict[str, object]:
+    fix = "mend the file, then check again"
+    problem = {"code": "does_not_load", "severity": "fatal", "where": robot, "message": message, "fix": fix}
+    return {"usable": False, "nq": None, "nv": None, "mass_kg": None, "problems": [problem]}
+
+
+def _print_audit(robot: str, result: Audit) -> None:
+    verdict = "usable for dynamics" if result.usable else "NOT usable for dynamics"
+    click.echo(f"{robot}: {verdict} (nq {result.nq}, nv {result.nv}, {result.mass_kg:.4g} kg)")
+    for problem in result.problems:
+        click.echo(f"\n{problem.severity} {problem.code} at {problem.where}\n  {problem.message}")
+        click.echo("  fix: " + problem.fix.replace("\n", "\n    "))

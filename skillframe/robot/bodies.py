@@ -1,0 +1,137 @@
+r"""Rigid bodies of a URDF: links that fixed joints make one, and their size.
+
+A body's size is its reach from the origin of the joint that moves it, to its child joints and to its geometry
+(contract: `robots check`). Where nothing tells (no child joint at a distance, no geometry), it is unknown; where a mesh
+cannot be measured, the reach is only a lower bound.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from skillframe.frames import Float, Pose, rotation_matrix
+from skillframe.robot.meshes import mesh_vertices, resolve_mesh
+from skillframe.robot.numbers import numbers
+from skillframe.robot.urdf import Joint, Urdf
+
+_ZERO3 = (0.0, 0.0, 0.0)
+
+
+@dataclass(slots=True, kw_only=True)
+class Body:
+    """A rigid body.
+
+    Attributes:
+        joint: that moves it, None for the root body.
+        links: names of its links, the first one carries the joint.
+        reach: to child joints and geometry [m], 0 where unknown; bound: the reach is only a lower bound.
+        far: (3,) the child joint farthest away, in body axes [m].
+    """
+
+    joint: str | None
+    links: list[str] = field(default_factory=list)
+    reach: float = 0.0
+    bound: bool = False
+    far: Float = field(default_factory=lambda: np.zeros(3))
+
+
+def rigid_bodies(urdf: Urdf) -> list[Body]:
+    """Bodies of a tree, root first."""
+    children = urdf.children()
+    bodies: list[Body] = []
+    heads: list[tuple[str | None, str]] = [(None, urdf.root)]
+    for joint, head in heads:  # grows while it is walked
+        body = Body(joint=joint)
+        heads += _gather(body, urdf, children, head)
+        bodies.append(body)
+    return bodies
+
+
+def size_of(body: Body, bodies: list[Body]) -> float:
+    """A body's size [m]: its reach, or, where that is unknown, that of the robot's largest link; 0 if none is known."""
+    if body.reach > 0.0 and not body.bound:
+        return body.reach
+    return max(b.reach for b in [body, *bodies])
+
+
+def missing_meshes(urdf: Urdf) -> dict[str, str]:
+    """File names of meshes that are not found, each with the first link that uses it."""
+    missing: dict[str, str] = {}
+    for name, link in urdf.links.items():
+        for mesh in link.findall("*/geometry/mesh"):
+            uri = mesh.get("filename", "")
+            if uri not in missing and resolve_mesh(uri, urdf.path) is None:
+                missing[uri] = name
+    return missing
+
+
+def placement(element: ET.Element | None) -> Pose:
+    """Pose that an <origin> inside an element says; fixed-axis roll, pitch, yaw."""
+    origin = element.find("origin") if element is not None else None
+    roll, pitch, yaw = np.diag(numbers(origin, "rpy", 3, _ZERO3))
+    rotation = rotation_matrix(yaw) @ rotation_matrix(pitch) @ rotation_matrix(roll)
+    return Pose(np.array(numbers(origin, "xyz", 3, _ZERO3)), rotation)
+
+
+def _gather(body: Body, urdf: Urdf, children: dict[str, list[Joint]], head: str) -> list[tuple[str | None, str]]:
+    """Fill a body with the links that are fixed to its head; returns the joints that leave it."""
+    leaving: list[tuple[str | None, str]] = []
+    links = [(head, Pose(np.zeros(3), np.eye(3)))]
+    for name, pose in links:  # grows while it is walked
+        body.links.append(name)
+        _measure(body, urdf.links[name], pose, urdf.path)
+        for joint in children[name]:
+            inside = pose.compose(placement(joint.element))
+            distance = float(np.linalg.norm(inside.position))
+            if distance > np.linalg.norm(body.far):
+                body.far = inside.position
+            body.reach = max(body.reach, distance)
+            if joint.type == "fixed":
+                links.append((joint.child, inside))
+            else:
+                leaving.append((joint.name, joint.child))
+    return leaving
+
+
+def _measure(body: Body, link: ET.Element, pose: Pose, path: Path) -> None:
+    for drawn in [*link.findall("visual"), *link.findall("collision")]:
+        for shape in drawn.findall("geometry/*"):
+            points = _points(shape, path)
+            if points is None:
+                body.bound = True
+                continue
+            placed = pose.compose(placement(drawn))
+            world = points @ placed.rotation.T + placed.position
+            body.reach = max(body.reach, float(np.linalg.norm(world, axis=1).max()))
+
+
+def _points(shape: ET.Element, path: Path) -> Float | None:
+    """Points that span a shape, in its own axes, or None where it cannot be measured."""
+    corners = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+    if shape.tag == "box":
+        return corners * 0.5 * np.array(numbers(shape, "size", 3, _ZERO3))
+    if shape.tag == "mesh":
+        file = resolve_mesh(shape.get("filename", ""), path)
+        vertices = mesh_vertices(file) if file else None
+        scale: Float = _scale(shape)
+        return None if vertices is None else vertices * scale
+    if shape.tag not in ("sphere", "cylinder", "capsule"):
+        return None
+    radius = numbers(shape, "radius", 1, (0.0,))[0]
+    half = 0.5 * numbers(shape, "length", 1, (0.0,))[0]
+    axes = np.vstack([np.eye(3), -np.eye(3)]) * radius
+    if shape.tag == "cylinder":
+        axes[:, 2] = 0.0
+    along = np.array([[0.0, 0.0, half]])
+    return np.vstack([axes + along, axes - along])
+
+
+def _scale(mesh: ET.Element) -> Float:
+    try:
+        return np.array(numbers(mesh, "scale", 3, (1.0, 1.0, 1.0)))
+    except ValueError:
+        return np.ones(3)
