@@ -1,0 +1,62 @@
+r"""Compliant axes: principal components of the demonstrations' mean directions, their number by a BIC-like criterion.
+
+Motion that the desired direction does not explain was caused by the environment, so the tool must give way there. Each
+demonstration gives one row, the mean of its unit directions of motion, less its component along the desired direction
+if that exists (green crosses in Fig. 14). Distances are taken about the origin, not the mean; of the principal axes
+the first d are compliant, with d minimising
+
+    BIC_d = r_d / sigma^2 + d (ln max(n, 2) + 2),     r_d = sum over j > d of s_j^2
+
+for the singular values s and n demonstrations. The papers take "inspiration from BIC" without printing it; with two
+demonstrations a literal BIC is degenerate (no residual), hence the fixed sigma, which is ours: 0.12 rad for rotations,
+and
+
+    sigma = clip(0.2 sqrt(15 mm / L), 0.08, 0.2)
+
+for translations over a mean path L, because a person's wandering is correlated over 15 mm and averages out beyond.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from skillframe.frames import Float
+
+
+class CompliantAxes(NamedTuple):
+    """Axes (d, 3), orthonormal and square to the desired direction, and the criterion for 0, 1, 2 (, 3) axes."""
+
+    axes: Float
+    criterion: list[float]
+
+
+def straightness(path: float, correlation: float) -> float:
+    """Noise of translational mean directions for a mean path [m] and a correlation length [m]."""
+    return float(np.clip(0.2 * np.sqrt(correlation / max(path, 1e-9)), 0.08, 0.2))
+
+
+def compliant_axes(means: Float, direction: Float | None, sigma: float) -> CompliantAxes:
+    """The compliant axes of one part.
+
+    Args:
+        means: (n, 3) mean unit direction of motion of each demonstration.
+        direction: (3,) desired direction, or None.
+        sigma: noise of a mean direction.
+    """
+    rows, most = means, 3
+    if direction is not None:
+        rows, most = means - (means @ direction)[:, None] * direction, 2
+    _, values, vectors = np.linalg.svd(rows, full_matrices=True)
+    squares = np.zeros(3)
+    squares[: len(values)] = values**2
+    price = np.log(max(len(rows), 2)) + 2.0
+    criterion = [float(squares[d:].sum() / sigma**2 + d * price) for d in range(most + 1)]
+    return CompliantAxes(np.array([_signed(v) for v in vectors[: int(np.argmin(criterion))]]).reshape(-1, 3), criterion)
+
+
+def _signed(axis: Float) -> Float:
+    """An axis has no sign; let its largest component be positive."""
+    result: Float = axis * np.copysign(1.0, axis[np.argmax(np.abs(axis))])
+    return result

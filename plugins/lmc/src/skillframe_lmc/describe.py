@@ -1,0 +1,97 @@
+"""An LMC skill in words: "push along -z at 20 mm/s; free along x; turns freely about y", then the details."""
+
+from __future__ import annotations
+
+from math import degrees
+from typing import Any
+
+from skillframe.records import Document
+from skillframe_lmc.phase import Part, Phase, read_phase
+from skillframe_lmc.words import axis_words, direction_words, exact_words, listed
+
+
+def describe(document: Document) -> list[str]:
+    """The skill in words, the headline first."""
+    phase = read_phase(document)
+    return [headline(phase), *_details(phase), *_messages(phase), _stops(phase), _frame(document["frame"])]
+
+
+def headline(phase: Phase) -> str:
+    """What the skill does, in one line."""
+    move, turn = phase.translation, phase.rotation
+    parts = []
+    if move.desired_direction is not None:
+        parts.append(f"push along {direction_words(move.desired_direction)} at {1e3 * move.speed:.3g} mm/s")
+    if move.fully_compliant:
+        parts.append("position free in every direction")
+    elif len(move.compliant_axes):
+        parts.append(f"free along {_axes(move)}")
+    elif move.desired_direction is None:
+        parts.append("holds its position")
+    if turn.desired_direction is not None:
+        parts.append(f"turn about {direction_words(turn.desired_direction)} at {degrees(turn.speed):.3g} degrees/s")
+    if turn.fully_compliant:
+        parts.append("turns freely about every axis")
+    elif len(turn.compliant_axes):
+        parts.append(f"turns freely about {_axes(turn)}")
+    elif turn.desired_direction is None:
+        parts.append("holds its attitude")
+    return "; ".join(parts)
+
+
+def _axes(part: Part) -> str:
+    return listed([axis_words(axis) for axis in part.compliant_axes])
+
+
+def _details(phase: Phase) -> list[str]:
+    lines = []
+    for name, part, k, unit in (
+        ("translation", phase.translation, "N/m", "J"), ("rotation", phase.rotation, "Nm/rad", "J"),
+    ):  # fmt: skip
+        facts = [_direction(part), *_free(part), f"stiffness {part.stiffness.diagonal().max():.4g} {k} at most"]
+        seen = part.evidence
+        if not seen.get("held") and "work_teacher_j" in seen:
+            facts.append(f"work of the teacher {seen['work_teacher_j']:.3g} {unit}, of the environment "
+                         f"{seen['work_environment_j']:.3g} {unit}")  # fmt: skip
+        lines.append(f"{name}: {'; '.join(facts)}")
+    if phase.pitch is not None:
+        lines.append(f"pitch: {1e3 * phase.pitch:.3g} mm of translation per radian of rotation")
+    return lines
+
+
+def _direction(part: Part) -> str:
+    if part.desired_direction is None:
+        return "held" if part.evidence.get("held") else "no desired direction"
+    text = f"desired direction {exact_words(part.desired_direction)}"
+    angle, area = part.evidence.get("pyramid_angle_rad"), part.evidence.get("feasible_solid_angle_sr")
+    if angle is None or area is None:
+        return text
+    return f"{text} (pyramids of {degrees(angle):.0f} degrees meet; directions that explain it: {area:.2f} sr)"
+
+
+def _free(part: Part) -> list[str]:
+    if part.fully_compliant:
+        return ["compliant in all three degrees of freedom"]
+    return [f"compliant axis {exact_words(axis)}" for axis in part.compliant_axes]
+
+
+def _messages(phase: Phase) -> list[str]:
+    parts = {"translation": phase.translation, "rotation": phase.rotation}
+    return [f"note: {name}: {text}" for name, part in parts.items() if (text := part.evidence.get("message"))]
+
+
+def _stops(phase: Phase) -> str:
+    stop = phase.stop
+    ends = f"ends when nothing has moved for {stop.stall_s:g} s while pushing"
+    if phase.translation.desired_direction is None and phase.rotation.desired_direction is None:
+        ends = f"ends after {stop.time_limit_s:.1f} s"
+    return (
+        f"{ends}; pushes with {stop.lead_force_n:.0f} N and {stop.lead_torque_nm:.1f} Nm at most; gives up at "
+        f"{stop.force_limit_n:.0f} N, {stop.time_limit_s:.0f} s or {1e3 * stop.travel_limit_m:.0f} mm"
+    )
+
+
+def _frame(frame: dict[str, Any]) -> str:
+    axes = "base axes" if frame["axes"] == "base" else "axes of the tool's attitude at the start of the phase"
+    points = [f"{what} {frame[key]}" for what, key in (("learned at", "learned_at"), ("hand at", "work_at"))]
+    return f"{axes}; {', '.join(points)}, centre of compliance {frame['center_of_compliance']} (m, tool frame)"

@@ -1,0 +1,120 @@
+"""What a part was decided from, as it is kept in the skill file: numbers, sentences, and enough sectors to draw.
+
+If the demonstrations leave the direction open - all of them slid the same way and the accepted set is wide - the
+evidence says so, with the set's solid angle, and asks for a demonstration from the other side.
+"""
+
+from __future__ import annotations
+
+from math import degrees, radians
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from skillframe.frames import Float, norm, unit
+from skillframe_lmc.intervals import Motion
+from skillframe_lmc.sectors import sectors
+from skillframe_lmc.settings import Settings
+
+if TYPE_CHECKING:
+    from skillframe_lmc.learner import Learned
+
+OPEN_HALF_WIDTH = radians(20.0)
+ONE_SIDED = 0.8  # |sum| / sum of |.| of the sideways means: 1 if all lean the same way, 0 if they balance
+LEANING = 0.15  # a sideways mean below this is wandering
+MOST_DRAWN = 30
+
+
+def of(part: Learned, settings: Settings) -> dict[str, Any]:
+    """The evidence of one part as plain JSON values."""
+    choice, done = part.choice, part.work
+    open_direction = is_ambiguous(part)
+    return {
+        "held": part.held,
+        "ambiguous": open_direction,
+        "message": _message(part, settings, open_direction),
+        "votes": None if choice is None else choice.votes,
+        "pyramid_angle_rad": None if choice is None else choice.pyramid_angle,
+        "feasible_solid_angle_sr": None if choice is None else choice.solid_angle,
+        "feasible_half_width_rad": None if choice is None else choice.half_width,
+        "work_teacher_j": 0.0 if done is None else done.teacher,
+        "work_environment_j": 0.0 if done is None else done.environment,
+        "work_fraction": 0.0 if done is None else done.fraction,
+        "criterion": [] if part.axes is None else part.axes.criterion,
+        "mean_speed": part.speed,
+        "demonstrations": [_drawable(m) for m in part.motions],
+    }
+
+
+def is_ambiguous(part: Learned) -> bool:
+    """Whether a demonstration from the other side would narrow the direction down."""
+    choice = part.choice
+    if choice is None or choice.direction is None or choice.half_width < OPEN_HALF_WIDTH:
+        return False
+    sideways = part.means - (part.means @ choice.direction)[:, None] * choice.direction
+    lean = norm(sideways)
+    return bool(lean.max() >= LEANING and norm(sideways.sum(axis=0)) > ONE_SIDED * lean.sum())
+
+
+def _message(part: Learned, settings: Settings, open_direction: bool) -> str:
+    if part.held:
+        return _held_message(part, settings)
+    if part.fully_compliant:
+        return f"the environment did {100.0 * _fraction(part):.0f} % of the work, so it is left free in all directions"
+    choice = part.choice
+    if choice is None:
+        return "too few intervals in which the teacher did the work to find a direction"
+    if choice.direction is None:
+        return (
+            f"no one {_push(part)} explains the demonstrations: it would take pyramids of "
+            f"{degrees(choice.pyramid_angle):.0f} degrees, and {degrees(settings.pyramid_max_rad):.0f} are allowed"
+        )
+    if open_direction:
+        who = "one demonstration leaves" if len(part.moving) == 1 else "demonstrations from one side leave"
+        return (
+            f"{who} the direction open: any {_push(part)} within {choice.solid_angle:.2f} sr, up to "
+            f"{degrees(choice.half_width):.0f} degrees to either side, explains what was seen; record another "
+            "demonstration from the other side"
+        )
+    return ""
+
+
+def _fraction(part: Learned) -> float:
+    return 0.0 if part.work is None else part.work.fraction
+
+
+def _push(part: Learned) -> str:
+    return "push" if part.name == "translation" else "turning push"
+
+
+def _held_message(part: Learned, settings: Settings) -> str:
+    most = max(m.excursion for m in part.motions)
+    if part.name == "translation":
+        moved, least, key = f"{1e3 * most:.1f} mm", f"{1e3 * settings.moving_m:.3g} mm", "moving_m"
+    else:
+        moved, least, key = f"{degrees(most):.1f} degrees", f"{degrees(settings.moving_rad):.3g} degrees", "moving_rad"
+    return f"moved {moved} at most, less than the {least} that count as a motion (--set {key}=...), so it is held"
+
+
+def _drawable(motion: Motion) -> dict[str, Any]:
+    """At most 30 of the sectors, evenly spread, and the demonstration's numbers."""
+    every = sectors(motion)
+    chosen = np.unique(np.linspace(0, max(len(every.contact) - 1, 0), MOST_DRAWN).round().astype(int))
+    chosen = chosen[: len(every.contact)]
+    mean = unit(motion.displacement).mean(axis=0) if len(motion.displacement) else np.zeros(3)
+    return {
+        "excursion": motion.excursion,
+        "path": motion.path,
+        "intervals": len(every.contact),
+        "work_teacher_j": float(-motion.work[motion.work < 0.0].sum()),
+        "work_environment_j": float(motion.work[motion.work > 0.0].sum()),
+        "mean_direction": _rounded(mean),
+        "motion": _rounded(every.motion[chosen]),
+        "push": _rounded(every.push[chosen]),
+        "contact": every.contact[chosen].tolist(),
+    }
+
+
+def _rounded(values: Float) -> list[Any]:
+    result: list[Any] = (np.round(values, 4) + 0.0).tolist()
+    return result

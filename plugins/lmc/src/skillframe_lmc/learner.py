@@ -1,0 +1,245 @@
+r"""The flow of learning (Fig. 6 of the seed document).
+
+First the pitch, then for translation and rotation alike
+
+    moved at all?      no: held stiff
+    who moved it?      the environment: three-degree-of-freedom compliance, equation (3)       [work]
+    where to push?     intersection of the pyramids; may not exist                              [sectors, directions]
+    where to give?     principal axes of the motion that the push does not explain              [axes]
+    how stiff?         zero along compliant axes, k elsewhere                                   [gains]
+
+and if both directions exist, their speeds are coupled by the pitch, lambda = nu / p. The wrench and the position are
+those of the learning point; the torque's work and sectors are taken at the hand, because only there is the teacher's
+torque apart from the lever arm of his force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from math import radians
+from typing import Literal
+
+import numpy as np
+
+from skillframe.config import build
+from skillframe.demonstration.record import Demonstration, resolve_point
+from skillframe.errors import InputError
+from skillframe.frames import Float, norm, unit
+from skillframe.records import Document, LearnOptions
+from skillframe_lmc import evidence, intervals
+from skillframe_lmc.axes import CompliantAxes, compliant_axes, straightness
+from skillframe_lmc.directions import Choice, choose
+from skillframe_lmc.gains import gains
+from skillframe_lmc.intervals import Motion, Track
+from skillframe_lmc.phase import Stop
+from skillframe_lmc.sectors import Sectors, sectors
+from skillframe_lmc.settings import Settings
+from skillframe_lmc.work import Work, work
+
+Name = Literal["translation", "rotation"]
+FEWEST_INTERVALS = 3  # fewer say nothing about an intersection
+SAME_POINT_M = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Learned:
+    """What was decided about one part, and from what.
+
+    Attributes:
+        name: "translation" or "rotation".
+        motions: all demonstrations.
+        moving: those that moved this part.
+        given: sectors of those that voted.
+        work: who moved it; None if held.
+        choice: the votes; None if none were cast.
+        axes: compliant axes; None if held or fully compliant.
+        means: (n, 3) mean directions, a row for each that moved.
+        speed: mean demonstrated speed, without the pauses [m/s or rad/s].
+    """
+
+    name: Name
+    motions: Sequence[Motion]
+    moving: Sequence[Motion]
+    given: Sequence[Sectors]
+    work: Work | None
+    choice: Choice | None
+    axes: CompliantAxes | None
+    means: Float
+    speed: float
+
+    @property
+    def held(self) -> bool:
+        """The part did not move."""
+        return not self.moving
+
+    @property
+    def fully_compliant(self) -> bool:
+        """The environment moved it."""
+        return self.work is not None and self.work.fraction > 0.5
+
+    @property
+    def direction(self) -> Float | None:
+        """The desired direction, if it exists."""
+        return None if self.choice is None else self.choice.direction
+
+
+def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
+    """The body of a skill document (`frame`, `phases`, `settings`) from demonstrations of one phase.
+
+    Raises:
+        InputError: no demonstration, tools that differ, values that are not finite, or an unknown setting.
+        UnknownName: a point's name that the demonstrations do not know, or unknown axes.
+    """
+    settings = build(Settings, options.settings, "--set")
+    frame = _frame(demonstrations, options)
+    at, hand = np.array(frame["learned_at"]), np.array(frame["work_at"])
+    tracks = [intervals.track(d, at, hand, options.axes) for d in demonstrations]
+    translation = _learn_part("translation", tracks, intervals.translation, settings)
+    rotation = _learn_part("rotation", tracks, intervals.rotation, settings)
+    return {
+        "frame": frame,
+        "phases": [_phase(translation, rotation, settings)],
+        "settings": asdict(settings),
+    }
+
+
+def _frame(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
+    if not demonstrations:
+        raise InputError("learn", "no demonstration given", "name at least one file")
+    if options.axes not in ("base", "phase_start"):
+        raise InputError("--axes", f"{options.axes!r} is neither base nor phase_start", "choose one of the two")
+    frames = _common_frames(demonstrations)
+    at = resolve_point(options.at, frames)
+    hand = _hand(demonstrations[0], options, frames)
+    point = at.tolist()
+    return {
+        "work_at": point if hand is None else hand.tolist(),
+        "learned_at": point,
+        "center_of_compliance": point,
+        "axes": options.axes,
+        "frames": frames,
+    }
+
+
+def _hand(demonstration: Demonstration, options: LearnOptions, frames: dict[str, list[float]]) -> Float | None:
+    """Where the hand holds: the option, else the demonstration's own, else None."""
+    own = demonstration.meta.get("hand")
+    if options.hand is not None or isinstance(own, str):
+        return resolve_point(options.hand if options.hand is not None else own, frames)
+    return None if own is None else np.array(own, dtype=float).reshape(3)
+
+
+def _common_frames(demonstrations: Sequence[Demonstration]) -> dict[str, list[float]]:
+    """Named points of the tool, which all demonstrations must share."""
+    frames: dict[str, list[float]] = {}
+    for demonstration in demonstrations:
+        for name, point in demonstration.meta.get("frames", {}).items():
+            values = np.array(point, dtype=float).reshape(3)
+            if norm(values - frames.setdefault(name, values.tolist())) > SAME_POINT_M:
+                raise InputError(
+                    demonstration.source or "demonstration",
+                    f"has its point {name!r} at {values.tolist()}, another demonstration at {frames[name]}",
+                    "learn from demonstrations of one tool",
+                )
+    return frames
+
+
+def _learn_part(
+    name: Name, tracks: Sequence[Track], cut: Callable[[Track, Settings], Motion], settings: Settings
+) -> Learned:
+    motions = [cut(blocks, settings) for blocks in tracks]
+    least = settings.moving_m if name == "translation" else settings.moving_rad
+    moving = [m for m in motions if m.excursion >= least and len(m.displacement)]
+    means = np.array([unit(m.displacement).mean(axis=0) for m in moving]).reshape(-1, 3)
+    done = work(moving) if moving else None
+    choice, given, axes = None, [sectors(m) for m in moving], None
+    if done is not None and done.fraction <= 0.5:
+        given = [sectors(m, teacher_driven_only=name == "rotation") for m in moving]
+        if all(len(g.contact) >= min(FEWEST_INTERVALS, len(m.work)) for g, m in zip(given, moving, strict=True)):
+            choice = choose(given, settings)
+        direction = None if choice is None else choice.direction
+        axes = compliant_axes(means, direction, _straightness(name, moving, settings))
+    path, time = sum(m.path for m in moving), sum(m.duration for m in moving)
+    return Learned(
+        name=name, motions=motions, moving=moving, given=given, work=done, choice=choice, axes=axes, means=means,
+        speed=path / time if time > 0.0 else 0.0,
+    )  # fmt: skip
+
+
+def _straightness(name: Name, moving: Sequence[Motion], settings: Settings) -> float:
+    if name == "rotation":
+        return settings.straightness_rad
+    return straightness(float(np.mean([m.path for m in moving])), settings.straightness_m)
+
+
+def _phase(translation: Learned, rotation: Learned, settings: Settings) -> Document:
+    pitch = translation.speed / rotation.speed if translation.speed > 0.0 and rotation.speed > 0.0 else None
+    speeds = _speeds(translation, rotation, pitch, settings)
+    leads = [
+        _lead(translation, settings.lead_force_n),
+        _lead(rotation, settings.lead_torque_nm),
+    ]
+    stiffness = [
+        settings.stiffness_n_m * leads[0] / settings.lead_force_n,
+        settings.stiffness_nm_rad * leads[1] / settings.lead_torque_nm,
+    ]
+    floors = [
+        (settings.mass_kg, settings.damping_min_ns_m),
+        (settings.inertia_kg_m2, settings.damping_min_nms_rad),
+    ]
+    parts: Document = {
+        part.name: _part(part, speed, k, *floor, settings)
+        for part, speed, k, floor in zip((translation, rotation), speeds, stiffness, floors, strict=True)
+    }
+    return {**parts, "pitch": pitch, "stop": asdict(_stop(translation, rotation, speeds, leads))}
+
+
+def _speeds(translation: Learned, rotation: Learned, pitch: float | None, settings: Settings) -> tuple[float, float]:
+    """Both speeds, nu and lambda: demonstrated, capped, and coupled by the pitch if both directions exist."""
+    nu = 0.0 if translation.direction is None else min(translation.speed, settings.speed_max_m_s)
+    turn = 0.0 if rotation.direction is None else min(rotation.speed, settings.speed_max_rad_s)
+    if nu > 0.0 and turn > 0.0 and pitch is not None:
+        turn = min(nu / pitch, settings.speed_max_rad_s)
+        nu = turn * pitch
+    return nu, turn
+
+
+def _lead(part: Learned, least: float) -> float:
+    """Largest push: what the teacher needed (90th percentile in contact), if that is more than the default."""
+    loads = np.concatenate([norm(m.load)[norm(m.load) >= m.load_min] for m in part.motions])
+    return max(least, float(np.percentile(loads, 90))) if part.direction is not None and len(loads) else least
+
+
+def _stop(translation: Learned, rotation: Learned, speeds: tuple[float, float], leads: Sequence[float]) -> Stop:
+    """Limits from the demonstrations' size: three times the travel, five times the time."""
+    travel = max(m.excursion for m in translation.motions)
+    turn = max(m.excursion for m in rotation.motions)
+    takes = [
+        max(m.path for m in part.motions) / speed
+        for part, speed in zip((translation, rotation), speeds, strict=True)
+        if speed > 0.0
+    ]
+    shown = max((m.duration for part in (translation, rotation) for m in part.motions), default=0.0)
+    return Stop(
+        lead_force_n=leads[0],
+        lead_torque_nm=leads[1],
+        force_limit_n=max(60.0, 4.0 * leads[0]),
+        time_limit_s=max(20.0, 5.0 * max(takes)) if takes else max(1.0, shown),
+        travel_limit_m=max(0.1, 3.0 * travel),
+        turn_limit_rad=max(radians(45.0), 2.0 * turn),
+    )
+
+
+def _part(part: Learned, speed: float, k: float, inertia: float, floor: float, settings: Settings) -> Document:
+    axes = np.zeros((0, 3)) if part.axes is None else part.axes.axes
+    stiffness, damping = gains(axes, part.fully_compliant, k, inertia, floor)
+    return {
+        "desired_direction": None if part.direction is None else part.direction.tolist(),
+        "speed": speed,
+        "compliant_axes": axes.tolist(),
+        "fully_compliant": part.fully_compliant,
+        "stiffness": stiffness.tolist(),
+        "damping": damping.tolist(),
+        "evidence": evidence.of(part, settings),
+    }

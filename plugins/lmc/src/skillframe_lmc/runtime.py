@@ -1,0 +1,163 @@
+r"""The LMC skill in the loop: equation (2) with a limit on the lead, for N trials at once.
+
+    x_d = x_0 + s v_d,      s <- min(s + nu dt,  (x - x_0).v_d + L)               (2), with the limit L = F_lead / k
+    R_d = exp(theta w_d) R_0,      theta <- theta + lambda dt - max(0, (error about w_d) - L_o)
+
+As printed, (2) is driven by time alone, so a blocked tool would push with K nu t; the limit on the lead is ours. The
+first desired pose is the measured one. Stiffness is zero along compliant axes. Damping is left to the controller,
+which designs it from the task-space inertia (the file's damping is the nominal design). The phase ends with SUCCESS
+where the push has come to rest, with FAILURE at a limit of force, time or travel; whether the task is done is for the
+world to say. Every row is computed by itself, element by element, so a trial's commands do not depend, to the last
+bit, on its neighbours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.frames import Float, Pose, rotate, rotation_matrix, rotation_vector
+from skillframe.records import Document
+from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
+from skillframe_lmc.phase import Part, Phase, read_phase
+from skillframe_lmc.stall import StallWatch
+
+PUSHING = 0.5  # of the lead limit: less is not yet a push that could stall
+
+
+def build(document: Document) -> LmcSkill:
+    """The skill of a document.
+
+    Raises:
+        InputError: the document's phase is not as it should be.
+    """
+    return LmcSkill(read_phase(document), document["frame"]["axes"] == "phase_start")
+
+
+class LmcSkill(Skill):
+    """One linear motion with compliance.
+
+    Args:
+        phase: what was learned.
+        in_start_attitude: directions are those of the tool's attitude at the start of the phase, not of base.
+    """
+
+    def __init__(self, phase: Phase, in_start_attitude: bool) -> None:
+        self._phase, self._stop = phase, phase.stop
+        self._in_start_attitude = in_start_attitude
+
+    def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
+        """Take the measured pose as the first desired one, and turn the directions into base."""
+        n = len(rngs)
+        self._home = Pose(observation.pose.position.copy(), observation.pose.rotation.copy())
+        self._began = observation.time.copy()
+        self._status = np.zeros(n, dtype=np.int64)
+        self._reason = no_reasons(n)
+        turn = self._home.rotation if self._in_start_attitude else np.broadcast_to(np.eye(3), (n, 3, 3))
+        self._push = _Advance(self._phase.translation, turn, self._stop.lead_force_n)
+        self._turn = _Advance(self._phase.rotation, turn, self._stop.lead_torque_nm)
+        self._impedance = Impedance(self._stiffness(turn))
+        self._twist = np.concatenate([self._push.velocity, self._turn.velocity], axis=1)
+        self._nothing = np.zeros((n, 6))
+        self._stall = StallWatch(self._stop)
+        self._first = True
+
+    def _stiffness(self, turn: Float) -> Float:
+        """(6, 6) in base axes, or (N, 6, 6) where each trial started in its own attitude."""
+        turn = turn if self._in_start_attitude else turn[:1]
+        result = np.zeros((len(turn), 6, 6))
+        back = np.swapaxes(turn, -1, -2)
+        result[:, :3, :3] = turn @ self._phase.translation.stiffness @ back
+        result[:, 3:, 3:] = turn @ self._phase.rotation.stiffness @ back
+        result = 0.5 * (result + np.swapaxes(result, -1, -2))
+        return result if self._in_start_attitude else result[0]
+
+    def step(self, observation: Observation) -> Command:
+        """Advance the desired pose and look whether the phase has ended."""
+        dt = 0.0 if self._first else observation.dt
+        self._first = False
+        travel = observation.pose.position - self._home.position
+        pushing = self._push.advance(dt, _dot(travel, self._push.direction))
+        position = self._home.position + self._push.progress[:, None] * self._push.direction
+        rotation, turning = self._home.rotation, None
+        if self._turn.exists:
+            rotation, turning = self._advance_rotation(observation, dt)
+        self._judge(observation, travel, pushing if turning is None else pushing | turning)
+        pose = Pose(position, rotation)
+        return Command(pose, self._twist, self._impedance, self._nothing, self._status.copy(), self._reason.copy())
+
+    def _advance_rotation(self, observation: Observation, dt: float) -> tuple[Float, NDArray[np.bool_]]:
+        wanted = self._turn.progress + self._turn.speed * dt
+        desired = self._attitude(wanted)
+        error = rotation_vector(desired @ np.swapaxes(observation.pose.rotation, -1, -2))
+        pushing = self._turn.advance(dt, wanted - _dot(error, self._turn.direction))
+        return self._attitude(self._turn.progress), pushing
+
+    def _attitude(self, angle: Float) -> Float:
+        return rotation_matrix(angle[:, None] * self._turn.direction) @ self._home.rotation
+
+    def _judge(self, observation: Observation, travel: Float, pushing: NDArray[np.bool_]) -> None:
+        """End the trials that have stalled or met a limit; the first reason stays."""
+        stop, elapsed = self._stop, observation.time - self._began
+        stalled = self._stall.look(observation, pushing)
+        force = observation.wrench[:, :3]
+        over = _dot(force, force) > stop.force_limit_n**2
+        late = elapsed >= stop.time_limit_s
+        far = _dot(travel, travel) > stop.travel_limit_m**2
+        if self._turn.exists:
+            far |= np.abs(self._turn.progress) > stop.turn_limit_rad
+        running = self._status == Status.RUNNING
+        ending = running & (stalled | over | late | far)
+        for i in np.flatnonzero(ending).tolist():
+            self._status[i], self._reason[i] = self._verdict(
+                i, bool(over[i]), bool(far[i]), bool(stalled[i]), travel[i], float(np.sqrt(_dot(force, force)[i]))
+            )
+
+    def _verdict(self, i: int, over: bool, far: bool, stalled: bool, travel: Float, force: float) -> tuple[int, str]:
+        stop = self._stop
+        moved = 1e3 * float(np.sqrt(_dot(travel[None], travel[None])[0]))
+        if over:
+            return Status.FAILURE, f"contact force {force:.0f} N above the limit of {stop.force_limit_n:.0f} N"
+        if far:
+            return Status.FAILURE, f"went {moved:.0f} mm from the start without coming to rest against anything"
+        if stalled:
+            return Status.SUCCESS, f"came to rest while pushing, {moved:.0f} mm from the start"
+        if not (self._push.exists or self._turn.exists):
+            return Status.SUCCESS, f"held for {stop.time_limit_s:.1f} s, there being no direction to push in"
+        return Status.FAILURE, f"still under way after the time limit of {stop.time_limit_s:.1f} s"
+
+
+class _Advance:
+    """Progress of the desired pose along (or about) a direction, ahead of the measured one by no more than a limit.
+
+    Attributes:
+        direction: (N, 3) in base; zero if there is none.
+        progress: (N,) s or theta [m or rad].
+        velocity: (N, 3) desired.
+    """
+
+    def __init__(self, part: Part, turn: Float, push: float) -> None:
+        self.exists = part.desired_direction is not None and part.speed > 0.0
+        given = np.zeros(3) if part.desired_direction is None or not self.exists else part.desired_direction
+        self.direction = rotate(turn, np.broadcast_to(given, (len(turn), 3)))
+        self.speed = part.speed if self.exists else 0.0
+        self.velocity = self.speed * self.direction
+        self.progress = np.zeros(len(turn))
+        stiffness = float(given @ part.stiffness @ given)
+        self._limit = push / stiffness if stiffness > 0.0 else np.inf
+
+    def advance(self, dt: float, reached: Float) -> NDArray[np.bool_]:
+        """Move on, but not ahead of what is `reached` (N,) by more than the limit; says who is pushing."""
+        if not self.exists:
+            return np.zeros(len(self.progress), dtype=bool)
+        self.progress = np.minimum(self.progress + self.speed * dt, reached + self._limit)
+        pushing: NDArray[np.bool_] = self.progress - reached >= PUSHING * self._limit
+        return pushing
+
+
+def _dot(a: Float, b: Float) -> Float:
+    """Row-wise dot product (N,) of (N, 3) arrays in one fixed order of additions."""
+    result: Float = a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
+    return result

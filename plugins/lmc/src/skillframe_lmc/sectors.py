@@ -1,0 +1,109 @@
+r"""Sectors and pyramids: which pushes explain an interval of motion, and by how much others miss.
+
+A tool that slides along \(\hat v\) against a contact force \(F_m\) slides the same way for every push inside the sector
+between \(\hat v\) and \(-\hat F_m\) (Fig. 5 of the seed document); for Coulomb friction it is 90 degrees - atan(mu)
+wide. A person wavers, so the sector is widened to a pyramid (Fig. 8): by alpha out of its plane and by beta beyond its
+two edges. With n = v x m, m = unit(-F_m), w the angle from v to m, e = n x v, a direction D lies
+
+    out = |asin D.n| out of the plane,   ins = min(ang, w - ang) inside the edges,   ang = atan2(D.e, D.v).
+
+We take beta = max(5 degrees, alpha / 3), so the least alpha that accepts D has a closed form,
+
+    a(D) = max(out, 0 if ex <= 5 degrees else 3 ex),   ex = max(0, -ins),
+
+and no loop over alpha is needed. Without contact (or with the load along the motion) the teacher pushed where the tool
+went: the cone angle(D, v) <= alpha + beta.
+"""
+
+from __future__ import annotations
+
+from math import radians
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.frames import Float, cross, norm, unit
+from skillframe_lmc.intervals import Motion
+
+BETA_MIN = np.float32(radians(5.0))
+DEEP = np.float32(0.6)  # deeper inside a sector than this hardly counts as better
+Float32 = NDArray[np.float32]
+
+
+class Sectors(NamedTuple):
+    """The K sectors of one demonstration.
+
+    Attributes:
+        motion: (K, 3) unit v.
+        push: (K, 3) unit -F, zero where free.
+        contact: (K,) False where the interval is free.
+    """
+
+    motion: Float
+    push: Float
+    contact: NDArray[np.bool_]
+
+    @property
+    def width(self) -> Float:
+        """(K,) angle between motion and push [rad]."""
+        result: Float = np.arctan2(norm(cross(self.motion, self.push)), (self.motion * self.push).sum(-1))
+        return result
+
+
+def sectors(motion: Motion, *, teacher_driven_only: bool = False) -> Sectors:
+    """Sectors of one part of a demonstration.
+
+    Args:
+        motion: the part.
+        teacher_driven_only: leave out intervals where the environment did the work. For rotations: there the angle
+            between axis and push exceeds 90 degrees, the sector is nearly a half circle through a random plane, and
+            both +y and -y would be accepted.
+    """
+    keep = motion.work <= 0.0 if teacher_driven_only else np.ones(len(motion.work), dtype=bool)
+    v, load = unit(motion.displacement[keep]), motion.load[keep]
+    size = norm(load)
+    push = -unit(load)
+    contact = (size >= motion.load_min) & (norm(cross(v, push)) >= 0.05)
+    return Sectors(v, np.where(contact[:, None], push, 0.0), contact)
+
+
+def misses(directions: Float, given: Sectors) -> tuple[Float32, Float32]:
+    """What each direction lacks, and how deep it lies.
+
+    Args:
+        directions: (C, 3) unit vectors.
+        given: K sectors.
+
+    Returns:
+        The least alpha (C, K) that makes each interval's pyramid accept each direction, and the depth (C, K) inside
+        the sector less the distance out of its plane [rad].
+    """
+    D = directions.astype(np.float32)
+    touching, free = given.contact, ~given.contact
+    shape = (len(D), len(touching))
+    need, depth = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    if touching.any():
+        need[:, touching], depth[:, touching] = _contact(D, given.motion[touching], given.push[touching])
+    if free.any():
+        need[:, free], depth[:, free] = _free(D, given.motion[free])
+    return need, depth
+
+
+def _contact(D: Float32, v: Float, m: Float) -> tuple[Float32, Float32]:
+    n = unit(cross(v, m))
+    e = cross(n, v)
+    w = np.arctan2((m * e).sum(-1), (m * v).sum(-1)).astype(np.float32)
+    out = np.abs(np.arcsin(np.clip(D @ n.T.astype(np.float32), -1.0, 1.0)))
+    angle = np.arctan2(D @ e.T.astype(np.float32), D @ v.T.astype(np.float32))
+    inside = np.minimum(angle, w - angle)
+    beyond = -inside
+    need = np.maximum(out, np.where(beyond <= BETA_MIN, np.float32(0.0), np.float32(3.0) * beyond))
+    # past DEEP a little still counts, so that the middle of two wide sectors is not a plateau
+    return need, np.minimum(inside, DEEP + np.float32(0.05) * (inside - DEEP)) - out
+
+
+def _free(D: Float32, v: Float) -> tuple[Float32, Float32]:
+    off = np.arccos(np.clip(D @ v.T.astype(np.float32), -1.0, 1.0))
+    scaled = np.float32(0.75) * off
+    return np.where(scaled >= 3.0 * BETA_MIN, scaled, np.maximum(off - BETA_MIN, np.float32(0.0))), -off

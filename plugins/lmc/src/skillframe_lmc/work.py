@@ -1,0 +1,48 @@
+r"""Who moved the tool: three degrees of freedom are compliant if the environment did more work than the teacher.
+
+    W = F_m . dx   (translation),    W = T_m . dbeta   (rotation, T_m at the hand)          (3) of the seed document
+
+F_m and T_m are the environment's, so positive work is the environment's and negative work the teacher's. Sliding with
+friction always takes work from the teacher; levering a peg round an edge drives the wrist. The part is fully compliant
+if the environment's share exceeds one half. Intervals without contact, and those whose load is within 5 degrees of
+square to the motion, have work that is noise and do not count (ours).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from skillframe.frames import norm
+from skillframe_lmc.intervals import Motion
+
+SQUARE = 0.087  # sin 5 degrees
+
+
+class Work(NamedTuple):
+    """Work over the intervals that count, in joules, both positive."""
+
+    teacher: float
+    environment: float
+
+    @property
+    def fraction(self) -> float:
+        """The environment's share; 0 where no work counts."""
+        total = self.teacher + self.environment
+        return self.environment / total if total > 0.0 else 0.0
+
+
+def work(motions: Sequence[Motion]) -> Work:
+    """Work of both sides over all demonstrations of one part."""
+    done = np.concatenate([m.work[_counts(m)] for m in motions])
+    return Work(float(-done[done < 0.0].sum()), float(done[done > 0.0].sum()))
+
+
+def _counts(motion: Motion) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    load = norm(motion.load)
+    result: np.ndarray[tuple[int], np.dtype[np.bool_]] = (load >= motion.load_min) & (
+        np.abs(motion.work) > SQUARE * load * norm(motion.displacement)
+    )
+    return result
