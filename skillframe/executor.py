@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.conditioning.kalman import WrenchFilter
-from skillframe.control.impedance import critical_damping, impedance_wrench, null_space_damping, task_inertia
+from skillframe.control.controller import ImpedanceController, Reading
 from skillframe.control.limits import LimitGuard
-from skillframe.frames import Float, Pose, norm
+from skillframe.frames import Float, Pose
 from skillframe.recorder import Recorder
 from skillframe.robot.model import RobotModel
 from skillframe.robot.spec import Limits
@@ -34,8 +34,7 @@ __all__ = ["QUANTITIES", "Result", "Setup", "simulate"]
 
 HOLD = Impedance(np.diag([2000.0] * 3 + [100.0] * 3))
 RAMP_S = 0.05
-NULL_SPACE_DAMPING = 10.0  # 1/s; ours: settles the elbow within half a second
-SLOW_TICKS = 10  # null-space projectors and goal checks are refreshed every 10 ms
+SLOW_TICKS = 10  # goals are looked at every 10 ms
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,6 +146,7 @@ class _Loop:
         self.plant.reset(start_configurations(robot, scene, draws, count))
         self.sensors = Sensors(setup.sensors, self.plant, [pair[0] for pair in children], draws)
         self.filter = WrenchFilter(dt=self.dt).steady()
+        self.controller = ImpedanceController(count)
         self.guard = LimitGuard(_joint_limits(robot), count, self.dt)
         self.coc = np.asarray(setup.center_of_compliance, dtype=float)
         self.active = np.arange(count)
@@ -155,12 +155,8 @@ class _Loop:
         self.duration, self.peak = np.zeros(count), np.zeros(count)
         self.goal, self.errors, self.energy = np.zeros(count, dtype=bool), np.zeros((count, 2)), np.zeros(count)
         self.recorder = (
-            None if trace_hz is None else Recorder(count, ratio(rate, trace_hz, "control", "the trace"), self.plant)
+            None if trace_hz is None else Recorder(self.plant, ratio(rate, trace_hz, "control", "the trace"), self.coc)
         )
-        self._stiffness: Float | None = None
-        self._damping: Float = np.zeros((count, 6, 6))
-        self._projector: Float | None = None
-        self._slow = 0
         self.interrupted = False
 
     def tare(self) -> None:
@@ -175,7 +171,7 @@ class _Loop:
             kinematics = self._kinematics()
             pose, wrench = self.sensors.sample(kinematics.pose)
             total += wrench
-            torque, _ = self._torque(command, kinematics, pose.at(self.coc), 1.0)
+            torque, _ = self._torque(command, self._reading(kinematics, pose.at(self.coc)), 1.0)
             self.plant.step(torque, self.active)
         self.sensors.set_tare(total / TARE_TICKS, self._kinematics().pose.rotation)
 
@@ -201,17 +197,15 @@ class _Loop:
         kinematics = self._kinematics()
         tool, raw = self.sensors.sample(kinematics.pose)
         wrench = at_point(self._filtered(raw, tick), tool.rotation, self.coc)
-        measured = tool.at(self.coc)
-        twist = (kinematics.jacobian @ kinematics.velocity[..., None])[..., 0]
-        observation = Observation(np.full(self.count, time), self.dt, measured, twist, wrench)
+        reading = self._reading(kinematics, tool.at(self.coc))
+        observation = Observation(np.full(self.count, time), self.dt, reading.pose, reading.twist, wrench)
         if tick == 0:
             self.skill.start(observation, self.skill_rngs)
         command = self.skill.step(observation)
-        torque, law = self._torque(command, kinematics, measured, min(1.0, time / RAMP_S), twist)
-        contact = self.plant.contact_wrench(self.coc)
-        self.peak[self.active] = np.maximum(self.peak, norm(contact[:, :3]))[self.active]
+        torque, law = self._torque(command, reading, min(1.0, time / RAMP_S))
+        self.peak[self.active] = np.maximum(self.peak, self.plant.contact_force())[self.active]
         if self.recorder is not None:
-            self.recorder.record(tick, time, observation, command, law, contact)
+            self.recorder.record(tick, time, observation, command, law)
         self._stop_where_due(tick, time, observation, command, tool.position, law)
         if len(self.active):
             self.plant.step(torque, self.active)
@@ -229,61 +223,27 @@ class _Loop:
             self.nominal.set_state(qpos, qvel, self.active)
         return self.nominal.kinematics(self.coc)
 
-    def _torque(
-        self, command: Command, kinematics: Kinematics, measured: Pose, ramp: float, twist: Float | None = None
-    ) -> tuple[Float, Float]:
-        """Generalised forces (N, nv) of the law, and its wrench (N, 6) at the centre of compliance."""
-        if twist is None:
-            twist = (kinematics.jacobian @ kinematics.velocity[..., None])[..., 0]
-        damping = self._damping_for(command.impedance, kinematics)
-        law = impedance_wrench(
-            command.pose, measured, ramp * command.twist - twist, command.impedance.stiffness, damping,
-            ramp * command.feedforward,
-        )  # fmt: skip
-        torque = (np.swapaxes(kinematics.jacobian, -1, -2) @ law[..., None])[..., 0] + kinematics.bias
-        return self.guard.rate_limited(torque + self._null_space(kinematics)), law
+    def _reading(self, kinematics: Kinematics, measured: Pose) -> Reading:
+        twist = (kinematics.jacobian @ kinematics.velocity[..., None])[..., 0]
+        return Reading(
+            measured, twist, kinematics.jacobian, kinematics.bias, kinematics.velocity, self.nominal.mass_matrix
+        )
 
-    def _damping_for(self, impedance: Impedance, kinematics: Kinematics) -> Float:
-        """The skill's damping, or critical damping designed anew for the rows whose stiffness has changed."""
-        if impedance.damping is not None:
-            return impedance.damping
-        if impedance.stiffness is self._stiffness:
-            return self._damping
-        now = np.broadcast_to(impedance.stiffness, (self.count, 6, 6))
-        if self._stiffness is None:
-            changed = np.ones(self.count, dtype=bool)
-        else:
-            changed = (now != np.broadcast_to(self._stiffness, now.shape)).any(axis=(-1, -2))
-        if changed.any():
-            inertia = task_inertia(kinematics.jacobian[changed], self.nominal.mass_matrix()[changed])
-            self._damping = self._damping.copy()
-            self._damping[changed] = critical_damping(now[changed], inertia)
-        self._stiffness = impedance.stiffness
-        return self._damping
-
-    def _null_space(self, kinematics: Kinematics) -> Float | float:
-        if self.plant.model.nv <= 6:
-            return 0.0
-        self._slow -= 1
-        if self._slow < 0:
-            self._projector = null_space_damping(kinematics.jacobian, self.nominal.mass_matrix(), NULL_SPACE_DAMPING)
-            self._slow = SLOW_TICKS - 1
-        assert self._projector is not None
-        result: Float = (self._projector @ kinematics.velocity[..., None])[..., 0]
-        return result
+    def _torque(self, command: Command, reading: Reading, ramp: float) -> tuple[Float, Float]:
+        """Generalised forces (N, nv), held to the torque rate, and the law's wrench (N, 6)."""
+        torque, law = self.controller.torque(command, reading, ramp)
+        return self.guard.rate_limited(torque), law
 
     def _stop_where_due(
         self, tick: int, time: float, observation: Observation, command: Command, position: Float, law: Float
     ) -> None:
-        reasons = no_reasons(self.count)
-        self.guard.violations(observation.time, position, observation.twist, observation.wrench, law, reasons)
-        broken = self.active[reasons[self.active] != ""]
-        for i in broken:
-            self._end(np.array([i]), time, str(reasons[i]), True)
-        ended = self.active[command.status[self.active] != Status.RUNNING]
-        for i in ended:
-            self.status[i] = command.status[i]
-            self._end(np.array([i]), time, str(command.reason[i]) or "the skill ended", False)
+        twist, wrench = observation.twist, observation.wrench
+        for i, cause in self.guard.violations(position, twist, wrench, law, self.active):
+            self._end(np.array([i]), time, f"{cause} (at {time:.3f} s)", True)
+        if command.status.any():
+            for i in self.active[command.status[self.active] != Status.RUNNING]:
+                self.status[i] = command.status[i]
+                self._end(np.array([i]), time, str(command.reason[i]) or "the skill ended", False)
         if self.setup.stop_when is not None and tick % SLOW_TICKS == 0 and len(self.active):
             done = self.setup.stop_when(self.plant.tip_state())
             rows = self.active[done[self.active]]

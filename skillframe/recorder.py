@@ -21,10 +21,11 @@ CAPACITY = 20_000
 
 
 class Recorder:
-    """Columns over time for N trials; `every` is the number of control ticks per sample."""
+    """Columns over time, a sample every `every` control ticks; true wrenches are taken at `point` of the tool frame."""
 
-    def __init__(self, count: int, every: int, plant: Plant, capacity: int = CAPACITY) -> None:
-        self._plant, self._every, self._capacity = plant, every, capacity
+    def __init__(self, plant: Plant, every: int, point: Float, capacity: int = CAPACITY) -> None:
+        self._plant, self._every, self._point, self._capacity = plant, every, point, capacity
+        count = plant.count
         positions, _ = plant.body_poses()
         shapes: dict[str, tuple[int, ...]] = {
             **COLUMNS, "q": (plant.configuration.shape[1],), "body_position": positions.shape[1:],
@@ -34,10 +35,9 @@ class Recorder:
         self._length = 0
         self._stop = np.full(count, -1.0)
         self._time = 0.0
+        self._bodies: list[dict[str, Any]] | None = None
 
-    def record(
-        self, tick: int, time: float, observation: Observation, command: Command, law: Float, contact: Float
-    ) -> None:
+    def record(self, tick: int, time: float, observation: Observation, command: Command, law: Float) -> None:
         """Take a sample if one is due at this tick."""
         self._time = time
         if tick % self._every:
@@ -48,7 +48,7 @@ class Recorder:
         sample: dict[str, Any] = {
             "time": observation.time, "position": observation.pose.position, "twist": observation.twist,
             "quaternion": quaternion_from_matrix(observation.pose.rotation), "wrench": observation.wrench,
-            "wrench_true": contact, "desired_position": command.pose.position,
+            "wrench_true": self._plant.contact_wrench(self._point), "desired_position": command.pose.position,
             "desired_quaternion": quaternion_from_matrix(command.pose.rotation), "command_wrench": law,
             "q": self._plant.configuration, "body_position": positions, "body_quaternion": quaternions,
         }  # fmt: skip
@@ -78,4 +78,6 @@ class Recorder:
         if self._stop[i] >= 0.0:
             length = int(np.searchsorted(self._data["time"][: self._length, i], self._stop[i], side="right"))
         arrays = {name: array[:length, i].copy() for name, array in self._data.items()}
-        return Trace(**arrays, meta={**meta, "bodies": drawn_bodies(self._plant)})
+        if self._bodies is None:
+            self._bodies = drawn_bodies(self._plant)
+        return Trace(**arrays, meta={**meta, "bodies": self._bodies})

@@ -5,19 +5,16 @@
   `RATE_PERSISTENCE` ticks running is stopped (one tick of saturation is what the limiter is for);
 - workspace: the tool point outside its box;
 - energy: work the controller has done on the tool at the centre of compliance since the start, above `energy_j`;
-- divergence: a pose or velocity that is not finite, or a tool faster than `SPEED_CEILING`.
+- divergence: a state, wrench or command that is not finite, or a tool faster than `SPEED_CEILING`.
 """
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float, norm
 from skillframe.robot.spec import Limits
-from skillframe.skill import Reasons
 
 RATE_PERSISTENCE = 5
 SPEED_CEILING = 20.0
@@ -38,64 +35,65 @@ class LimitGuard:
         if self._limits.torque_rate_nm_s is None:
             return torque
         step = self._limits.torque_rate_nm_s * self._dt
-        if self._torque is None:
-            self._torque = torque.copy()
-            return torque
-        change = torque - self._torque
-        over = np.abs(change).max(axis=-1) > step
-        self._saturated = np.where(over, self._saturated + 1, 0)
-        self._torque = self._torque + np.clip(change, -step, step)
-        return self._torque
+        if self._torque is not None:
+            change = torque - self._torque
+            over = np.abs(change) > step
+            if over.any():
+                torque = np.where(over, self._torque + np.copysign(step, change), torque)
+            self._saturated = (self._saturated + 1) * over.any(-1)
+        self._torque = torque
+        return torque
 
     def violations(
-        self, time: Float, position: Float, twist: Float, wrench: Float, command: Float, reasons: Reasons
-    ) -> None:
-        """Write the reason of each trial that broke a limit into `reasons` where it is still empty.
+        self, position: Float, twist: Float, wrench: Float, command: Float, rows: NDArray[np.int64]
+    ) -> list[tuple[int, str]]:
+        """The trials among `rows` that broke a limit, each with the cause in words.
 
         Args:
-            time: (N,) [s].
             position: (N, 3) tool point in base.
             twist: (N, 6) of the centre of compliance.
             wrench: (N, 6) filtered, environment on tool.
             command: (N, 6) the law's wrench on the tool at the centre of compliance.
-            reasons: (N,) texts.
+            rows: indices of the trials that still run.
         """
+        self.energy += np.vecdot(command, twist) * self._dt
+        force, torque, speed = norm(wrench[:, :3]), norm(wrench[:, 3:]), norm(twist[:, :3])
         limits = self._limits
-        self.energy += (command * twist).sum(-1) * self._dt
-        force, torque = norm(wrench[:, :3]), norm(wrench[:, 3:])
-        finite = np.isfinite(position).all(-1) & np.isfinite(twist).all(-1)
-        _write(reasons, ~finite, time, lambda i: "diverged: the state is not a finite number")
-        speed = norm(twist[:, :3])
-        fast = finite & (speed > SPEED_CEILING)
-        _write(reasons, fast, time, lambda i: f"diverged: the tool moves at {speed[i]:.1f} m/s")
-        if limits.force_n is not None:
-            largest = limits.force_n
-            _write(reasons, force > largest, time, lambda i: f"force limit: {force[i]:.1f} N is above {largest:g} N")
-        if limits.torque_n_m is not None:
-            most = limits.torque_n_m
-            _write(reasons, torque > most, time, lambda i: f"torque limit: {torque[i]:.2f} Nm is above {most:g} Nm")
-        _write(
-            reasons, self._saturated >= RATE_PERSISTENCE, time,
-            lambda i: f"torque rate limit: above {limits.torque_rate_nm_s:g} Nm/s for {RATE_PERSISTENCE} ticks",
-        )  # fmt: skip
-        if limits.workspace_m is not None:
-            low, high = np.array(limits.workspace_m)
-            outside = ((position < low) | (position > high)).any(-1)
-            _write(
-                reasons, outside, time,
-                lambda i: f"workspace limit: tool point at {np.round(position[i], 3).tolist()} m",
-            )  # fmt: skip
-        if limits.energy_j is not None:
-            ceiling = limits.energy_j
-            _write(
-                reasons, self.energy > ceiling, time,
-                lambda i: f"energy limit: {self.energy[i]:.2f} J put into the tool, above {ceiling:g} J",
-            )  # fmt: skip
+        fine = (speed <= SPEED_CEILING) & (self._saturated < RATE_PERSISTENCE)
+        fine &= (force <= _or_infinite(limits.force_n)) & (torque <= _or_infinite(limits.torque_n_m))
+        fine &= (self.energy <= _or_infinite(limits.energy_j)) & self._inside(position)
+        if fine.all():
+            return []
+        values = np.concatenate([position, twist, wrench, command], axis=-1)
+        return [
+            (int(i), self._cause(int(i), values[i], float(force[i]), float(torque[i]), float(speed[i])))
+            for i in rows[~fine[rows]]
+        ]
+
+    def _inside(self, position: Float) -> NDArray[np.bool_]:
+        if self._limits.workspace_m is None:
+            return np.isfinite(position[:, 0])
+        low, high = self._limits.workspace_m
+        inside: NDArray[np.bool_] = ((position >= low) & (position <= high)).all(-1)
+        return inside
+
+    def _cause(self, i: int, values: Float, force: float, torque: float, speed: float) -> str:
+        """Why trial i is not fine, the first cause in the order of the module's list."""
+        limits = self._limits
+        if not np.isfinite(values).all():
+            return "diverged: state or command is not a finite number"
+        if speed > SPEED_CEILING:
+            return f"diverged: the tool moves at {speed:.1f} m/s"
+        if force > _or_infinite(limits.force_n):
+            return f"force limit: {force:.1f} N is above {limits.force_n:g} N"
+        if torque > _or_infinite(limits.torque_n_m):
+            return f"torque limit: {torque:.2f} Nm is above {limits.torque_n_m:g} Nm"
+        if self._saturated[i] >= RATE_PERSISTENCE:
+            return f"torque rate limit: above {limits.torque_rate_nm_s:g} Nm/s for {RATE_PERSISTENCE} ticks"
+        if self.energy[i] > _or_infinite(limits.energy_j):
+            return f"energy limit: {self.energy[i]:.2f} J put into the tool, above {limits.energy_j:g} J"
+        return f"workspace limit: tool point at {np.round(values[:3], 3).tolist()} m"
 
 
-def _write(reasons: Reasons, broken: NDArray[np.bool_], time: Float, text: Callable[[int], str]) -> None:
-    if not broken.any():
-        return
-    for i in np.flatnonzero(broken):
-        if not reasons[i]:
-            reasons[i] = f"{text(int(i))} (at {time[i]:.3f} s)"
+def _or_infinite(limit: float | None) -> float:
+    return np.inf if limit is None else limit

@@ -15,7 +15,7 @@ import mujoco.batch
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.frames import Float, Pose, move_wrench, quaternion_from_matrix, rotate, rotation_matrix
+from skillframe.frames import Float, Pose, cross, move_wrench, norm, quaternion_from_matrix, rotate, rotation_matrix
 from skillframe.robot.model import RobotModel
 from skillframe.world.convert import FIXTURE, SENSOR, TIMESTEP, TOOL, build_spec
 from skillframe.world.scene import Scene, State
@@ -152,6 +152,10 @@ class Plant:
         point = pose.position + rotate(pose.rotation, offset)
         return move_wrench(at_com, point - self._com[:, self._layout.root])
 
+    def contact_force(self) -> Float:
+        """Size (N,) of the true contact force on the tool [N]."""
+        return norm(self._external[:, self._layout.tool, 3:])
+
     def tip_state(self) -> State:
         """The tool's tip seen from the true fixture, for goals."""
         i = self._layout.tool
@@ -217,10 +221,8 @@ class Layout:
         jacobian = np.zeros((len(point), 6, self.model.nv))
         if len(self.hinges):
             a = axis[:, self.hinges]
-            r = point[:, None] - anchor[:, self.hinges]
-            jacobian[:, 0, self.hinge_dofs] = a[..., 1] * r[..., 2] - a[..., 2] * r[..., 1]
-            jacobian[:, 1, self.hinge_dofs] = a[..., 2] * r[..., 0] - a[..., 0] * r[..., 2]
-            jacobian[:, 2, self.hinge_dofs] = a[..., 0] * r[..., 1] - a[..., 1] * r[..., 0]
+            lever = point[:, None] - anchor[:, self.hinges]
+            jacobian[:, :3, self.hinge_dofs] = np.swapaxes(cross(a, lever), 1, 2)
             jacobian[:, 3:, self.hinge_dofs] = np.swapaxes(a, 1, 2)
         if len(self.slides):
             jacobian[:, :3, self.slide_dofs] = np.swapaxes(axis[:, self.slides], 1, 2)
@@ -230,14 +232,7 @@ class Layout:
             r = point - anchor[:, 0]
             jacobian[:, [0, 1, 2], [0, 1, 2]] = 1.0
             jacobian[:, 3:, 3:6] = rotation
-            jacobian[:, :3, 3:6] = np.stack(
-                [
-                    rotation[:, 1] * r[:, 2:] - rotation[:, 2] * r[:, 1:2],
-                    rotation[:, 2] * r[:, :1] - rotation[:, 0] * r[:, 2:],
-                    rotation[:, 0] * r[:, 1:2] - rotation[:, 1] * r[:, :1],
-                ],
-                axis=1,
-            )
+            jacobian[:, :3, 3:6] = np.swapaxes(cross(np.swapaxes(rotation, 1, 2), r[:, None]), 1, 2)
         return jacobian
 
     def dense(self, sparse: Float) -> Float:

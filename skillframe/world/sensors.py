@@ -16,7 +16,7 @@ import numpy as np
 from skillframe.frames import Float, Pose, cross, move_wrench, rotate, rotate_spatial, rotation_matrix
 from skillframe.world.plant import Plant
 
-BLOCK = 500
+BLOCK = 100
 TARE_TICKS = 100
 
 
@@ -48,22 +48,24 @@ class Sensors:
         self._plant, self._rngs = plant, list(rngs)
         count = len(self._rngs)
         self._scale = _noise_scales(settings, count, draws)
-        self._bias = _biases(settings, self._rngs, draws)
-        self._noise = np.zeros((count, BLOCK, 12))
+        self._bias = _biases(settings, self._rngs, draws)  # what is left of it after taring, from then on
+        self._noise, self._turn = np.zeros((count, BLOCK, 12)), np.zeros((count, BLOCK, 3, 3))
         self._next = BLOCK
-        self._tare = np.zeros((count, 6))
         tool = plant.scene.tool
         self._weight = tool.mass * np.array(plant.model.opt.gravity)
         self._com = np.array(tool.center_of_mass)
 
-    def _draw(self) -> Float:
+    def _draw(self) -> tuple[Float, Float]:
+        """Noise of force, torque and position (N, 12), and the rotation (N, 3, 3) that attitude noise turns by."""
         if self._next == BLOCK:
             for i, rng in enumerate(self._rngs):
                 self._noise[i] = rng.standard_normal((BLOCK, 12))
+            self._noise *= self._scale[:, None]
+            self._turn = rotation_matrix(self._noise[..., 9:])
             self._next = 0
-        sample: Float = self._noise[:, self._next] * self._scale
+        now = self._next
         self._next += 1
-        return sample
+        return self._noise[:, now], self._turn[:, now]
 
     def sample(self, pose: Pose) -> tuple[Pose, Float]:
         """Measured pose of the tool frame, and the wrench (N, 6) on the tool there without weight and tare, base axes.
@@ -71,17 +73,16 @@ class Sensors:
         Args:
             pose: true pose of the tool frame.
         """
-        noise = self._draw()
-        measured = Pose(pose.position + noise[:, 6:9], rotation_matrix(noise[:, 9:]) @ pose.rotation)
-        reading = self._plant.sensor_wrench() + self._bias + noise[:, :6]
-        weight = rotate(np.swapaxes(measured.rotation, -1, -2), self._weight)
-        reading[:, :3] -= weight
-        reading[:, 3:] -= cross(self._com, weight)
-        return measured, rotate_spatial(measured.rotation, reading - self._tare)
+        noise, turn = self._draw()
+        measured = Pose(pose.position + noise[:, 6:9], turn @ pose.rotation)
+        wrench = rotate_spatial(measured.rotation, self._plant.sensor_wrench() + (self._bias + noise[:, :6]))
+        wrench[:, :3] -= self._weight
+        wrench[:, 3:] -= cross(rotate(measured.rotation, self._com), self._weight)
+        return measured, wrench
 
     def set_tare(self, mean: Float, rotation: Float) -> None:
         """Take the mean wrench (N, 6) of a still moment, base axes, as the bias from now on."""
-        self._tare = self._tare + rotate_spatial(np.swapaxes(rotation, -1, -2), mean)
+        self._bias = self._bias - rotate_spatial(np.swapaxes(rotation, -1, -2), mean)
 
 
 def at_point(wrench: Float, rotation: Float, offset: Float) -> Float:

@@ -20,12 +20,13 @@ TOOL_MASS = 0.6
 def tool(geoms: tuple[Geom, ...], tip: float = WRIST_TO_TIP, hand: str = "wrist") -> Tool:
     """A 0.6 kg tool along +z with its tip `tip` metres from the wrist, its mass centred half way.
 
-    The figures are ours: a light gripper with a part in it.
+    The figures are ours: a light gripper with a part in it. A teacher holds it at "wrist", or, to guide a tip over
+    slopes, like a pen at "grip", 40 mm behind the tip.
     """
     inertia = TOOL_MASS * tip**2 / 12.0 / 2.0
     return Tool(
         geoms=geoms, mass=TOOL_MASS, center_of_mass=(0.0, 0.0, 0.5 * tip), inertia=(inertia, inertia, 2e-4),
-        frames={"wrist": (0.0, 0.0, 0.0), "tip": (0.0, 0.0, tip)}, hand=hand,
+        frames={"wrist": (0.0, 0.0, 0.0), "tip": (0.0, 0.0, tip), "grip": (0.0, 0.0, tip - 0.04)}, hand=hand,
     )  # fmt: skip
 
 

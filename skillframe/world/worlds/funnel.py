@@ -55,7 +55,7 @@ def build(params: FunnelParams) -> Scene:
     return Scene(
         name="funnel",
         fixture=tuple(slope(params.slope, float(a), params.length, float(width)) for a in azimuths),
-        tool=tool((ball, shaft(0.004, 0.01, WRIST_TO_TIP - params.radius))),
+        tool=tool((ball, shaft(0.004, 0.01, WRIST_TO_TIP - params.radius)), hand="grip"),
         friction=params.friction,
         start_tip=(0.0, 0.0, float(resting + 0.004)),
         start_quaternion=TOOL_DOWN,

@@ -64,7 +64,7 @@ def build(params: ValleyParams) -> Scene:
             slope(params.slope, 0.0, params.length, 0.16),
             slope(params.slope, np.pi, params.length, 0.16),
         ),
-        tool=tool((ball, shaft(0.004, 0.01, WRIST_TO_TIP - params.radius))),
+        tool=tool((ball, shaft(0.004, 0.01, WRIST_TO_TIP - params.radius)), hand="grip"),
         friction=params.friction,
         start_tip=(0.0, 0.0, float(resting + 0.004)),
         start_quaternion=TOOL_DOWN,
@@ -73,7 +73,7 @@ def build(params: ValleyParams) -> Scene:
         goal_error=lambda state: (distance(state), np.zeros(len(state.tip.position))),
         task=Task(
             direction=(0.0, 0.0, -1.0), hand="sliding",
-            starts=({"start.offset_x": 0.025}, {"start.offset_x": -0.025}),
+            starts=({"start.offset_x": 0.04}, {"start.offset_x": -0.04}),
         ),
         analytic={"largest_tilt_rad": float(params.slope - np.arctan(params.friction))},
     )  # fmt: skip
