@@ -1,0 +1,109 @@
+"""HTML and SVG as text that cannot be broken by what is put into it.
+
+`tag` escapes every child that is not `Markup` already, and every attribute, so that a reason, a file name or a skill's
+description can hold any character; there is no other way to make `Markup` but to write it as a literal in this package.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import math
+from collections.abc import Iterable
+from typing import Any
+
+VOID = {"br", "hr", "img", "input", "line", "circle", "rect", "path", "polyline", "polygon", "meta"}
+
+
+class Markup(str):
+    """Text that is HTML or SVG already."""
+
+    __slots__ = ()
+
+
+def escape(value: object) -> Markup:
+    """Any value as text inside HTML; `Markup` passes."""
+    return value if isinstance(value, Markup) else Markup(html.escape(str(value), quote=True))
+
+
+def join(parts: Iterable[object], between: str = "") -> Markup:
+    """Parts one after another, each escaped unless it is `Markup`."""
+    return Markup(between.join(escape(part) for part in parts))
+
+
+def tag(name: str, /, *children: object, **attributes: Any) -> Markup:
+    """An element. A final underscore is dropped (`class_`), others become hyphens, None and False are left out."""
+    text = "".join(
+        _attribute(key, value) for key, value in attributes.items() if value is not None and value is not False
+    )
+    inner = join(children)
+    if not inner and name in VOID:
+        return Markup(f"<{name}{text}/>")
+    return Markup(f"<{name}{text}>{inner}</{name}>")
+
+
+def _attribute(key: str, value: object) -> str:
+    name = key.rstrip("_").replace("_", "-")
+    name = {"viewbox": "viewBox"}.get(name, name)
+    return f" {name}" if value is True else f' {name}="{html.escape(str(value), quote=True)}"'
+
+
+def json_script(identifier: str, value: object) -> Markup:
+    """Data for the page's script; "<" is written as an escape so that no text can close the element."""
+    text = json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    return Markup(f'<script type="application/json" id="{html.escape(identifier)}">{text}</script>')
+
+
+def data_uri(mime: str, content: bytes) -> str:
+    """Bytes as an address that points nowhere outside."""
+    return f"data:{mime};base64,{base64.b64encode(content).decode('ascii')}"
+
+
+def figure(title: str, caption: object, *content: object, class_: str = "") -> Markup:
+    """A titled picture with its caption below."""
+    head = tag("h4", title) if title else ""
+    foot = tag("figcaption", caption) if caption else ""
+    return tag("figure", head, *content, foot, class_=class_ or None)
+
+
+def table(head: Iterable[object], rows: Iterable[Iterable[object]], *, class_: str = "", numeric: int = 1) -> Markup:
+    """A table; columns from index `numeric` on are set as figures."""
+
+    def cells(name: str, row: Iterable[object]) -> Markup:
+        return join(tag(name, cell, class_="num" if i >= numeric else None) for i, cell in enumerate(row))
+
+    body = join(tag("tr", cells("td", row)) for row in rows)
+    content = tag("table", tag("thead", tag("tr", cells("th", head))), tag("tbody", body), class_=class_ or None)
+    return tag("div", content, class_="scroll")
+
+
+def note(*text: object) -> Markup:
+    """A sentence about something that is missing or worth knowing."""
+    return tag("p", *text, class_="note")
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A figure for people: `digits` significant ones, no exponent between 1e-4 and 1e6, a true minus sign."""
+    if not math.isfinite(value):
+        return "–"
+    if value == 0.0:
+        return "0"
+    size = abs(value)
+    if not 1e-4 <= size < 1e6:
+        return f"{value:.{digits - 1}e}".replace("-", "−")
+    decimals = max(0, digits - 1 - math.floor(math.log10(size)))
+    text = f"{value:.{decimals}f}"
+    return (text.rstrip("0").rstrip(".") if "." in text else text).replace("-", "−")
+
+
+def percent(value: float) -> str:
+    """A share as a percentage, a decimal near the ends; 0 % and 100 % only where it is exactly that."""
+    if not math.isfinite(value):
+        return "–"
+    if value in (0.0, 1.0):
+        return f"{value:.0%}".replace("%", " %")
+    if 0.1 <= value < 0.9:
+        return f"{100.0 * value:.0f} %"
+    text = f"{100.0 * value:.1f} %"
+    return {"0.0 %": "< 0.1 %", "100.0 %": "> 99.9 %"}.get(text, text)

@@ -1,0 +1,149 @@
+"""Plots over time of a run and of a demonstration: force, torque, motion, wanted against measured.
+
+Forces are those of the environment on the tool in base axes; positions are relative to the start, in millimetres;
+attitudes are rotation vectors from the start, in degrees (readable up to half a turn).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from skillframe.demonstration.record import Demonstration
+from skillframe.frames import Float, matrix_from_quaternion, norm, rotation_vector
+from skillframe.report.markup import Markup, figure, join, tag
+from skillframe.report.svg import LEFT, Axes, envelope, legend, padded, picture, text
+from skillframe.trace import Trace
+
+AXES = ("x", "y", "z")
+LEAST_RANGE = {"N": 1.0, "Nm": 0.05, "mm": 0.5, "°": 0.5}
+MOST_EVENTS = 12
+FORCE_CAPTION = "What the environment does to the tool, filtered; x, y, z are the robot's base axes."
+POSITION_CAPTION = (
+    "Of the centre of compliance, from the start. Dashed: asked for by the skill; where they part, the environment led."
+)
+ATTITUDE_CAPTION = "Turn since the start about x, y and z. Dashed: asked for."
+TORQUE_CAPTION = "About the centre of compliance."
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Curve:
+    """One curve: its name for the legend (empty for none), its values (T,), the class of its stroke."""
+
+    name: str
+    values: Float
+    stroke: str
+
+
+def time_plot(
+    title: str, unit: str, time: Float, curves: Sequence[Curve], *, caption: str = "",
+    limit: float | None = None, events: Sequence[tuple[float, str]] = (),
+) -> Markup:  # fmt: skip
+    """A plot over time; a limit is drawn when it is near enough to matter."""
+    axes = Axes(x=_time_range(time), y=_value_range(curves, unit, limit), x_label="time [s]", y_label=f"[{unit}]")
+    names = [(c.name, c.stroke) for c in curves if c.name]
+    content = [
+        axes.frame(),
+        _event_marks(axes, events),
+        *(axes.line(*envelope(time, c.values), c.stroke) for c in curves),
+    ]
+    content += [legend(axes, names), _limit_line(axes, limit, unit), _cursor(axes)]
+    svg = picture(axes, title, *content, class_="time", data_width=axes.width, data_left=LEFT, data_right=axes.right,
+                  data_start=float(axes.x[0]), data_stop=float(axes.x[1]))  # fmt: skip
+    return figure(title, caption, svg, class_="plot")
+
+
+def _time_range(time: Float) -> tuple[float, float]:
+    low, high = float(time[0]), float(time[-1])
+    return (low, high) if high > low else (low, low + 1.0)
+
+
+def _value_range(curves: Sequence[Curve], unit: str, limit: float | None) -> tuple[float, float]:
+    values = np.concatenate([c.values[np.isfinite(c.values)] for c in curves])
+    if not len(values):
+        return 0.0, 1.0
+    low, high = float(values.min()), float(values.max())
+    if limit is not None and high > 0.5 * limit:
+        high = max(high, limit)
+    return padded(low, high, least=LEAST_RANGE.get(unit, 1e-6))
+
+
+def _limit_line(axes: Axes, limit: float | None, unit: str) -> Markup:
+    if limit is None or not axes.inside(limit):
+        return Markup("")
+    y = float(axes.up(limit))
+    line = tag("line", x1=LEFT, x2=axes.right, y1=round(y, 1), y2=round(y, 1), class_="limit")
+    return join([line, text(axes.right - 4, y - 5, f"limit {limit:g} {unit}", "limit-text", "end")])
+
+
+def _event_marks(axes: Axes, events: Sequence[tuple[float, str]]) -> Markup:
+    marks = []
+    for index, (when, what) in enumerate(events[:MOST_EVENTS], start=1):
+        if axes.inside(when, vertical=False):
+            x = round(float(axes.across(when)), 1)
+            line = tag(
+                "line", tag("title", f"{when:.2f} s: {what}"), x1=x, x2=x, y1=axes.top, y2=axes.bottom, class_="event"
+            )
+            marks += [line, text(x + 3, axes.top + 9, index, "event-text")]
+    return join(marks)
+
+
+def _cursor(axes: Axes) -> Markup:
+    return tag("line", x1=0, x2=0, y1=axes.top, y2=axes.bottom, class_="cursor")
+
+
+def events_of(trace: Trace) -> list[tuple[float, str]]:
+    """Events of a trace as (time [s], text), in order."""
+    pairs = [e for e in trace.meta.get("events") or [] if isinstance(e, list | tuple) and len(e) == 2]
+    return sorted((float(when), str(what)) for when, what in pairs if isinstance(when, int | float))
+
+
+def run_plots(trace: Trace) -> list[Markup]:
+    """Force, position, attitude and torque of a run."""
+    time, events = np.asarray(trace.time, dtype=float), events_of(trace)
+    limit = (trace.meta.get("limits") or {}).get("force_n")
+    true_size = Curve(name="in the simulator", values=norm(trace.wrench_true[:, :3]), stroke="line faint")
+    size = Curve(name="size", values=norm(trace.wrench[:, :3]), stroke="line ink")
+    origin, first = trace.position[0], trace.quaternion[:1]
+    moved = _pairs(1e3 * (trace.desired_position - origin), 1e3 * (trace.position - origin))
+    turns = _pairs(turned(trace.desired_quaternion, first), turned(trace.quaternion, first))
+    return [
+        time_plot("Contact force", "N", time, [true_size, *_components(trace.wrench[:, :3], "thin"), size],
+                  limit=None if limit is None else float(limit), events=events, caption=FORCE_CAPTION),
+        time_plot("Position", "mm", time, moved, events=events, caption=POSITION_CAPTION),
+        time_plot("Attitude", "°", time, turns, events=events, caption=ATTITUDE_CAPTION),
+        time_plot("Contact torque", "Nm", time, _components(trace.wrench[:, 3:], ""), events=events,
+                  caption=TORQUE_CAPTION),
+    ]  # fmt: skip
+
+
+def demonstration_plots(demonstration: Demonstration) -> Markup:
+    """Force, position and attitude of a demonstration."""
+    time = demonstration.time - demonstration.time[0]
+    moved = 1e3 * (demonstration.position - demonstration.position[0])
+    turn = turned(demonstration.quaternion, demonstration.quaternion[:1])
+    force = demonstration.wrench[:, :3]
+    size = Curve(name="size", values=norm(force), stroke="line ink")
+    return join([
+        time_plot("Force", "N", time, [*_components(force, "thin"), size]),
+        time_plot("Motion", "mm", time, _components(moved, "")),
+        time_plot("Turn", "°", time, _components(turn, "")),
+    ])  # fmt: skip
+
+
+def turned(quaternion: Float, first: Float) -> Float:
+    """Rotation vectors (T, 3) [degrees] from a first attitude (1, 4), in base axes."""
+    start = matrix_from_quaternion(first)
+    result: Float = np.degrees(rotation_vector(matrix_from_quaternion(quaternion) @ np.swapaxes(start, -1, -2)))
+    return result
+
+
+def _components(values: Float, style: str) -> list[Curve]:
+    return [Curve(name=n, values=values[:, i], stroke=f"line c{i + 1} {style}".strip()) for i, n in enumerate(AXES)]
+
+
+def _pairs(wanted: Float, measured: Float) -> list[Curve]:
+    dashed = [Curve(name="", values=wanted[:, i], stroke=f"line c{i + 1} dashed") for i in range(3)]
+    return [*dashed, *_components(measured, "")]

@@ -1,0 +1,218 @@
+"""Geometries of a trace as triangle meshes: primitives by revolution, creased normals, convex sections.
+
+A section keeps the half space \\(n \\cdot (x - p) \\le 0\\) of a convex mesh and closes the cut with the polygon of the
+points where edges cross the plane, sorted by angle (our choice: a fixture cut open shows what a tool does inside it).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.frames import Float, cross, matrix_from_quaternion, unit
+
+SEGMENTS = 32
+PLANE_HALF_SIZE = 1.0
+CREASE = np.cos(np.radians(35.0))
+CUT_SHADE = 0.78
+DEFAULT_RGBA = (0.6, 0.65, 0.7, 1.0)
+
+
+class Mesh(NamedTuple):
+    """Triangles with a normal and a colour per vertex.
+
+    Attributes:
+        vertices, normals: (V, 3).
+        faces: (F, 3) indices, counter-clockwise seen from outside.
+        colors: (V, 4) red, green, blue, opacity in 0..1.
+    """
+
+    vertices: Float
+    normals: Float
+    faces: NDArray[np.int64]
+    colors: Float
+
+    def placed(self, position: Float, quaternion: Float) -> Mesh:
+        """The mesh in the frame that holds this pose (3,), (4,)."""
+        rotation = matrix_from_quaternion(quaternion)
+        return self._replace(vertices=self.vertices @ rotation.T + position, normals=self.normals @ rotation.T)
+
+    def painted(self, rgba: Sequence[float]) -> Mesh:
+        """The mesh in one colour."""
+        return self._replace(colors=np.tile(np.asarray(rgba, dtype=float), (len(self.vertices), 1)))
+
+
+EMPTY = Mesh(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64), np.zeros((0, 4)))
+
+
+def merge(meshes: Sequence[Mesh]) -> Mesh:
+    """Several meshes as one."""
+    if not meshes:
+        return EMPTY
+    starts = np.cumsum([0, *(len(m.vertices) for m in meshes[:-1])])
+    return Mesh(
+        np.concatenate([m.vertices for m in meshes]),
+        np.concatenate([m.normals for m in meshes]),
+        np.concatenate([m.faces + start for m, start in zip(meshes, starts, strict=True)]),
+        np.concatenate([m.colors for m in meshes]),
+    )
+
+
+def mesh_of(geom: Mapping[str, Any]) -> Mesh:
+    """One geometry of a trace in its body's frame; an unknown kind gives an empty mesh."""
+    kind, size = geom.get("kind", ""), [float(s) for s in geom.get("size") or ()]
+    if kind == "mesh":
+        mesh = creased(np.array(geom["vertices"], dtype=float), np.array(geom["faces"], dtype=np.int64))
+    elif kind in _MAKERS:
+        mesh = _MAKERS[kind](size)
+    else:
+        return EMPTY
+    rgba = geom.get("rgba") or DEFAULT_RGBA
+    position, quaternion = geom.get("position") or (0.0, 0.0, 0.0), geom.get("quaternion") or (0.0, 0.0, 0.0, 1.0)
+    return mesh.painted(rgba).placed(np.array(position, dtype=float), np.array(quaternion, dtype=float))
+
+
+def revolve(profile: Sequence[tuple[float, float, float, float]]) -> Mesh:
+    """A surface of revolution about z from points (r, z, normal r, normal z), bottom to top."""
+    points = np.array(profile)
+    angle = np.linspace(0.0, 2.0 * np.pi, SEGMENTS + 1)[:-1]
+    c, s = np.cos(angle)[None], np.sin(angle)[None]
+    ones = np.ones_like(c)
+    vertices = np.stack([points[:, :1] * c, points[:, :1] * s, points[:, 1:2] * ones], axis=-1)
+    normals = np.stack([points[:, 2:3] * c, points[:, 2:3] * s, points[:, 3:] * ones], axis=-1)
+    faces = [f for row in range(len(points) - 1) if _moves(points, row) for f in _ring(row)]
+    mesh = Mesh(vertices.reshape(-1, 3), normals.reshape(-1, 3), np.array(faces, dtype=np.int64), np.zeros((0, 4)))
+    return mesh
+
+
+def _moves(points: Float, row: int) -> bool:
+    return bool(np.abs(points[row + 1, :2] - points[row, :2]).max() > 0.0)
+
+
+def _ring(row: int) -> list[tuple[int, int, int]]:
+    faces = []
+    for i in range(SEGMENTS):
+        a, b = row * SEGMENTS + i, row * SEGMENTS + (i + 1) % SEGMENTS
+        faces += [(a, b, b + SEGMENTS), (a, b + SEGMENTS, a + SEGMENTS)]
+    return faces
+
+
+def _cylinder(size: Sequence[float]) -> Mesh:
+    r, h = size[0], size[1]
+    return revolve([(0, -h, 0, -1), (r, -h, 0, -1), (r, -h, 1, 0), (r, h, 1, 0), (r, h, 0, 1), (0, h, 0, 1)])
+
+
+def _capsule(size: Sequence[float]) -> Mesh:
+    r, h = size[0], size[1] if len(size) > 1 else 0.0
+    arc = np.linspace(-np.pi / 2, 0.0, 7)
+    low = [(r * np.cos(a), r * np.sin(a) - h, np.cos(a), np.sin(a)) for a in arc]
+    return revolve([*low, *[(x, -z, n, -m) for x, z, n, m in reversed(low)]])
+
+
+def _sphere(size: Sequence[float]) -> Mesh:
+    return _capsule([size[0], 0.0])
+
+
+def _box(size: Sequence[float]) -> Mesh:
+    half = np.array(size[:3])
+    vertices: list[Float] = []
+    normals: list[Float] = []
+    faces: list[tuple[int, int, int]] = []
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            n = np.zeros(3)
+            n[axis] = sign
+            u, v = np.roll(np.abs(n), 1), np.roll(np.abs(n), 2) * sign
+            start = len(vertices)
+            vertices += [half * (n - u - v), half * (n + u - v), half * (n + u + v), half * (n - u + v)]
+            normals += [n] * 4
+            faces += [(start, start + 1, start + 2), (start, start + 2, start + 3)]
+    return Mesh(np.array(vertices), np.array(normals), np.array(faces), np.zeros((0, 4)))
+
+
+def _plane(size: Sequence[float]) -> Mesh:
+    x, y = (s if 0.0 < s < PLANE_HALF_SIZE else PLANE_HALF_SIZE for s in (*size[:2], 0.0, 0.0)[:2])
+    vertices = np.array([(-x, -y, 0.0), (x, -y, 0.0), (x, y, 0.0), (-x, y, 0.0)])
+    return Mesh(vertices, np.tile([0.0, 0.0, 1.0], (4, 1)), np.array([(0, 1, 2), (0, 2, 3)]), np.zeros((0, 4)))
+
+
+_MAKERS = {"box": _box, "sphere": _sphere, "capsule": _capsule, "cylinder": _cylinder, "plane": _plane}
+
+
+def face_normals(vertices: Float, faces: NDArray[np.int64]) -> Float:
+    """Area-weighted normals (F, 3) of triangles."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    return cross(b - a, c - a)
+
+
+def creased(vertices: Float, faces: NDArray[np.int64]) -> Mesh:
+    """A mesh whose normals are smooth but across edges sharper than 35 degrees."""
+    weighted = face_normals(vertices, faces)
+    flat = unit(weighted)
+    corner_face, corner_vertex = np.repeat(np.arange(len(faces)), 3), faces.reshape(-1)
+    order = np.argsort(corner_vertex, kind="stable")
+    normals = np.empty((len(order), 3))
+    for group in np.split(order, np.flatnonzero(np.diff(corner_vertex[order])) + 1):
+        near = flat[corner_face[group]] @ flat[corner_face[group]].T >= CREASE
+        normals[group] = near @ weighted[corner_face[group]]
+    corners: Float = np.hstack([vertices[corner_vertex], unit(normals)])
+    rows = corners.round(6)
+    unique, index = np.unique(rows, axis=0, return_inverse=True)
+    return Mesh(unique[:, :3], unit(unique[:, 3:]), index.reshape(-1, 3), np.zeros((0, 4)))
+
+
+def section(mesh: Mesh, point: Float, normal: Float) -> Mesh:
+    """The part of a convex mesh behind a plane, closed by a darker cap."""
+    height = (mesh.vertices - point) @ normal
+    if len(height) == 0 or height.max() <= 1e-9:
+        return mesh
+    if height.min() >= -1e-9:
+        return EMPTY
+    soup = _clipped(mesh, height)
+    cap = _cap(soup, point, normal, mesh.colors[0])
+    return merge([soup, cap])
+
+
+def _clipped(mesh: Mesh, height: Float) -> Mesh:
+    vertices: list[Float] = []
+    normals: list[Float] = []
+    colors: list[Float] = []
+    faces: list[tuple[int, int, int]] = []
+    for face in mesh.faces:
+        loop = _clip_face(mesh, face, height)
+        start = len(vertices)
+        vertices += [v for v, _ in loop]
+        normals += [n for _, n in loop]
+        colors += [mesh.colors[face[0]]] * len(loop)
+        faces += [(start, start + i, start + i + 1) for i in range(1, len(loop) - 1)]
+    if not faces:
+        return EMPTY
+    return Mesh(np.array(vertices), unit(np.array(normals)), np.array(faces, dtype=np.int64), np.array(colors))
+
+
+def _clip_face(mesh: Mesh, face: NDArray[np.int64], height: Float) -> list[tuple[Float, Float]]:
+    """Sutherland-Hodgman against one plane: vertices with normals of what is left of a triangle."""
+    loop = []
+    for i, j in zip(face, np.roll(face, -1), strict=True):
+        if height[i] <= 0.0:
+            loop.append((mesh.vertices[i], mesh.normals[i]))
+        if (height[i] <= 0.0) != (height[j] <= 0.0):
+            share = height[i] / (height[i] - height[j])
+            loop.append(tuple(a[i] + share * (a[j] - a[i]) for a in (mesh.vertices, mesh.normals)))
+    return loop if len(loop) > 2 else []
+
+
+def _cap(soup: Mesh, point: Float, normal: Float, color: Float) -> Mesh:
+    edge = soup.vertices[np.abs((soup.vertices - point) @ normal) < 1e-9]
+    if len(edge) < 3:
+        return EMPTY
+    side = unit(cross(normal, np.roll(np.abs(normal), 1)))
+    local = edge - edge.mean(axis=0)
+    angle = np.round(np.arctan2(local @ cross(normal, side), local @ side), 9)
+    edge = edge[np.unique(angle, return_index=True)[1]]
+    faces = np.array([(0, i, i + 1) for i in range(1, len(edge) - 1)], dtype=np.int64).reshape(-1, 3)
+    shaded = np.array([*(CUT_SHADE * color[:3]), color[3]])
+    return Mesh(edge, np.tile(normal, (len(edge), 1)), faces, np.tile(shaded, (len(edge), 1)))

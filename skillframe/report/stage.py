@@ -1,0 +1,148 @@
+"""What is shown of a trace: its bodies as meshes, which of them stand still, where to look from, where to cut.
+
+The close view looks at the tool from the front right; fixtures near it are cut along the vertical plane through the
+tool's middle that faces the viewer (normal -y of base), so that what happens inside a hole is seen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from skillframe.frames import Float, matrix_from_quaternion, norm, rotate
+from skillframe.report.shapes import Mesh, merge, mesh_of, section
+from skillframe.trace import Trace
+
+CUT_NORMAL = np.array([0.0, -1.0, 0.0])
+STILL_MM, STILL_QUATERNION = 1e-6, 1e-6
+AZIMUTH, ELEVATION, FIELD_OF_VIEW = np.radians(-62.0), np.radians(24.0), np.radians(32.0)
+
+
+class Camera(NamedTuple):
+    """Where the viewer stands: it looks at `target` (3,) from `distance` [m] at these angles [rad], z up."""
+
+    target: Float
+    distance: float
+    azimuth: float = float(AZIMUTH)
+    elevation: float = float(ELEVATION)
+    field_of_view: float = float(FIELD_OF_VIEW)
+
+    @property
+    def backward(self) -> Float:
+        """Unit vector (3,) from the target to the eye."""
+        c = np.cos(self.elevation)
+        return np.array([c * np.cos(self.azimuth), c * np.sin(self.azimuth), np.sin(self.elevation)])
+
+    @property
+    def eye(self) -> Float:
+        """Position (3,) of the eye [m]."""
+        eye: Float = self.target + self.distance * self.backward
+        return eye
+
+
+@dataclass(frozen=True)
+class Stage:
+    """The drawn bodies of one trace.
+
+    Attributes:
+        names: of the bodies.
+        whole: meshes per body, in the body's frame, one per geometry (planes included).
+        position, quaternion: (T, B, 3), (T, B, 4) poses.
+        point: (T, 3) the centre of compliance.
+    """
+
+    names: tuple[str, ...]
+    whole: tuple[tuple[Mesh, ...], ...]
+    flat: tuple[bool, ...]
+    position: Float
+    quaternion: Float
+    point: Float
+
+    @cached_property
+    def still(self) -> tuple[bool, ...]:
+        """Whether each body stands still."""
+        moved = np.ptp(self.position, axis=0).max(axis=-1)
+        turned = np.ptp(self.quaternion, axis=0).max(axis=-1)
+        return tuple(bool(m < STILL_MM and t < STILL_QUATERNION) for m, t in zip(moved, turned, strict=True))
+
+    @cached_property
+    def meshes(self) -> tuple[Mesh, ...]:
+        """One mesh per body, in its frame."""
+        return tuple(merge(parts) for parts in self.whole)
+
+    def placed(self, body: int, frame: int) -> Mesh:
+        """A body's mesh in base at a frame."""
+        return self.meshes[body].placed(self.position[frame, body], self.quaternion[frame, body])
+
+    @cached_property
+    def tool(self) -> int | None:
+        """The body that is looked at: the one called "tool", else the moving one nearest the centre of compliance."""
+        moving = [b for b, still in enumerate(self.still) if not still and len(self.meshes[b].vertices)]
+        named = [b for b in moving if self.names[b].rsplit("/", 1)[-1] == "tool"]
+        near = sorted(moving, key=lambda b: float(norm(self.placed(b, -1).vertices - self.point[-1]).min()))
+        return next(iter([*named, *near]), None)
+
+    @cached_property
+    def close(self) -> Camera:
+        """The close view: the tool from start to end."""
+        seen = self._around_tool()
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        radius = float(np.clip(0.5 * norm(high - low), 0.03, 0.6))
+        return Camera(0.5 * (low + high), 1.25 * radius / np.sin(0.5 * FIELD_OF_VIEW))
+
+    def _around_tool(self) -> Float:
+        if self.tool is None:
+            return self._everything() if any(len(m.vertices) for m in self.meshes) else self.point
+        return np.concatenate([self.placed(self.tool, 0).vertices, self.placed(self.tool, -1).vertices])
+
+    def _everything(self) -> Float:
+        solid = [b for b in range(len(self.names)) if not self.flat[b] and len(self.meshes[b].vertices)]
+        bodies = solid or list(range(len(self.names)))
+        return np.concatenate([self.placed(b, frame).vertices for b in bodies for frame in (0, -1)])
+
+    @cached_property
+    def far(self) -> Camera:
+        """The whole scene."""
+        seen = self._everything()
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        radius = float(np.clip(0.5 * norm(high - low), 0.05, 8.0))
+        return Camera(
+            0.5 * (low + high), 1.05 * radius / np.sin(0.5 * FIELD_OF_VIEW), elevation=float(np.radians(18.0))
+        )
+
+    @cached_property
+    def cut(self) -> tuple[Mesh | None, ...]:
+        """Per body its mesh cut open, in its frame; None where it is not cut."""
+        return tuple(self._cut_body(b) for b in range(len(self.names)))
+
+    def _cut_body(self, body: int) -> Mesh | None:
+        if not self.still[body] or self.flat[body] or self.tool is None or not len(self.meshes[body].vertices):
+            return None
+        reach = self.close.distance * np.sin(0.5 * FIELD_OF_VIEW)
+        world = self.placed(body, 0).vertices
+        outside = np.maximum(world.min(axis=0) - self.close.target, self.close.target - world.max(axis=0))
+        if outside.max() > reach:
+            return None
+        back = np.swapaxes(matrix_from_quaternion(self.quaternion[0, body]), -1, -2)
+        point = rotate(back, self.close.target - self.position[0, body])
+        return merge([section(mesh, point, rotate(back, CUT_NORMAL)) for mesh in self.whole[body]])
+
+
+def stage_of(trace: Trace) -> Stage | None:
+    """The stage of a trace, or None where it holds no drawn bodies."""
+    bodies: list[dict[str, Any]] = trace.meta.get("bodies") or []
+    poses = np.asarray(trace.body_position)
+    if not bodies or poses.ndim != 3 or poses.shape[:2] != (len(trace.time), len(bodies)) or not len(trace.time):
+        return None
+    whole = tuple(tuple(m for m in map(mesh_of, body.get("geoms", ())) if len(m.faces)) for body in bodies)
+    if not any(whole):
+        return None
+    flat = tuple(any(g.get("kind") == "plane" for g in body.get("geoms", ())) for body in bodies)
+    return Stage(
+        names=tuple(str(body.get("name", f"body {i}")) for i, body in enumerate(bodies)),
+        whole=whole, flat=flat, position=poses.astype(float), quaternion=np.asarray(trace.body_quaternion, dtype=float),
+        point=np.asarray(trace.position, dtype=float),
+    )  # fmt: skip

@@ -1,0 +1,166 @@
+"""The chapter's middle: how far the skill can be trusted. Map, curves, comparison in pairs, failures, peak forces."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from skillframe.report.convergence import MOST_CURVES, cell_map, influence, rate_curves, regions, theory_sentence
+from skillframe.report.markup import Markup, figure, join, note, number, percent, table, tag
+from skillframe.report.quantities import quantity
+from skillframe.report.results import Results
+from skillframe.report.sources import Chapter
+from skillframe.report.svg import Axes, padded, picture
+
+MOST_TRIALS_NAMED = 6
+
+
+def trust_section(chapter: Chapter) -> Markup:
+    """Where it works."""
+    results = chapter.results
+    if results is None:
+        return note("There is no results.csv here, so nothing is known about how often it works.")
+    if not results.rows:
+        return note("results.csv holds no rows yet.")
+    return join(
+        [_map(chapter, results), _comparison(results), _failures(results, chapter.folder), _forces(chapter, results)]
+    )
+
+
+def _map(chapter: Chapter, results: Results) -> Markup:
+    if not results.varied:
+        return note("Nothing varied between the trials, so there is no map.")
+    ranked = influence(results)
+    limits = regions(chapter.scene, results.varied)
+    pair = [name for name in results.varied if name in ranked[:2]]
+    parts = [
+        tag("p", _how_to_read(results, pair, ranked), class_="lead"),
+        theory_sentence(limits, chapter.scene, results.varied),
+    ]
+    if len(pair) == 2:
+        maps = [cell_map(results, skill, pair, limits) for skill in results.skills]
+        parts += [tag("div", *maps, class_="grid"), _colour_key()]
+    curves = [rate_curves(results, name, limits) for name in ranked[:MOST_CURVES]]
+    left_out = [quantity(name).label for name in ranked[MOST_CURVES:]]
+    parts += [_skill_key(results), tag("div", *curves, class_="grid")]
+    if left_out:
+        parts.append(note(f"Less telling and not drawn: {', '.join(left_out)}."))
+    return join(parts)
+
+
+def _how_to_read(results: Results, pair: Sequence[str], ranked: Sequence[str]) -> str:
+    same = (
+        "every skill met the same draws, trial by trial" if len(results.skills) > 1 else "every trial has its own draw"
+    )
+    varied = ", ".join(quantity(name).label for name in results.varied)
+    chosen = f" The map shows the two that matter most of {len(ranked)}." if len(ranked) > 2 else ""
+    cells = " A cell counts its successes and gives the exact 95 % interval of its rate." if len(pair) == 2 else ""
+    points = " Points in the curves carry the same kind of interval."
+    return f"Varied from trial to trial: {varied}; {same}.{chosen}{cells}{points}"
+
+
+def _skill_key(results: Results) -> Markup:
+    names = [
+        tag("span", tag("span", "", class_=f"swatch s{i % 4 + 1}"), skill) for i, skill in enumerate(results.skills)
+    ]
+    return tag("p", *names, class_="keys skills")
+
+
+def _colour_key() -> Markup:
+    return tag(
+        "p", tag("span", class_="key ramp"), " never to always succeeds · ", tag("span", "●", class_="won-key"),
+        " a trial that succeeded · ", tag("span", "×", class_="lost-key"), " one that failed", class_="keys",
+    )  # fmt: skip
+
+
+def _comparison(results: Results) -> Markup:
+    if len(results.skills) < 2:
+        return Markup("")
+    rows = []
+    for first, second in combinations(results.skills, 2):
+        both, only_first, only_second, neither = results.pairs(first, second)
+        rows.append(
+            (
+                f"{first} – {second}",
+                both,
+                only_first,
+                only_second,
+                neither,
+                p_value(results.compare(only_first, only_second)),
+            )
+        )
+    test = "McNemar's exact test" if results.fixed else "McNemar's test in the form that holds at every look"
+    return join([
+        tag("h3", "Side by side, on the same draws"),
+        table(("first – second", "both", "only first", "only second", "neither", "p"), rows),
+        tag("p", f"p: chance of such a difference between equally good skills ({test}, two-sided).", class_="caption"),
+    ])  # fmt: skip
+
+
+def p_value(p: float) -> str:
+    """A p-value for people."""
+    if p >= 0.001:
+        return f"{p:.3f}"
+    return "< 10⁻¹⁵" if p < 1e-15 else f"{p:.0e}".replace("e-0", " · 10^−").replace("e-", " · 10^−")
+
+
+def _failures(results: Results, folder: str) -> Markup:
+    blocks = []
+    for skill in results.skills:
+        causes = results.causes(skill)
+        total = len(results.of(skill))
+        if not causes:
+            blocks.append(tag("div", tag("h4", skill), tag("p", f"No failure in {total} trials."), class_="card"))
+            continue
+        rows = [(cause, len(trials), percent(len(trials) / total), _named(trials)) for cause, trials in causes]
+        blocks.append(tag("div", tag("h4", skill), table(("cause", "trials", "share", "trial"), rows), class_="card"))
+    replay = tag(
+        "p",
+        "To see one again, bit by bit: ",
+        tag("code", f"skillframe campaign replay {folder} TRIAL"),
+        class_="caption",
+    )
+    return join([tag("h3", "What went wrong"), tag("div", *blocks, class_="grid"), replay])
+
+
+def _named(trials: Sequence[int]) -> str:
+    more = ", …" if len(trials) > MOST_TRIALS_NAMED else ""
+    return ", ".join(map(str, trials[:MOST_TRIALS_NAMED])) + more
+
+
+def _forces(chapter: Chapter, results: Results) -> Markup:
+    forces = {s: np.array([r.values.get("peak_force_n", math.nan) for r in results.of(s)]) for s in results.skills}
+    finite = {s: f[np.isfinite(f)] for s, f in forces.items()}
+    if not any(len(f) for f in finite.values()):
+        return note("The table holds no peak forces.")
+    everything = np.concatenate(list(finite.values()))
+    edges = np.linspace(0.0, max(float(everything.max()), 1e-3), 25)
+    counts = {s: np.histogram(f, edges)[0] for s, f in finite.items()}
+    top = max(int(c.max()) for c in counts.values())
+    axes = Axes(
+        width=600,
+        height=260,
+        x=padded(0.0, edges[-1], 0.01),
+        y=(0.0, 1.08 * top),
+        x_label="peak contact force [N]",
+        y_label="trials",
+    )
+    parts = [axes.frame()]
+    for i, skill in enumerate(results.skills):
+        xs, ys = np.repeat(edges, 2), np.concatenate([[0], np.repeat(counts[skill], 2), [0]])
+        parts.append(axes.line(xs, ys.astype(float), f"histogram s{i % 4 + 1}"))
+    words = "; ".join(
+        f"{s}: median {number(float(np.median(f)))} N, highest {number(float(f.max()))} N"
+        for s, f in finite.items()
+        if len(f)
+    )
+    return join(
+        [
+            tag("h3", "How hard it pushed"),
+            _skill_key(results),
+            figure("", words + ".", picture(axes, "Peak contact force of all trials", *parts), class_="plot wide"),
+        ]
+    )
