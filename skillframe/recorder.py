@@ -17,7 +17,7 @@ from skillframe.trace import COLUMNS, Trace
 from skillframe.world.drawing import drawn_bodies
 from skillframe.world.plant import Plant
 
-CAPACITY = 20_000
+CAPACITY, FIRST = 20_000, 1000  # samples per trial: at most, and before the arrays first grow
 
 
 class Recorder:
@@ -31,7 +31,10 @@ class Recorder:
             **COLUMNS, "q": (plant.configuration.shape[1],), "body_position": positions.shape[1:],
             "body_quaternion": (positions.shape[1], 4),
         }  # fmt: skip
-        self._data = {name: np.zeros((min(capacity, 1000), count, *shape)) for name, shape in shapes.items()}
+        self._data = {
+            name: np.zeros((min(capacity, FIRST), count, *shape), np.float32 if name.startswith("body") else np.float64)
+            for name, shape in shapes.items()
+        }
         self._length = 0
         self._stop = np.full(count, -1.0)
         self._time = 0.0
@@ -59,7 +62,7 @@ class Recorder:
     def _make_room(self) -> None:
         if self._length < self._capacity:
             for name, array in self._data.items():
-                grown = np.zeros((min(2 * self._length, self._capacity), *array.shape[1:]))
+                grown = np.zeros((min(2 * self._length, self._capacity), *array.shape[1:]), array.dtype)
                 grown[: self._length] = array
                 self._data[name] = grown
             return
@@ -73,11 +76,11 @@ class Recorder:
         self._stop[rows] = self._time
 
     def trace(self, i: int, meta: dict[str, Any]) -> Trace:
-        """The trace of trial i."""
+        """The trace of trial i; its arrays are views, so that N traces take no more memory than the recording."""
         length = self._length
         if self._stop[i] >= 0.0:
             length = int(np.searchsorted(self._data["time"][: self._length, i], self._stop[i], side="right"))
-        arrays = {name: array[:length, i].copy() for name, array in self._data.items()}
+        arrays = {name: array[:length, i] for name, array in self._data.items()}
         if self._bodies is None:
             self._bodies = drawn_bodies(self._plant)
         return Trace(**arrays, meta={**meta, "bodies": self._bodies})

@@ -45,8 +45,8 @@ def impedance_wrench(
 def task_inertia(jacobian: Float, mass_matrix: Float) -> Float:
     """Task-space inertia (N, 6, 6), Lambda = (J M^-1 J^T + eps)^-1; eps keeps singular postures finite."""
     mobility = jacobian @ np.linalg.solve(mass_matrix, np.swapaxes(jacobian, -1, -2))
-    result: Float = np.linalg.inv(mobility + 1e-6 * np.eye(6))
-    return 0.5 * (result + np.swapaxes(result, -1, -2))
+    inertia: Float = np.linalg.inv(mobility + 1e-6 * np.eye(6)).astype(np.float64, copy=False)
+    return 0.5 * (inertia + np.swapaxes(inertia, -1, -2))
 
 
 def critical_damping(

@@ -59,9 +59,9 @@ class LimitGuard:
         self.energy += np.vecdot(command, twist) * self._dt
         force, torque, speed = norm(wrench[:, :3]), norm(wrench[:, 3:]), norm(twist[:, :3])
         limits = self._limits
-        fine = (speed <= SPEED_CEILING) & (self._saturated < RATE_PERSISTENCE)
+        fine = self._inside(position) & (speed <= SPEED_CEILING) & (self._saturated < RATE_PERSISTENCE)
         fine &= (force <= _or_infinite(limits.force_n)) & (torque <= _or_infinite(limits.torque_n_m))
-        fine &= (self.energy <= _or_infinite(limits.energy_j)) & self._inside(position)
+        fine &= self.energy <= _or_infinite(limits.energy_j)
         if fine.all():
             return []
         values = np.concatenate([position, twist, wrench, command], axis=-1)
@@ -72,9 +72,9 @@ class LimitGuard:
 
     def _inside(self, position: Float) -> NDArray[np.bool_]:
         if self._limits.workspace_m is None:
-            return np.isfinite(position[:, 0])
+            return np.ones(len(position), dtype=bool)
         low, high = self._limits.workspace_m
-        inside: NDArray[np.bool_] = ((position >= low) & (position <= high)).all(-1)
+        inside: NDArray[np.bool_] = np.all((position >= low) & (position <= high), axis=-1)
         return inside
 
     def _cause(self, i: int, values: Float, force: float, torque: float, speed: float) -> str:

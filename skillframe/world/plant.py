@@ -142,7 +142,8 @@ class Plant:
 
         It holds contact, tool weight and the tool's inertial forces; the reading is that of the step just taken.
         """
-        return -self._sensor
+        reading: Float = -self._sensor
+        return reading
 
     def contact_wrench(self, offset: Float) -> Float:
         """True wrench (N, 6) of the environment on the tool at a point of the tool frame, base axes."""

@@ -29,7 +29,8 @@ def build(params: FreeParams) -> Scene:
     start = (0.0, 0.0, 0.05)
 
     def travelled(state: State) -> NDArray[np.bool_]:
-        return (state.tip.position - np.array(start)) @ np.array(params.direction) > 0.08
+        far: NDArray[np.bool_] = (state.tip.position - np.array(start)) @ np.array(params.direction) > 0.08
+        return far
 
     return Scene(
         name="free", fixture=(), tool=tool((ball, shaft(0.004, 0.01, WRIST_TO_TIP))), friction=0.2,
