@@ -9,8 +9,9 @@ converges to a constant (Anderson and Moore, Optimal Filtering, 1979), after whi
 
     w- = w + h s,     e = z - w-,     w = w- + k_1 e,     s = s + k_2 e                                   (1)
 
-It depends on \(q^2 h^3 / r^2\) alone, that is, on the corner frequency \(f = (q^2 / (r^2 h))^{1/4} / 2\pi\), and follows a
-ramp without lag. filterpy makes the filter over time and the smoother (offline); (1) runs in the loop and needs numpy only.
+It depends on \(q^2 h^3 / r^2\) alone, so on the corner frequency \(f = (q^2 / (r^2 h))^{1/4} / 2\pi\), and follows
+a ramp without lag. filterpy makes the filter over time and the smoother (offline); (1) runs in the loop and needs numpy
+only.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from skillframe.errors import SkillframeError
 from skillframe.frames import Float
 
 FORCE_NOISE, TORQUE_NOISE, CORNER = 0.3, 0.02, 25.0
-"""Noise of a wrist sensor on a moving robot [N, Nm] and a corner [Hz] at 1 kHz: our choice; kuka_ati shows 0.2-0.65 N."""
+"""Noise of a wrist sensor on a moving robot [N, Nm] and a corner [Hz] at 1 kHz: our choice; 0.2-0.65 N are seen."""
 CHUNK, OVERLAP = 20_000, 2_000
 
 
@@ -48,7 +49,7 @@ class WrenchModel:
 
     @staticmethod
     def from_corner(noise: Float, corner: float | Float, dt: float) -> WrenchModel:
-        """The model whose converged filter has this corner frequency [Hz], a number or (6,), at sample time `dt` [s]."""
+        """The model whose converged filter has this corner [Hz], a number or (6,), at sample time `dt` [s]."""
         noise = np.asarray(noise, dtype=float)
         return WrenchModel(noise=noise, walk=noise * np.sqrt(dt) * (2.0 * np.pi * np.asarray(corner)) ** 2)
 
@@ -90,7 +91,8 @@ def process_noise(walk: float, dt: float) -> Float:
 def steady_gain(noise: Float, walk: Float, dt: float) -> Gain:
     """The gain that the Kalman filter converges to, by doubling of the Riccati recursion.
 
-    For P = F (P^-1 + H^T H / r^2)^-1 F^T + Q, with A = F^T and G = H^T H, each round (Anderson 1978, doubling algorithms)
+    For P = F (P^-1 + H^T H / r^2)^-1 F^T + Q, with A = F^T and G = H^T H / r^2, each round (Anderson, Second-order
+    convergent algorithms for the steady-state Riccati equation, 1978)
 
         A' = A W A,  G' = G + A W G A^T,  P' = P + A^T P W A,   W = (1 + G P)^-1
 
@@ -159,7 +161,7 @@ class WrenchFilter:
         return SteadyWrenchFilter(steady_gain(self.model.noise, self.model.walk, self.dt), self.dt)
 
     def kalman(self) -> Any:
-        """filterpy's `KalmanFilter` of all channels: state (12,), value and slope channel by channel."""
+        """Filterpy's `KalmanFilter` of all channels: state (12,), value and slope channel by channel."""
         from filterpy.kalman import KalmanFilter
 
         kalman = KalmanFilter(dim_x=12, dim_z=6)
@@ -170,10 +172,11 @@ class WrenchFilter:
         return kalman
 
     def _matrices(self, dt: float) -> tuple[Float, Float]:
-        noise = np.zeros((12, 12))
+        noise: Float = np.zeros((12, 12))
         for i, walk in enumerate(self.model.walk):
             noise[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = process_noise(float(walk), dt)
-        return np.kron(np.eye(6), transition(dt)), noise
+        transitions: Float = np.kron(np.eye(6), transition(dt)).astype(np.float64)
+        return transitions, noise
 
     def filter(self, time: Float, wrench: Float) -> Float:
         """Filtered wrench (T, 6), causal, with the time-varying gain and the samples' own spacing."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from skillframe.demonstration import checks
 from skillframe.demonstration.columns import (
+    ALIASES,
     CANONICAL,
     POSITION,
     QUATERNION,
@@ -17,9 +18,9 @@ from skillframe.demonstration.columns import (
     select_arm,
     with_quaternion,
 )
-from skillframe.demonstration.convention import declared_wrench, to_standard
 from skillframe.demonstration.contradiction import refuse_contradiction
-from skillframe.demonstration.join import join
+from skillframe.demonstration.convention import declared_wrench, to_standard
+from skillframe.demonstration.join import join, within
 from skillframe.demonstration.metafile import check_meta, nested
 from skillframe.demonstration.options import ReadOptions
 from skillframe.demonstration.record import Demonstration, resolve_point
@@ -28,6 +29,8 @@ from skillframe.frames import matrix_from_quaternion
 
 NOTES = "reading"
 """Metadata key of the list of sentences about what was done at reading."""
+JOIN_MARGIN = 1.0
+"""Seconds kept beyond a cut until two files are joined."""
 
 
 def assemble(
@@ -54,12 +57,11 @@ def assemble(
     zero = -float(pose["t"][0]) if options.zero_time else 0.0  # one shift for both files: their clocks stay together
     pose = _checked_pose(_shifted(pose, zero), options, notes)
     if wrench is not None:
-        pose = join(pose, _shifted(_checked_wrench_file(wrench, options, rate, notes), zero), options, notes)
+        pose = join(pose, _checked_wrench_file(wrench, options, rate, zero, notes), options, notes)
     else:
-        advice = (
-            "" if any(n in pose for n in WRENCH) else "name its columns, or give the wrench's own file with --wrench"
-        )
-        checks.refuse_missing(pose, WRENCH, "wrench", advice if not _alike(pose) else "")
+        given = any(name in pose for name in WRENCH) or _alike(pose)
+        advice = "" if given else "name its columns, or give the wrench's own file with --wrench"
+        checks.refuse_missing(pose, WRENCH, "wrench", advice)
     pose = _cut(pose, options)
     checks.refuse_not_finite(pose)
     checks.refuse_dead_wrench(pose, meta)
@@ -68,7 +70,7 @@ def assemble(
 
 
 def _alike(columns: Columns) -> bool:
-    return any(old in columns for old in checks.ALIASES)
+    return any(name in columns for name in ALIASES)
 
 
 def _meta_rate(source: str, meta: Mapping[str, Any], columns: Columns) -> float | None:
@@ -105,54 +107,49 @@ def _checked_pose(columns: Columns, options: ReadOptions, notes: list[str]) -> C
     """Columns with position and unit quaternion."""
     if options.position is not None and not columns.has(POSITION):
         point = resolve_point(options.position, {})
-        columns = columns.with_values(
-            {**columns, **{n: np.full(len(columns["t"]), p) for n, p in zip(POSITION, point, strict=True)}}
-        )
+        held = {name: np.full(len(columns["t"]), value) for name, value in zip(POSITION, point, strict=True)}
+        columns = columns.with_values({**columns, **held})
         notes.append(f"the tool point was held at {options.position} m, since the file holds none")
     checks.refuse_missing(columns, POSITION, "position")
-    columns = with_quaternion(_cut_before_join(columns, options), options.euler)
+    columns = _cut(columns, options, JOIN_MARGIN if options.wrench is not None else 0.0)
+    columns = with_quaternion(columns, options.euler)
     checks.refuse_missing(columns, QUATERNION, "orientation")
     checks.refuse_not_finite(columns)
     return checks.checked_quaternions(columns, notes)
 
 
-def _cut_before_join(columns: Columns, options: ReadOptions) -> Columns:
-    """Leave out what is far outside the cut, so that a bad row there does not matter; a second is kept for joining."""
-    time = columns["t"]
-    keep = (time >= (-np.inf if options.start is None else options.start - 1.0)) & (
-        time <= (np.inf if options.stop is None else options.stop + 1.0)
-    )
-    return take(columns, keep) if options.wrench is not None and keep.sum() >= 2 else _cut(columns, options)
-
-
-def _checked_wrench_file(columns: Columns, options: ReadOptions, rate: float | None, notes: list[str]) -> Columns:
-    columns = _clocked(columns, options.wrench_rate or (rate if "t" not in columns else None), notes)
-    checks.refuse_missing(
-        columns, WRENCH, "wrench", "name its columns with --wrench-columns" if not _alike(columns) else ""
-    )
+def _checked_wrench_file(
+    columns: Columns, options: ReadOptions, rate: float | None, zero: float, notes: list[str]
+) -> Columns:
+    """The separate file's clock and wrench, on the pose's zero."""
+    rate = options.wrench_rate or (rate if "t" not in columns else None)
+    columns = _shifted(_clocked(columns, rate, notes), zero + options.wrench_shift)
+    advice = "" if _alike(columns) else "name its columns with --wrench-columns"
+    checks.refuse_missing(columns, WRENCH, "wrench", advice)
+    columns = _cut(columns.with_values({name: columns[name] for name in ("t", *WRENCH)}), options, JOIN_MARGIN)
     checks.refuse_not_finite(columns)
-    return columns.with_values({name: columns[name] for name in ("t", *WRENCH)})
+    return columns
 
 
-def take(columns: Columns, keep: Any) -> Columns:
-    """Chosen rows of every column."""
-    rows = None if columns.rows is None else np.asarray(columns.rows)[keep].tolist()
-    return Columns({name: column[keep] for name, column in columns.items()}, columns.source, rows)
+def _cut(columns: Columns, options: ReadOptions, margin: float = 0.0) -> Columns:
+    """The rows between `start` and `stop`, and a margin [s]; what lies outside is never judged.
 
-
-def _cut(columns: Columns, options: ReadOptions) -> Columns:
+    Raises:
+        InputError: fewer than two rows are left.
+    """
     if options.start is None and options.stop is None:
         return columns
     time = columns["t"]
-    keep = (time >= (-np.inf if options.start is None else options.start)) & (
-        time <= (np.inf if options.stop is None else options.stop)
-    )
+    start, stop = options.start, options.stop
+    keep = within(time, None if start is None else start - margin, None if stop is None else stop + margin)
     if keep.sum() < 2:
+        asked = f"{'the start' if start is None else f'{start:g} s'} to {'the end' if stop is None else f'{stop:g} s'}"
         raise InputError(
-            columns.source, f"no samples from {options.start} to {options.stop} s (it spans {time[0]:.6g} to {time[-1]:.6g} s)",
+            columns.source, f"no samples from {asked} (it spans {time[0]:.6g} to {time[-1]:.6g} s)",
             "choose --from and --to inside the recording",
         )  # fmt: skip
-    return take(columns, keep)
+    rows = None if columns.rows is None else np.asarray(columns.rows)[keep].tolist()
+    return Columns({name: column[keep] for name, column in columns.items()}, columns.source, rows)
 
 
 def _finish(columns: Columns, meta: dict[str, Any], options: ReadOptions, notes: list[str]) -> Demonstration:
@@ -163,7 +160,7 @@ def _finish(columns: Columns, meta: dict[str, Any], options: ReadOptions, notes:
     declared = declared_wrench(source, meta, options)
     refuse_contradiction(columns, rotation, declared)
     wrench, said, more = to_standard(columns.stack(WRENCH), rotation, declared, meta, source)
-    notes = [*meta.get(NOTES, []), *notes, *more]
+    notes = list(dict.fromkeys([*meta.get(NOTES, []), *notes, *more]))
     meta = {**meta, **({"wrench": said} if said else {}), **({NOTES: notes} if notes else {})}
     return Demonstration(
         time=columns["t"], position=columns.stack(POSITION), quaternion=quaternion, wrench=wrench, meta=meta,

@@ -1,10 +1,10 @@
 r"""Refusals: what no reader accepts, each with file, row or channel and what to do.
 
 Orientation is judged as rotation, never by raw angles, because Euler angles jump at gimbal lock while the tool turns
-smoothly, and a wrong order makes the tool jump. The tool jumps if it turns by more than \(\max(2^\circ, 10\,\mathrm{rad/s}\,
-\Delta t)\) within 5 ms (or one sample, where samples are farther apart), or, at low rates, by more than 20 degrees in
-one sample and ten times faster than in the three samples before and after. Our choice, because nobody teaches a robot
-at 570 degrees a second, and a snap assembly read in ten wrong orders turned at 830 to 11 600.
+smoothly, and a wrong order makes the tool jump. The tool jumps if it turns by more than \(\max(2^\circ, 10\,\Delta t)\)
+(10 rad/s) within 5 ms (or one sample, if samples are farther apart), or, at low rates, by more than 20 degrees in one
+sample and ten times faster than in the three samples before and after. Our choice, because nobody teaches a robot at
+570 degrees a second, and a snap assembly read in ten wrong orders turned at 830 to 11 600.
 """
 
 from __future__ import annotations

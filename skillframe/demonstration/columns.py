@@ -45,7 +45,7 @@ class Columns(dict[str, Float]):
         self.source, self.rows = source, rows
 
     def place(self, row: int, column: str = "") -> str:
-        """ "file: row N, column c" for messages; rows as an editor counts them, or from 1 in files without lines."""
+        """Where a value stands: "file: row N, column c", rows counted as an editor does."""
         number = row + 1 if self.rows is None else int(self.rows[row])
         return f"{self.source}: row {number}" + (f", column {column}" if column else "")
 
@@ -71,7 +71,7 @@ def name_columns(table: Table, spec: str | None, units: str | None) -> Columns:
         units: `ReadOptions.units`.
 
     Raises:
-        InputError: no header and no names, a number of names that does not fit, a name twice, words where numbers belong.
+        InputError: no header and no names, too many or few names, a name twice, words where numbers belong.
     """
     picks = _picks(table, spec)
     factors = scales(units)

@@ -3,12 +3,12 @@ r"""A wrench frame that metadata declare and the data contradict; only an explic
 Two signatures, both our choice:
 
 - Weight and bias. A sensor on a turning tool reads a bias fixed in the tool and a weight fixed in base. In tool axes
-  \(F = b + R^T w\), in base axes \(F = w + R b\). Both are fitted (robustly, over at most 400 samples); the declared frame is
-  refused if its median residual exceeds 1 N and five times the other's. Constant forces in either frame satisfy both
-  models, so that a contact force that turns with the tool is no contradiction. A weight that is declared to be in the
-  wrench must also turn in tool axes (and not in base axes).
-- Work. A passive environment cannot push the tool along. Over the motion in contact, \(c = \int F \cdot dx / \int |F| |dx|\);
-  the declared frame is refused if its c is above 0.3 and the other frame's below -0.3.
+  \(F = b + R^T w\), in base axes \(F = w + R b\). Both are fitted (robustly, over at most 400 samples); the declared
+  frame is refused if its median residual exceeds 1 N and five times the other's. Constant forces in either frame
+  satisfy both models, so that a contact force that turns with the tool is no contradiction. A weight that is declared
+  to be in the wrench must also turn in tool axes (and not in base axes).
+- Work. A passive environment cannot push the tool along. Over the motion in contact, with
+  \(c = \int F \cdot dx / \int |F| |dx|\), the declared frame is refused if its c is above 0.3, the other's below -0.3.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from skillframe.frames import Float, norm, rotate, rotation_vector
 SAMPLES, ROUNDS = 400, 8
 LEAST_TURN = np.deg2rad(20.0)
 LEAST_RESIDUAL, RESIDUAL_RATIO = 1.0, 5.0
-LEAST_PATH, WORK_COSINE, WORK_RATE = 0.02, 0.3, 20.0
+LEAST_PATH, WORK_COSINE, WORK_RATE, WORK_FORCE = 0.02, 0.3, 20.0, 3.0
 LEAST_WEIGHT = 2.0
 
 
@@ -44,7 +44,7 @@ def refuse_contradiction(columns: Columns, rotation: Float, declared: Mapping[st
     if frame is None:
         return
     force = columns.stack(FORCE)
-    evidence = _weight_evidence(force, rotation, frame, bool(declared.get("includes_tool_weight")))
+    evidence = weight_evidence(force, rotation, frame, bool(declared.get("includes_tool_weight")))
     if evidence is None and not declared.get("includes_tool_weight"):
         sign = -1.0 if declared.get("sign") == "teacher" else 1.0
         evidence = _work_evidence(columns.stack(POSITION), sign * force, rotation, columns["t"], frame)
@@ -65,35 +65,41 @@ def fit_weight_and_bias(force: Float, rotation: Float, frame: str) -> tuple[Floa
     matrix = rotation if frame == "base" else np.swapaxes(rotation, -1, -2)
     design = np.concatenate([np.broadcast_to(np.eye(3), matrix.shape), matrix], axis=-1)
     weight = np.ones(len(force))
-    solution = np.zeros(6)
+    solution: Float = np.zeros(6)
     residual = norm(force)
     for _ in range(ROUNDS):
         scaled = (design * weight[:, None, None]).reshape(-1, 6)
-        solution = np.linalg.lstsq(scaled, (force * weight[:, None]).ravel(), rcond=1e-6)[0]
+        solution = np.asarray(np.linalg.lstsq(scaled, (force * weight[:, None]).ravel(), rcond=1e-6)[0], dtype=float)
         residual = norm(force - design @ solution)
         weight = 1.0 / np.sqrt(np.maximum(residual, 1e-3 + 0.1 * np.median(residual)))
     return solution, float(np.median(residual))
 
 
-def _weight_evidence(force: Float, rotation: Float, frame: str, weighs: bool) -> str | None:
+def weight_evidence(force: Float, rotation: Float, frame: str, weighs: bool = False) -> str | None:
+    """Evidence that forces (T, 3), said to be in these axes, are in the others; None if there is none."""
     pick = np.linspace(0, len(force) - 1, min(SAMPLES, len(force))).round().astype(int)
     force, rotation = force[pick], rotation[pick]
     if norm(rotation_vector(rotation[0].T @ rotation)).max() < LEAST_TURN:
         return None
     other = "tool" if frame == "base" else "base"
     _, ours = fit_weight_and_bias(force, rotation, frame)
-    solution, theirs = fit_weight_and_bias(force, rotation, other)
+    _, theirs = fit_weight_and_bias(force, rotation, other)
     if ours > LEAST_RESIDUAL and ours > RESIDUAL_RATIO * theirs:
-        return f"weight and bias on the turning tool explain it in {other} axes to {theirs:.2f} N and in {frame} axes only to {ours:.2f} N"
+        return (
+            f"weight and bias on the turning tool explain it in {other} axes to {theirs:.2f} N, "
+            f"in {frame} axes only to {ours:.2f} N"
+        )
     return _still_weight(force, rotation, frame) if weighs else None
 
 
 def _still_weight(force: Float, rotation: Float, frame: str) -> str | None:
-    """A weight said to be in the wrench that stands still in tool axes, or turns in base axes, with the turning tool."""
+    """A weight, said to be in the wrench, that stands still in tool axes or turns in base axes."""
     in_frame, in_other = force, rotate(rotation if frame == "tool" else np.swapaxes(rotation, -1, -2), force)
     spread, other_spread = (float(np.median(norm(f - np.median(f, axis=0)))) for f in (in_frame, in_other))
     if frame == "tool" and spread < 0.1 * other_spread and other_spread > LEAST_RESIDUAL:
-        return f"the weight does not turn with the tool (spread {spread:.2f} N in tool axes, {other_spread:.2f} N in base axes)"
+        return (
+            f"the weight does not turn with the tool (spread {spread:.2f} N in tool axes, {other_spread:.2f} N in base)"
+        )
     if frame == "base" and other_spread < 0.1 * spread and spread > LEAST_WEIGHT:
         return f"the weight turns in base axes (spread {spread:.2f} N there, {other_spread:.2f} N in tool axes)"
     return None
@@ -102,13 +108,13 @@ def _still_weight(force: Float, rotation: Float, frame: str) -> str | None:
 def work_cosine(position: Float, force: Float, time: Float) -> tuple[float, float]:
     """Work of a force over the motion in contact, as a share of \\(\\int |F| |dx|\\), and that motion's length [m].
 
-    Contact is where the force exceeds 30 % of its 95th percentile; steps are taken at 20 Hz, to keep noise out of dx.
+    Contact is where the force exceeds 3 N and 30 % of its 95th percentile; steps are taken at 20 Hz, to keep noise out.
     """
     stride = max(1, round(1.0 / (WORK_RATE * float(np.median(np.diff(time))))))
     step = np.diff(position[::stride], axis=0)
     middle = force[::stride][: len(step)]
     strength = norm(middle)
-    touching = strength > 0.3 * np.quantile(norm(force), 0.95)
+    touching = strength > max(WORK_FORCE, 0.3 * float(np.quantile(norm(force), 0.95)))
     length = norm(step)[touching]
     total = float((strength[touching] * length).sum())
     work = float((middle[touching] * step[touching]).sum())
@@ -121,5 +127,8 @@ def _work_evidence(position: Float, force: Float, rotation: Float, time: Float, 
     ours, path = work_cosine(position, in_base, time)
     theirs, _ = work_cosine(position, wrong, time)
     if path > LEAST_PATH and ours > WORK_COSINE and theirs < -WORK_COSINE:
-        return f"it would push the tool along (work {ours:+.0%} of |F||dx| over {path * 1e3:.0f} mm), otherwise oppose it ({theirs:+.0%})"
+        return (
+            f"it would push the tool along (work {ours:+.0%} of |F||dx| over {path * 1e3:.0f} mm), "
+            f"otherwise oppose it ({theirs:+.0%})"
+        )
     return None

@@ -4,7 +4,7 @@ With the tool's attitude R (tool to base), the reference point r in tool coordin
 
 - `frame = "tool"`: \(F_b = R F\), \(T_b = R T\);
 - `point = r`: \(T_{tool} = T_r + (R r) \times F\);
-- `includes_tool_weight`: \(F - m g\), \(T - (R c) \times m g\), with \(g = (0, 0, -9.81)\,\mathrm{m/s^2}\) (`frames.move_wrench`'s signs);
+- `includes_tool_weight`: \(F - m g\), \(T - (R c) \times m g\), with \(g = (0, 0, -9.81)\) m/s^2;
 - `sign = "teacher"`: the sensor saw the teacher's force on the tool, so the environment's is its opposite. That is
   Newton's law for a tool without inertia: it holds while \(m \ddot x\) is small beside the forces (quasi-static).
 """

@@ -1,4 +1,4 @@
-"""CSV demonstrations: a header, one row per sample, metadata in `NAME.meta.toml` beside it; numbers round-trip exactly."""
+"""CSV demonstrations: a header, a row per sample, metadata in `NAME.meta.toml` beside it; numbers round-trip."""
 
 from __future__ import annotations
 
@@ -51,5 +51,5 @@ def write_csv(demonstration: Demonstration, path: Path) -> None:
             raise InputError(path, f"column name {name!r} cannot stand in a CSV header", "rename it, or write .npz")
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     text = "\n".join([",".join(columns), *(",".join(map(repr, row)) for row in rows)]) + "\n"
-    replace_file(meta_path(path), toml_text({"quaternion": "xyzw", **demonstration.meta}).encode())
     replace_file(path, text.encode())
+    replace_file(meta_path(path), toml_text({"quaternion": "xyzw", **demonstration.meta}).encode())

@@ -1,16 +1,17 @@
-"""Pose and wrench from two files with two clocks, joined on time over the interval that both cover.
+r"""Pose and wrench from two files with two clocks, joined on time over the interval that both cover.
 
-One clock's samples are kept and the other file is interpolated at them: linearly for positions, wrenches and further
-columns, along the shortest rotation for attitudes, \\(R(s) = R_0 \\exp(s \\log(R_0^T R_1))\\). Files are never paired row
-by row unless both are given a rate instead of a clock.
+One clock's samples are kept and the other file is interpolated at them: linearly for positions and wrenches, along the
+shortest rotation for attitudes, \(R(s) = R_0 \exp(s \log(R_0^T R_1))\); whole numbers of further columns are held.
+Files are never paired row by row unless both are given a rate instead of a clock.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skillframe.demonstration.checks import GAP
-from skillframe.demonstration.columns import QUATERNION, WRENCH, Columns
+from skillframe.demonstration.columns import KNOWN, QUATERNION, WRENCH, Columns
 from skillframe.demonstration.options import ReadOptions
 from skillframe.errors import InputError
 from skillframe.frames import (
@@ -28,20 +29,20 @@ def join(pose: Columns, wrench: Columns, options: ReadOptions, notes: list[str])
     Args:
         pose: t, position, quaternion and whatever else the file holds.
         wrench: t, fx ... tz and whatever else; its columns win where both files have them.
-        options: `clock`, `wrench_shift`.
+        options: `clock`; the cut, to count what is left out of it.
         notes: what was done is added here.
 
     Raises:
         InputError: the clocks have no interval in common.
     """
-    moved = wrench.with_values({**wrench, "t": wrench["t"] + options.wrench_shift})
-    start, stop = max(pose["t"][0], moved["t"][0]), min(pose["t"][-1], moved["t"][-1])
-    keep_pose = options.clock == "pose" or (options.clock == "auto" and _rate(pose) > 0.95 * _rate(moved))
-    kept, other = (pose, moved) if keep_pose else (moved, pose)
+    start, stop = max(pose["t"][0], wrench["t"][0]), min(pose["t"][-1], wrench["t"][-1])
+    keep_pose = options.clock == "pose" or (options.clock == "auto" and _rate(pose) > 0.95 * _rate(wrench))
+    kept, other = (pose, wrench) if keep_pose else (wrench, pose)
     inside = (kept["t"] >= start) & (kept["t"] <= stop)
     if inside.sum() < 2:
         raise InputError(
-            wrench.source, f"its clock ({_span(moved)}) has no interval in common with that of {pose.source} ({_span(pose)})",
+            wrench.source,
+            f"its clock ({_span(wrench)}) has no interval in common with that of {pose.source} ({_span(pose)})",
             "check the units of time (--units, --wrench-units), or move its clock with --wrench-shift",
         )  # fmt: skip
     time = kept["t"][inside]
@@ -49,7 +50,8 @@ def join(pose: Columns, wrench: Columns, options: ReadOptions, notes: list[str])
     own = {name: column[inside] for name, column in kept.items()}
     first, second = (own, found) if keep_pose else (found, own)
     joined = {**{k: v for k, v in first.items() if k not in WRENCH}, **second, "t": time}
-    notes.append(_sentence(pose, moved, keep_pose, inside.sum(), time))
+    wanted = within(kept["t"], options.start, options.stop)
+    notes.append(_sentence(pose, wrench, keep_pose, int((wanted & ~inside).sum())))
     notes += _gaps(other, time)
     rows = None if kept.rows is None else np.asarray(kept.rows)[inside].tolist()
     return Columns(joined, kept.source, rows)
@@ -63,12 +65,10 @@ def _span(columns: Columns) -> str:
     return f"{columns['t'][0]:.6g} to {columns['t'][-1]:.6g} s"
 
 
-def _sentence(pose: Columns, wrench: Columns, keep_pose: bool, count: int, time: Float) -> str:
-    which = "pose" if keep_pose else "wrench"
-    return (
-        f"pose ({len(pose['t'])} rows, {_rate(pose):.4g} Hz) and wrench ({len(wrench['t'])} rows, {_rate(wrench):.4g} Hz) "
-        f"were joined on the {which}'s clock, {count} samples from {time[0]:.6g} to {time[-1]:.6g} s"
-    )
+def _sentence(pose: Columns, wrench: Columns, keep_pose: bool, outside: int) -> str:
+    text = f"pose at {_rate(pose):.4g} Hz and wrench at {_rate(wrench):.4g} Hz were joined on the clock of the "
+    text += "pose" if keep_pose else "wrench"
+    return text + (f"; {outside} samples that the other file does not cover were left out" if outside else "")
 
 
 def _gaps(other: Columns, time: Float) -> list[str]:
@@ -84,11 +84,27 @@ def _gaps(other: Columns, time: Float) -> list[str]:
 def interpolate(columns: Columns, time: Float) -> dict[str, Float]:
     """Every column at other times inside its clock; attitudes along the shortest rotation."""
     clock = columns["t"]
-    result = {name: np.interp(time, clock, column) for name, column in columns.items() if name != "t"}
+    before = np.searchsorted(clock, time, side="right") - 1
+    result = {
+        name: column[before] if _counts(name, column) else np.interp(time, clock, column)
+        for name, column in columns.items()
+        if name != "t"
+    }
     if columns.has(QUATERNION):
         quaternion = slerp(clock, columns.stack(QUATERNION), time)
         result.update({name: quaternion[:, i] for i, name in enumerate(QUATERNION)})
     return result
+
+
+def _counts(name: str, column: Float) -> bool:
+    """Whether a further column holds whole numbers, labels for example, which are held instead of interpolated."""
+    return name not in KNOWN and bool(np.all(column == np.round(column)))
+
+
+def within(time: Float, start: float | None, stop: float | None) -> NDArray[np.bool_]:
+    """Mask (T,) of start <= t <= stop, None for no limit."""
+    after = time >= (-np.inf if start is None else start)
+    return np.asarray(after & (time <= (np.inf if stop is None else stop)))
 
 
 def slerp(clock: Float, quaternion: Float, time: Float) -> Float:

@@ -1,7 +1,7 @@
 """How a file is to be read: the settings that `demonstration convert` and `check` share with `read_demonstration`.
 
-Nothing is guessed that a setting can say. The conventions that files must follow otherwise are the contract's: SI units,
-radians, quaternions x, y, z, w, the wrench that the environment exerts on the tool at the tool point in base axes.
+Nothing is guessed that a setting can say. The conventions that files must follow otherwise are the contract's: SI
+units, radians, quaternions x, y, z, w, the wrench of the environment on the tool at the tool point in base axes.
 """
 
 from __future__ import annotations

@@ -1,0 +1,126 @@
+"""`skillframe condition`: a demonstration's wrench filtered or smoothed, without bias and tool weight."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from skillframe.cli.demonstration import six
+from skillframe.cli.output import emit_json
+
+if TYPE_CHECKING:
+    from skillframe.conditioning.kalman import WrenchModel
+    from skillframe.conditioning.offline import Removed
+    from skillframe.demonstration.record import Demonstration
+
+
+@click.command(name="condition")
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="File to write: .npz or .csv.")
+@click.option(
+    "--method",
+    type=click.Choice(["smoother", "filter", "none"]),
+    default="smoother",
+    show_default=True,
+    help="Kalman smoother (no lag, for learning), the loop's causal filter, or neither.",
+)
+@click.option("--bias/--no-bias", default=True, show_default=True, help="Remove the bias of a free-air stretch.")
+@click.option(
+    "--weight/--no-weight",
+    default=None,
+    help="Identify and remove the tool's weight [default: if the metadata say that it is in the wrench].",
+)
+@click.option("--free-air", metavar="FROM,TO", help="Stretch without contact [s] [default: start to first contact].")
+@click.option("--noise", metavar="N,NM", help="Sensor noise per sample [N, Nm] [default: from the recording].")
+@click.option("--corner", type=float, help="Corner frequency [Hz] [default: the recording's most likely].")
+@click.option("--json", "as_json", is_flag=True, help="What was identified as JSON on stdout.")
+def command(
+    file: Path, out: Path, method: str, bias: bool, weight: bool | None, free_air: str | None, noise: str | None,
+    corner: float | None, as_json: bool,
+) -> int:  # fmt: skip
+    """Filter a demonstration's wrench; remove bias and tool weight.
+
+    Noise figures come from the recording unless they are given. Weight can be told from bias only if the tool turns in
+    free air; if it does not turn enough, the bias alone is removed and a sentence says about which axis to turn it.
+
+    \b
+    Examples:
+      skillframe condition demo.npz --out clean.npz
+      skillframe condition free_motion.npz --weight --free-air 0,6 --method none --out identified.npz
+    """
+    from skillframe.conditioning.offline import filter_wrench, remove_bias, smooth
+    from skillframe.demonstration.files import read_demonstration, write_demonstration
+
+    demonstration = read_demonstration(file)
+    removed = None
+    if bias or weight:
+        removed = remove_bias(demonstration, _pair("--free-air", free_air), weight)
+        demonstration = removed.demonstration
+    if method != "none":
+        run = smooth if method == "smoother" else filter_wrench
+        demonstration = run(demonstration, _model(demonstration, _pair("--noise", noise), corner))
+    write_demonstration(demonstration, out)
+    said = demonstration.meta.get("conditioning", {})
+    if as_json:
+        emit_json({**_plain(said), "written": str(out)})
+    else:
+        _show(out, removed, said)
+    return 0
+
+
+def _pair(name: str, text: str | None) -> tuple[float, float] | None:
+    """Two numbers from "A,B"."""
+    if text is None:
+        return None
+    try:
+        first, second = (float(part) for part in text.split(","))
+    except ValueError:
+        raise click.UsageError(f"{name} {text!r} is not two numbers; write for example {name} 0,2.5") from None
+    if not (math.isfinite(first) and math.isfinite(second)):
+        raise click.UsageError(f"{name} {text!r} is not finite")
+    return first, second
+
+
+def _model(demonstration: Demonstration, noise: tuple[float, float] | None, corner: float | None) -> WrenchModel:
+    """The wrench model: from the recording, with what was given in its place."""
+    import numpy as np
+
+    from skillframe.conditioning.kalman import WrenchModel
+    from skillframe.conditioning.noise import model_of
+
+    model, dt = model_of(demonstration), 1.0 / demonstration.rate
+    corners = model.corner(dt) if corner is None else np.full(6, corner)
+    if not np.all(corners > 0.0) or (noise is not None and min(noise) <= 0.0):
+        raise click.UsageError("--noise and --corner must be above 0")
+    return WrenchModel.from_corner(model.noise if noise is None else np.repeat(noise, 3), corners, dt)
+
+
+def _plain(said: dict[str, Any]) -> dict[str, Any]:
+    """Infinite condition numbers as None, which JSON has."""
+    payload = {
+        k: v if not isinstance(v, float) or math.isfinite(v) else None for k, v in said.get("payload", {}).items()
+    }
+    return {**said, **({"payload": payload} if payload else {})}
+
+
+def _show(out: Path, removed: Removed | None, said: dict[str, Any]) -> None:
+    if removed is not None:
+        payload = removed.payload
+        click.echo(f"free air    {removed.stretch[0]:.3f} to {removed.stretch[1]:.3f} s")
+        click.echo(f"bias        {six(payload.bias.tolist())} in tool axes")
+        if payload.mass:
+            com = ", ".join(f"{v * 1e3:.1f}" for v in payload.com)
+            click.echo(
+                f"tool        {payload.mass:.3f} kg, centre of mass ({com}) mm, condition {payload.condition:.1f}"
+            )
+        click.echo(f"left over   {payload.residual_force:.3f} N, {payload.residual_torque:.4f} Nm rms")
+        if payload.advice:
+            click.echo(f"note        {payload.advice}")
+    if "method" in said:
+        corner = said["corner_hz"]
+        click.echo(f"noise       {six(said['noise'])}")
+        click.echo(f"{said['method']:<12}corner {corner[0]:.1f} Hz (force), {corner[3]:.1f} Hz (torque)")
+    click.echo(f"written     {out}")

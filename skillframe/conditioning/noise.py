@@ -1,0 +1,114 @@
+r"""Noise figures from the data themselves: how much a quiet wrench scatters, and how fast a true one changes.
+
+The sensor's noise is the scatter about a straight line within windows of 0.25 s; the figure is the median over the
+quietest quarter of the windows, so that contact and motion do not count. The walk of the wrench model is the one whose
+converged filter predicts the next sample best: with the gain fixed by the corner, the likelihood of the innovations e,
+concentrated over r, is \(-\frac{n}{2} \ln \overline{e^2}\) up to a constant, maximised over a grid of corners, the
+forces' and the torques' each on its own. Both are our choice.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from skillframe.conditioning.kalman import WrenchModel, steady_gain
+from skillframe.demonstration.record import Demonstration
+from skillframe.errors import InputError
+from skillframe.frames import Float
+
+WINDOW, LEAST_SAMPLES = 0.25, 10
+FLOOR = np.repeat([1e-4, 1e-6], 3)
+"""Least noise assumed [N, Nm]: a channel that a simulation or a filter left clean still needs a positive figure."""
+
+
+class NoiseFigures(NamedTuple):
+    """Scatter of a wrench.
+
+    Attributes:
+        quiet: (6,) standard deviation in the quietest quarter of the windows [N, Nm].
+        typical: (6,) median over all windows: with motion and vibration [N, Nm].
+        quiet_start: start of the quietest window [s].
+    """
+
+    quiet: Float
+    typical: Float
+    quiet_start: float
+
+
+def noise_figures(time: Float, wrench: Float) -> NoiseFigures:
+    """Noise of a recorded wrench.
+
+    Args:
+        time: (T,) [s].
+        wrench: (T, 6) [N, Nm].
+
+    Raises:
+        InputError: fewer than ten samples.
+    """
+    if len(time) < LEAST_SAMPLES:
+        raise InputError(
+            "wrench", f"{len(time)} samples are too few for noise figures", f"give at least {LEAST_SAMPLES}"
+        )
+    period = float(np.median(np.diff(time)))
+    width = int(np.clip(round(WINDOW / period), LEAST_SAMPLES, len(time)))
+    count = len(time) // width
+    windows = np.asarray(wrench, dtype=float)[: count * width].reshape(count, width, 6)
+    scatter = detrended_std(windows)
+    rank = (scatter / np.maximum(np.median(scatter, axis=0), FLOOR)).sum(axis=1)
+    quietest = np.argsort(rank, kind="stable")[: max(1, count // 4)]
+    return NoiseFigures(
+        np.median(scatter[quietest], axis=0), np.median(scatter, axis=0), float(time[int(quietest[0]) * width])
+    )
+
+
+def detrended_std(windows: Float) -> Float:
+    """Standard deviation (K, C) about the best straight line within windows (K, W, C), unbiased for white noise."""
+    width = windows.shape[1]
+    ramp = np.linspace(-1.0, 1.0, width)[:, None]
+    centred = windows - windows.mean(axis=1, keepdims=True)
+    slope = (centred * ramp).sum(axis=1, keepdims=True) / (ramp**2).sum()
+    result: Float = np.sqrt(((centred - slope * ramp) ** 2).sum(axis=1) / (width - 2))
+    return result
+
+
+def estimate_model(time: Float, wrench: Float) -> WrenchModel:
+    """The wrench model that fits a recording: noise from its quiet windows, walk by the likelihood of the innovations.
+
+    Args:
+        time: (T,) [s], evenly spaced but for jitter.
+        wrench: (T, 6) [N, Nm].
+    """
+    dt = float(np.median(np.diff(time)))
+    noise = np.maximum(noise_figures(time, wrench).quiet, FLOOR)
+    corners = np.geomspace(min(0.5, 0.05 / dt), 0.4 / dt, 24)
+    error = _innovation_variance(corners, wrench / noise, dt)
+    best = [corners[np.argmin(np.log(error[:, part] + 1e-300).sum(axis=1))] for part in (slice(0, 3), slice(3, 6))]
+    return WrenchModel.from_corner(noise, np.repeat(best, 3), dt)
+
+
+def _innovation_variance(corners: Float, wrench: Float, dt: float) -> Float:
+    """Mean squared one-step prediction error (C, 6) of the converged filters with these corners, run side by side."""
+    unit = np.ones((len(corners), 1))
+    model = unit * np.sqrt(dt) * (2.0 * np.pi * corners[:, None]) ** 2
+    gain = steady_gain(unit, model, dt)
+    value = np.broadcast_to(wrench[0], (len(corners), 6)).copy()
+    slope, total = np.zeros_like(value), np.zeros_like(value)
+    for measured in wrench[1:]:
+        value += dt * slope
+        error = measured - value
+        total += error**2
+        value += gain.value * error
+        slope += gain.slope * error
+    return total / max(1, len(wrench) - 1)
+
+
+def model_of(demonstration: Demonstration) -> WrenchModel:
+    """The wrench model of one demonstration; sensor noise stated in its metadata wins over the estimate."""
+    model = estimate_model(demonstration.time, demonstration.wrench)
+    sensor = demonstration.meta.get("sensor")
+    if not isinstance(sensor, dict):
+        return model
+    stated = np.repeat([float(sensor.get("force_noise", 0.0) or 0.0), float(sensor.get("torque_noise", 0.0) or 0.0)], 3)
+    return WrenchModel(noise=np.where(stated > 0.0, stated, model.noise), walk=model.walk)

@@ -1,0 +1,125 @@
+"""A whole demonstration conditioned after the fact: bias and tool weight removed, wrench filtered or smoothed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from skillframe.conditioning.contact import first_free_air
+from skillframe.conditioning.kalman import WrenchFilter, WrenchModel
+from skillframe.conditioning.noise import model_of, noise_figures
+from skillframe.conditioning.payload import Payload, gravity_in_tool, identify_payload
+from skillframe.demonstration.record import Demonstration
+from skillframe.errors import InputError
+from skillframe.frames import Float, rotate_spatial
+
+METHODS = ("smoother", "filter", "none")
+LEAST_STRETCH = 0.2
+
+
+class Removed(NamedTuple):
+    """A demonstration without bias (and weight), and what was taken off.
+
+    Attributes:
+        demonstration: what remains.
+        payload: what was identified; `mass` is 0 where only the bias was removed.
+        stretch: the free-air stretch that was used [s].
+    """
+
+    demonstration: Demonstration
+    payload: Payload
+    stretch: tuple[float, float]
+
+
+def smooth(demonstration: Demonstration, model: WrenchModel | None = None) -> Demonstration:
+    """The demonstration with its wrench smoothed over time (Rauch-Tung-Striebel), which shifts nothing in time.
+
+    Args:
+        demonstration: as recorded.
+        model: noise figures; estimated from the recording if not given.
+    """
+    return _with_filter(demonstration, model, "smoother")
+
+
+def filter_wrench(demonstration: Demonstration, model: WrenchModel | None = None) -> Demonstration:
+    """The demonstration with its wrench filtered as the loop would, causally; arguments as `smooth`."""
+    return _with_filter(demonstration, model, "filter")
+
+
+def _with_filter(demonstration: Demonstration, model: WrenchModel | None, method: str) -> Demonstration:
+    model = model or model_of(demonstration)
+    dt = 1.0 / demonstration.rate
+    design = WrenchFilter(model, dt)
+    run = design.smooth if method == "smoother" else design.filter
+    said = {"method": method, "noise": model.noise.tolist(), "corner_hz": model.corner(dt).tolist()}
+    wrench = run(demonstration.time, demonstration.wrench)
+    return replace(demonstration, wrench=wrench, meta=_noted(demonstration.meta, said))
+
+
+def _noted(meta: dict[str, Any], said: dict[str, Any]) -> dict[str, Any]:
+    return {**meta, "conditioning": {**meta.get("conditioning", {}), **said}}
+
+
+def remove_bias(
+    demonstration: Demonstration, stretch: tuple[float, float] | None = None, weight: bool | None = None
+) -> Removed:
+    """Bias, and the tool's weight where it is in the wrench, identified in free air and taken off throughout.
+
+    Args:
+        demonstration: as recorded.
+        stretch: free-air stretch [s]; by default all of it if the metadata says `contact = false`, else from the start
+            to the first contact.
+        weight: whether the wrench holds the tool's weight; the metadata's word if not given.
+
+    Raises:
+        InputError: the stretch is shorter than 0.2 s.
+    """
+    d = demonstration
+    stretch = stretch or _free_air(d)
+    inside = (d.time >= stretch[0]) & (d.time <= stretch[1])
+    if stretch[1] - stretch[0] < LEAST_STRETCH or inside.sum() < 2:
+        raise InputError(
+            d.source or "demonstration",
+            f"free air from {stretch[0]:.3g} to {stretch[1]:.3g} s is too short to find a bias",
+            "name a stretch without contact (--free-air FROM,TO), or leave the bias (--no-bias)",
+        )  # fmt: skip
+    said = d.meta.get("wrench", {})
+    weight = bool(said.get("includes_tool_weight")) if weight is None else weight
+    payload = payload_of(d, inside)
+    if not weight:
+        payload = _without_mass(d, inside, payload)
+    wrench = d.wrench - payload.wrench(d.pose.rotation)
+    meta = _noted(d.meta, {"free_air_s": list(stretch), "payload": payload.as_meta()})
+    if weight and not payload.mass:
+        meta = {**meta, "wrench": {**said, "includes_tool_weight": True}}
+    elif "includes_tool_weight" in said or weight:
+        meta = {**meta, "wrench": {**said, "includes_tool_weight": False}}
+    return Removed(replace(d, wrench=wrench, meta=meta), payload, stretch)
+
+
+def payload_of(demonstration: Demonstration, inside: Any) -> Payload:
+    """Payload identified over chosen samples, in tool axes."""
+    rotation = demonstration.pose.rotation[inside]
+    back = np.swapaxes(rotation, -1, -2)
+    return identify_payload(rotate_spatial(back, demonstration.wrench[inside]), gravity_in_tool(rotation))
+
+
+def _without_mass(demonstration: Demonstration, inside: Any, payload: Payload) -> Payload:
+    """The bias alone: the weight was removed before."""
+    back = np.swapaxes(demonstration.pose.rotation[inside], -1, -2)
+    reading: Float = rotate_spatial(back, demonstration.wrench[inside])
+    bias = reading.mean(axis=0)
+    left = np.sqrt(np.mean((reading - bias) ** 2, axis=0))
+    force, torque = float(np.sqrt((left[:3] ** 2).mean())), float(np.sqrt((left[3:] ** 2).mean()))
+    return replace(
+        payload, bias=bias, mass=0.0, com=np.zeros(3), residual_force=force, residual_torque=torque, advice=""
+    )
+
+
+def _free_air(demonstration: Demonstration) -> tuple[float, float]:
+    d = demonstration
+    if d.meta.get("contact") is False:
+        return float(d.time[0]), float(d.time[-1])
+    return first_free_air(d.time, d.wrench, noise_figures(d.time, d.wrench))

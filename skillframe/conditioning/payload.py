@@ -1,0 +1,168 @@
+r"""Bias and tool weight from poses without contact, by least squares.
+
+In tool axes, with the tool's attitude R (tool to base) and gravity \(g_t = R^T g\), a wrench sensor in free air reads
+
+    F = b_F + m g_t,        T = b_T + h x g_t,   h = m c                                            (1)
+
+m being the mass beyond the sensor, c its centre of mass and b the bias. Both lines are linear in (m, b_F) and (h, b_T).
+They are separable only if the tool turns: about one horizontal axis for m, about two for all of c. The condition
+number of each problem (columns scaled to 1) says how well; the excitation is the angle by which \(g_t\) moves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from skillframe.demonstration.convention import GRAVITY, weight_wrench
+from skillframe.errors import InputError
+from skillframe.frames import Float, norm, rotate, rotate_spatial, skew
+
+LARGEST_CONDITION = 15.0
+"""Above it errors are magnified too much to tell weight from bias: gravity must turn by some 26 degrees. Our choice."""
+LEAST_MASS = 1e-3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Payload:
+    """What a sensor carries, in tool axes.
+
+    Attributes:
+        bias: (6,) force then torque [N, Nm]; holds the weight as well where it could not be separated.
+        mass: [kg]; 0 where it could not be separated from the bias.
+        com: (3,) centre of mass in the tool frame [m]; 0 where it could not be found.
+        residual_force: root mean square of the force left over, per axis [N].
+        residual_torque: the same of the torque [Nm].
+        condition: condition number of the force problem.
+        condition_torque: condition number of the torque problem.
+        turned: largest angle between two gravity directions in the tool [rad].
+        advice: what to do for a better answer; empty if the data suffice.
+    """
+
+    bias: Float
+    mass: float
+    com: Float
+    residual_force: float
+    residual_torque: float
+    condition: float
+    condition_torque: float
+    turned: float
+    advice: str
+
+    def wrench(self, rotation: Float) -> Float:
+        """Bias and weight (..., 6) in base axes at the tool point, for attitudes (..., 3, 3)."""
+        return rotate_spatial(rotation, self.bias) + weight_wrench(rotation, self.mass, self.com)
+
+    def as_meta(self) -> dict[str, Any]:
+        """Plain values for metadata and `--json`."""
+        return {
+            "bias": self.bias.tolist(), "mass_kg": self.mass, "com_m": self.com.tolist(),
+            "residual_force_n": self.residual_force, "residual_torque_nm": self.residual_torque,
+            "condition": self.condition, "condition_torque": self.condition_torque, "turned_rad": self.turned,
+            "advice": self.advice,
+        }  # fmt: skip
+
+
+class _Solution(NamedTuple):
+    first: Float
+    bias: Float
+    residual: float
+    condition: float
+
+
+def gravity_in_tool(rotation: Float, gravity: Float = GRAVITY) -> Float:
+    """Gravity (..., 3) in tool axes [m/s^2] for attitudes (..., 3, 3)."""
+    return rotate(np.swapaxes(rotation, -1, -2), gravity)
+
+
+def identify_payload(wrench: Float, gravity: Float) -> Payload:
+    """Bias, mass and centre of mass by equation (1).
+
+    Args:
+        wrench: (T, 6) readings without contact, tool axes [N, Nm].
+        gravity: (T, 3) gravity in tool axes [m/s^2].
+
+    Raises:
+        InputError: no samples.
+    """
+    if len(wrench) == 0:
+        raise InputError("payload", "no samples without contact", "name a stretch of free air")
+    force = _solve(gravity[:, :, None], wrench[:, :3])
+    torque = _solve(-skew(gravity), wrench[:, 3:])
+    advice = excitation_advice(gravity, force.condition, torque.condition)
+    turned = _turned(gravity)
+    if force.condition > LARGEST_CONDITION or force.first[0] < LEAST_MASS:
+        return _bias_alone(wrench, force.condition, torque.condition, turned, advice)
+    mass = float(force.first[0])
+    moment = torque.first if torque.condition <= LARGEST_CONDITION else _damped_moment(wrench[:, 3:], gravity)
+    left = wrench[:, 3:] + np.einsum("tij,j->ti", skew(gravity), moment)
+    bias = np.concatenate([force.bias, left.mean(axis=0)])
+    return Payload(
+        bias=bias, mass=mass, com=moment / mass, residual_force=force.residual,
+        residual_torque=float(np.sqrt(np.mean((left - bias[3:]) ** 2))), condition=force.condition,
+        condition_torque=torque.condition, turned=turned, advice=advice,
+    )  # fmt: skip
+
+
+def _solve(design: Float, reading: Float) -> _Solution:
+    """Least squares of reading = design first + bias, over all samples; the scaled condition number with it."""
+    count = design.shape[-1]
+    columns = np.concatenate([design / 9.81, np.broadcast_to(np.eye(3), (*design.shape[:1], 3, 3))], axis=-1).reshape(
+        -1, count + 3
+    )
+    solution, _, _, values = np.linalg.lstsq(columns, reading.ravel(), rcond=1e-12)
+    residual = float(np.sqrt(np.mean((columns @ solution - reading.ravel()) ** 2)))
+    condition = float(values[0] / values[-1]) if values[-1] > 0.0 else float("inf")
+    return _Solution(solution[:count] / 9.81, solution[count:], residual, condition)
+
+
+def _damped_moment(torque: Float, gravity: Float) -> Float:
+    """The part of h that the data show: least squares without the directions that are magnified too much."""
+    turned = -skew(gravity - gravity.mean(axis=0))
+    u, s, vt = np.linalg.svd(turned.reshape(-1, 3), full_matrices=False)
+    keep = s > s.max() / LARGEST_CONDITION if s.max() > 0.0 else np.zeros(3, dtype=bool)
+    target = u.T @ (torque - torque.mean(axis=0)).ravel()
+    return np.asarray(vt[keep].T @ (target[keep] / s[keep]))
+
+
+def _bias_alone(wrench: Float, condition: float, condition_torque: float, turned: float, advice: str) -> Payload:
+    """The mean reading, weight included, where the tool did not turn."""
+    bias = wrench.mean(axis=0)
+    left = wrench - bias
+    return Payload(
+        bias=bias, mass=0.0, com=np.zeros(3), residual_force=float(np.sqrt(np.mean(left[:, :3] ** 2))),
+        residual_torque=float(np.sqrt(np.mean(left[:, 3:] ** 2))), condition=condition,
+        condition_torque=condition_torque, turned=turned, advice=advice,
+    )  # fmt: skip
+
+
+def _turned(gravity: Float) -> float:
+    """Largest angle between the mean gravity direction and a sample's, both ways [rad]."""
+    direction = gravity / norm(gravity)[:, None]
+    far = direction[np.argmin(direction @ direction[0])]
+    return float(np.arccos(np.clip((direction @ far).min(), -1.0, 1.0)))
+
+
+def excitation_advice(gravity: Float, condition: float, condition_torque: float) -> str:
+    """Which axis to turn about, if the data do not tell weight from bias.
+
+    Gravity that moved along d in the tool says nothing of c along d; turning about d moves it across.
+    """
+    middle = gravity.mean(axis=0)
+    spread = np.linalg.svd((gravity - middle) / 9.81, full_matrices=False)[2]
+    if condition > LARGEST_CONDITION:
+        axis = "xyz"[int(np.argmin(np.abs(middle)))]
+        return (
+            f"the tool turned gravity by only {np.rad2deg(_turned(gravity)):.0f} degrees, so weight and bias cannot be "
+            f"told apart: turn it by 30 degrees or more about its {axis} axis, then about another horizontal one, in "
+            "free air"
+        )
+    if condition_torque > LARGEST_CONDITION:
+        axis = "xyz"[int(np.argmax(np.abs(spread[0])))]
+        return (
+            f"the centre of mass along the tool's {axis} axis cannot be told from the torque bias: turn the tool by "
+            f"30 degrees or more about its {axis} axis as well, in free air"
+        )
+    return ""

@@ -1,0 +1,187 @@
+"""The audit of a demonstration: what it holds, how clean it is, and what looks wrong, with evidence.
+
+Refusals happen at reading (`checks`); here everything is a figure or a warning. A recording in which nothing moves
+holds nothing to learn: it is not `usable`, and `demonstration check` answers no (exit code 1).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from skillframe.conditioning.contact import (
+    LEVEL_TIME,
+    Contact,
+    contact_intervals,
+    contact_threshold,
+    free_air_level,
+)
+from skillframe.conditioning.noise import LEAST_SAMPLES, NoiseFigures, noise_figures
+from skillframe.demonstration.assemble import NOTES
+from skillframe.demonstration.checks import GAP, angles_between
+from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration.suspicions import AUDITS, spike_indices
+from skillframe.frames import Float, norm
+
+LEAST_BIAS = np.repeat([0.5, 0.05], 3)
+LEAST_PATH, LEAST_TURN = 1e-4, np.deg2rad(0.1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Audit:
+    """Figures and warnings of one demonstration.
+
+    Attributes:
+        file: where it was read from.
+        samples: number of rows.
+        duration_s: first to last sample.
+        rate_hz: median rate.
+        jitter: standard deviation of the clock's steps over the period, gaps left out.
+        gaps: [start, length] of steps beyond three periods [s].
+        path_m: length of the tool point's path, sampled at 20 Hz.
+        turned_rad: the same of the attitude.
+        frames: names of points that the metadata define.
+        wrench: what the metadata say about it.
+        bias: (6,) mean of the first 0.25 s, taken as free air [N, Nm].
+        noise: (6,) scatter in the quietest quarter of the recording.
+        noise_typical: (6,) median scatter.
+        drift: (6,) free-air level at the end less that at the start; None unless it ends in free air.
+        spikes: number of samples that stand out of their neighbours.
+        peak_force_n: largest force.
+        contact_threshold_n: force above the free-air level that counts as contact.
+        contacts: [start, stop, peak] of every contact [s, s, N].
+        notes: what the reader did.
+        warnings: sentences with evidence.
+        usable: whether there is anything to learn from.
+    """
+
+    file: str
+    samples: int
+    duration_s: float
+    rate_hz: float
+    jitter: float
+    gaps: list[list[float]]
+    path_m: float
+    turned_rad: float
+    frames: list[str]
+    wrench: dict[str, Any]
+    bias: list[float]
+    noise: list[float]
+    noise_typical: list[float]
+    drift: list[float] | None
+    spikes: int
+    peak_force_n: float
+    contact_threshold_n: float
+    contacts: list[list[float]]
+    notes: list[str]
+    warnings: list[str]
+    usable: bool
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain JSON values."""
+        return dataclasses.asdict(self)
+
+
+def audit(demonstration: Demonstration) -> Audit:
+    """Look through a demonstration.
+
+    Args:
+        demonstration: as read, in the contract's convention.
+    """
+    d = demonstration
+    step = np.diff(d.time)
+    period = float(np.median(step))
+    noise = _noise(d)
+    level = free_air_level(d.time, d.wrench)
+    contacts = contact_intervals(d.time, d.wrench, noise, level)
+    drift = _drift(d, contacts)
+    path, turned = _travel(d)
+    usable = path > LEAST_PATH or turned > LEAST_TURN
+    warnings = [text for suspicion in AUDITS for text in suspicion(d)]
+    warnings += _wrench_warnings(d, noise, level, drift, contacts)
+    if not usable:
+        warnings.append(
+            f"motion: the tool moves by {path * 1e3:.3f} mm and {np.rad2deg(turned):.3f} degrees: nothing to learn"
+        )
+    return Audit(
+        file=d.source, samples=len(d), duration_s=d.duration, rate_hz=d.rate,
+        jitter=float(np.std(step[step < GAP * period]) / period),
+        gaps=[[float(d.time[i]), float(step[i])] for i in np.flatnonzero(step > GAP * period)],
+        path_m=path, turned_rad=turned, frames=sorted(d.meta.get("frames", {})), wrench=dict(d.meta.get("wrench", {})),
+        bias=level.tolist(), noise=noise.quiet.tolist(), noise_typical=noise.typical.tolist(),
+        drift=None if drift is None else drift.tolist(), spikes=len(spike_indices(d.wrench[:, :3])),
+        peak_force_n=float(norm(d.wrench[:, :3]).max()),
+        contact_threshold_n=contact_threshold(noise, norm(d.wrench[:, :3] - level[:3])),
+        contacts=[list(contact) for contact in contacts], notes=list(d.meta.get(NOTES, [])), warnings=warnings,
+        usable=usable,
+    )  # fmt: skip
+
+
+def _noise(d: Demonstration) -> NoiseFigures:
+    """Noise figures, or zeros where a recording is too short for any."""
+    if len(d) < LEAST_SAMPLES:
+        return NoiseFigures(np.zeros(6), np.zeros(6), float(d.time[0]))
+    return noise_figures(d.time, d.wrench)
+
+
+def _travel(d: Demonstration) -> tuple[float, float]:
+    """Path [m] and turning [rad], at 20 Hz so that noise does not add up."""
+    stride = max(1, min(round(d.rate / 20.0), len(d) // 2))
+    pick = np.r_[np.arange(0, len(d) - 1, stride), len(d) - 1]
+    path = float(norm(np.diff(d.position[pick], axis=0)).sum())
+    return path, float(angles_between(d.pose.rotation[pick]).sum())
+
+
+def _drift(d: Demonstration, contacts: list[Contact]) -> Float | None:
+    """Change of the free-air level, if the recording ends at rest out of contact."""
+    if not contacts or d.time[-1] - contacts[-1].stop < 2.0 * LEVEL_TIME or d.duration < 4.0 * LEVEL_TIME:
+        return None
+    first = free_air_level(d.time, d.wrench)
+    last = free_air_level(d.time, d.wrench, (float(d.time[-1]) - LEVEL_TIME, float(d.time[-1])))
+    return last - first
+
+
+def _wrench_warnings(
+    d: Demonstration, noise: NoiseFigures, level: Float, drift: Float | None, contacts: list[Contact]
+) -> list[str]:
+    result = []
+    force, torque = norm(level[:3]), norm(level[3:])
+    if force > max(LEAST_BIAS[0], 5.0 * norm(noise.quiet[:3])) or torque > max(
+        LEAST_BIAS[3], 5.0 * norm(noise.quiet[3:])
+    ):
+        result.append(
+            f"bias: {force:.2f} N and {torque:.3f} Nm in the first {LEVEL_TIME:g} s: bias, weight, or it starts in "
+            "contact; `skillframe condition` removes it"
+        )
+    if drift is not None and np.any(np.abs(drift) > np.maximum(LEAST_BIAS, 5.0 * noise.quiet)):
+        result.append(
+            f"drift: the free-air level moved by {norm(drift[:3]):.2f} N and {norm(drift[3:]):.3f} Nm "
+            f"in {d.duration:.1f} s"
+        )
+    if not contacts and d.meta.get("contact") is not False:
+        result.append("contact: none found; say contact = false in the metadata if there was none on purpose")
+    return result
+
+
+def odd_ones(demonstrations: list[Demonstration], audits: list[Audit]) -> list[Audit]:
+    """Audits of one set, with a warning where one of three or more goes another way than the rest.
+
+    The way is the direction from the first to the last tool point; odd is more than 15 degrees from the others' mean
+    and at least three times as far as their typical member.
+    """
+    ways = [d.position[-1] - d.position[0] for d in demonstrations]
+    if len(ways) < 3 or min(float(norm(w)) for w in ways) < 0.01:
+        return audits
+    unit = np.array([w / norm(w) for w in ways])
+    rest = unit.sum(axis=0) - unit
+    angles = np.arccos(np.clip((unit * rest).sum(axis=1) / np.maximum(norm(rest), 1e-9), -1.0, 1.0))
+    typical = float(np.median(angles))
+    said = [f"direction: {np.rad2deg(angle):.0f} degrees off the other recordings' mean" for angle in angles]
+    odd = angles > max(np.deg2rad(15.0), 3.0 * typical)
+    return [
+        dataclasses.replace(a, warnings=[*a.warnings, text]) if is_odd else a
+        for a, text, is_odd in zip(audits, said, odd, strict=True)
+    ]

@@ -1,0 +1,133 @@
+"""What data only suggest: sentences with their evidence, never refusals. Thresholds are our choice.
+
+Each function looks at one demonstration in the contract's convention and yields warnings; `AUDITS` lists them all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from skillframe.demonstration.checks import GAP
+from skillframe.demonstration.columns import WRENCH
+from skillframe.demonstration.contradiction import WORK_COSINE, weight_evidence, work_cosine
+from skillframe.demonstration.record import Demonstration
+from skillframe.frames import Float, norm
+
+Suspicion = Callable[[Demonstration], Iterator[str]]
+FARTHEST, FASTEST = 20.0, 10.0
+LARGEST_FORCE, LONGEST_LEVER = 2e4, 3.0
+SPIKE_SIGMAS, SPIKE_FORCE, SPIKE_WIDTH = 12.0, 5.0, 9
+
+
+def clock(d: Demonstration) -> Iterator[str]:
+    """Gaps, jitter, a rate that contradicts the metadata, a unit of time that cannot be."""
+    step = np.diff(d.time)
+    period = float(np.median(step))
+    gaps = np.flatnonzero(step > GAP * period)
+    if gaps.size:
+        longest = int(gaps[np.argmax(step[gaps])])
+        yield (
+            f"gaps: {gaps.size} of more than {GAP:g} periods, the longest {step[longest]:.3g} s "
+            f"at t = {d.time[longest]:.3f} s"
+        )
+    jitter = float(np.std(step[step < GAP * period]) / period)
+    if jitter > 0.1:
+        yield f"jitter: steps of the clock scatter by {jitter:.0%} of the period"
+    if not 5.0 <= d.rate <= 2e4:
+        yield f"rate: {d.rate:.3g} Hz over {d.duration:.4g} s looks like another unit of time; see --units"
+    stated = d.meta.get("rate")
+    if isinstance(stated, int | float) and stated > 0 and abs(d.rate / stated - 1.0) > 0.05:
+        yield f"rate: the metadata says {stated:g} Hz, the clock {d.rate:.4g} Hz"
+
+
+def quaternions(d: Demonstration) -> Iterator[str]:
+    """Values that look w-first where neither header nor metadata say the order."""
+    if d.meta.get("quaternion") is not None:
+        return
+    q = d.quaternion
+    first, last = q[:, 0], q[:, 3]
+    if np.abs(first).min() > 0.9:
+        yield (
+            f"quaternion: the first value stays near 1 (|qx| >= {np.abs(first).min():.3f}): the tool is turned half "
+            'about x, or the values are w-first; say quaternion = "xyzw" in the metadata if they are right'
+        )
+    elif (first.min() >= 0.0 or first.max() <= 0.0) and last.min() < -0.01 and last.max() > 0.01:
+        yield "quaternion: qx never changes sign, but qw does: the values may be w-first"
+
+
+def motion(d: Demonstration) -> Iterator[str]:
+    """Positions in another unit, or that jump."""
+    far = float(np.abs(d.position).max())
+    if far > FARTHEST:
+        yield f"position: up to {far:.4g} m from the base; is it in millimetres (--units mm)?"
+    step, dt = norm(np.diff(d.position, axis=0)), np.diff(d.time)
+    fast = np.flatnonzero((step > FASTEST * dt) & (step > 0.02))
+    if fast.size:
+        worst = int(fast[np.argmax(step[fast])])
+        yield f"position: jumps by {step[worst] * 1e3:.1f} mm at t = {d.time[worst + 1]:.3f} s ({fast.size} jumps)"
+
+
+def channels(d: Demonstration) -> Iterator[str]:
+    """Channels that stand still, are copies of each other, or hold their value between fewer true samples."""
+    for i, name in enumerate(WRENCH):
+        if np.all(d.wrench[:, i] == d.wrench[0, i]):
+            yield f"{name}: is exactly {d.wrench[0, i]:g} throughout"
+    for i in range(6):
+        for j in range(i + 1, 6):
+            moves = np.any(d.wrench[:, i] != d.wrench[0, i])
+            if moves and np.array_equal(d.wrench[:, i], d.wrench[:, j]):
+                yield f"{WRENCH[i]} and {WRENCH[j]} are identical: was a column pasted twice?"
+    held = float(np.mean(np.all(d.wrench[1:] == d.wrench[:-1], axis=1)))
+    if held > 0.5:
+        yield f"wrench: {held:.0%} of the samples repeat the one before: its rate is about {d.rate * (1 - held):.3g} Hz"
+
+
+def magnitudes(d: Demonstration) -> Iterator[str]:
+    """Forces and torques that no tool stands."""
+    force, torque = norm(d.wrench[:, :3]), norm(d.wrench[:, 3:])
+    if force.max() > LARGEST_FORCE:
+        yield f"force: up to {force.max():.3g} N at t = {d.time[np.argmax(force)]:.3f} s; check its unit (--units)"
+    strong = force > 0.3 * force.max()
+    lever = float(np.median(torque[strong] / np.maximum(force[strong], 1e-9)))
+    if lever > LONGEST_LEVER and torque.max() > 0.0:
+        yield f"torque: a typical lever arm of {lever:.3g} m (|T| / |F|); check its unit (--units Nmm)"
+
+
+def spikes(d: Demonstration) -> Iterator[str]:
+    """Forces that stand out of their neighbours for one or two samples."""
+    found = spike_indices(d.wrench[:, :3])
+    if found.size:
+        strength = norm(d.wrench[found, :3])
+        worst = int(found[np.argmax(strength)])
+        yield f"spikes: {found.size} samples, the largest {strength.max():.1f} N at t = {d.time[worst]:.3f} s"
+
+
+def spike_indices(force: Float) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+    """Samples of (T, 3) farther than 5 N and 12 robust sigmas from the median of the nine around them."""
+    if len(force) < SPIKE_WIDTH:
+        return np.empty(0, dtype=np.intp)
+    half = SPIKE_WIDTH // 2
+    padded = np.pad(force, ((half, half), (0, 0)), mode="edge")
+    around = np.median(np.lib.stride_tricks.sliding_window_view(padded, SPIKE_WIDTH, axis=0), axis=-1)
+    away = norm(force - around)
+    sigma = 1.4826 * np.median(away)
+    return np.flatnonzero(away > max(SPIKE_FORCE, SPIKE_SIGMAS * sigma))
+
+
+def frame_and_sign(d: Demonstration) -> Iterator[str]:
+    """A wrench that looks like one of tool axes, or like the teacher's own."""
+    evidence = weight_evidence(d.wrench[:, :3], d.pose.rotation, "base")
+    if evidence is not None:
+        yield f'wrench frame: {evidence}; is it in tool axes (wrench.frame = "tool")?'
+    cosine, path = work_cosine(d.position, d.wrench[:, :3], d.time)
+    if cosine > WORK_COSINE and path > 0.02:
+        yield (
+            f"wrench sign: it pushes the tool along ({cosine:+.0%} of |F||dx| over {path * 1e3:.0f} mm), which a "
+            'passive environment cannot: the teacher\'s force (wrench.sign = "teacher"), weight or bias in it, or '
+            "another frame"
+        )
+
+
+AUDITS: Sequence[Suspicion] = (clock, quaternions, motion, channels, magnitudes, spikes, frame_and_sign)
