@@ -113,7 +113,8 @@ def _points(shape: ET.Element, path: Path) -> Float | None:
     """Points that span a shape, in its own axes, or None where it cannot be measured."""
     corners = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
     if shape.tag == "box":
-        return corners * 0.5 * np.array(numbers(shape, "size", 3, _ZERO3))
+        extent: Float = 0.5 * np.array(numbers(shape, "size", 3, _ZERO3))
+        return np.asarray(corners * extent)
     if shape.tag == "mesh":
         file = resolve_mesh(shape.get("filename", ""), path)
         vertices = mesh_vertices(file) if file else None

@@ -1,0 +1,82 @@
+"""robot.toml: what is read, what is refused, and with which sentence."""
+
+import subprocess
+import sys
+
+import pytest
+
+from skillframe.errors import InputError, UnknownName
+from skillframe.robot.spec import load_robot, robot_names
+
+
+def test_shipped_robots_are_found_by_name():
+    assert {"free_tool", "panda"} <= set(robot_names())
+    panda = load_robot("panda")
+    assert (panda.name, panda.base, panda.arm[0].tool_frame) == ("panda", "fixed", "flange")
+    assert load_robot(panda.folder) == load_robot(panda.folder / "robot.toml") == panda
+
+
+def test_a_name_with_a_typo_gets_a_suggestion():
+    with pytest.raises(UnknownName, match="did you mean 'panda'"):
+        load_robot("pnada")
+
+
+def test_a_users_own_robots_come_before_the_shipped_ones(save, urdf, tmp_path, monkeypatch):
+    toml = save(urdf.tree(0, 2), "", name="panda")
+    (tmp_path / "robots").mkdir()
+    toml.parent.rename(tmp_path / "robots" / "panda")
+    monkeypatch.setenv("SKILLFRAME_PATH", str(tmp_path))
+    assert load_robot("panda").folder == tmp_path / "robots" / "panda"
+
+
+def test_a_bare_urdf_is_a_robot_on_a_fixed_base_without_arms(save, urdf):
+    spec = load_robot(save(urdf.tree(0, 2)))
+    assert (spec.base, spec.arm, spec.mimic) == ("fixed", (), True)
+    with pytest.raises(InputError, match="names no arm"):
+        spec.require_simulated()
+
+
+@pytest.mark.parametrize(
+    ("toml", "sentence"),
+    [
+        ('bsae = "free"', "did you mean 'base'"),
+        ('base = "floating"', "unknown value 'floating'"),
+        ("[limits]\nforce_n = -3.0", "positive"),
+        ("[limits]\nworkspace_m = [[0, 0, 0], [1, 1, 0]]", "lower corner first"),
+        ("[home]\nj = inf", "finite"),
+        ("[[arm]]\nname = 'a'\ntool_frame = 'x'\n[[arm]]\nname = 'a'\ntool_frame = 'y'", "two arms"),
+        ("[inertia]\nl0 = { mass = 1.0 }", "missing inertia"),
+        ("mimic = 1", "expected bool"),
+        ("[control]\nrate_hz = 0", "positive"),
+    ],
+)
+def test_a_robot_toml_that_says_something_impossible_is_refused_with_its_key(save, urdf, toml, sentence):
+    with pytest.raises(InputError, match=sentence):
+        load_robot(save(urdf.tree(0, 2), toml))
+
+
+def test_a_missing_urdf_and_a_missing_file_are_named(save, urdf, tmp_path):
+    toml = save(urdf.tree(0, 2), "")
+    toml.with_name("made.urdf").unlink()
+    with pytest.raises(InputError, match=r"made\.urdf"):
+        load_robot(toml)
+    with pytest.raises(InputError, match="no such file"):
+        load_robot(tmp_path / "nowhere" / "robot.urdf")
+
+
+@pytest.mark.parametrize("key", ["loop", "actuation"])
+def test_loops_and_actuators_are_kept_and_refused_when_a_plant_is_asked_for(save, urdf, key):
+    entries = {
+        "loop": 'frame_a = "a"\nframe_b = "b"',
+        "actuation": 'joint = "j"\nfmu = "x"\nparameters = { bore = 0.08 }',
+    }
+    spec = load_robot(save(urdf.tree(0, 2), f"[[{key}]]\n{entries[key]}"))
+    assert len(getattr(spec, key)) == 1
+    with pytest.raises(InputError, match="not simulated yet"):
+        spec.require_simulated()
+
+
+def test_reading_a_spec_loads_no_robot_library():
+    code = "import sys; from skillframe.robot import load_robot; load_robot('panda'); print('pinocchio' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
