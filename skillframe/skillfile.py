@@ -12,13 +12,13 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from skillframe import __version__
 from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration.safe import replace_file
 from skillframe.errors import InputError, UnknownName
 from skillframe.records import Document, SkillType
 from skillframe.registry import registry
@@ -84,15 +84,7 @@ def save(document: Document, path: Path) -> None:
         InputError: the document breaks the layout, or the file cannot be written.
     """
     _check(document, str(path))
-    text = to_text(document)
-    temporary = path.with_name(path.name + ".tmp")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise InputError(path, f"cannot be written ({error.strerror})", "choose a folder you may write to") from None
+    replace_file(path, to_text(document).encode())
 
 
 def to_text(document: Document) -> str:
