@@ -8,7 +8,6 @@ holds the interpreter's lock; a hang thus becomes a death like any other.
 
 from __future__ import annotations
 
-import faulthandler
 import logging
 import tempfile
 from collections.abc import Callable
@@ -19,6 +18,7 @@ from typing import Any
 
 from skillframe.campaign.driver import Answer, Died, Evaluate, Raised
 from skillframe.campaign.rows import ChunkJob, Row
+from skillframe.campaign.worker import guarded
 from skillframe.errors import SkillframeError
 
 THREADS = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
@@ -28,25 +28,6 @@ _MEMORY_LOGGER = "distributed.nanny.memory"
 
 class SchedulerError(SkillframeError):
     """A cluster that cannot be used; says why."""
-
-
-def guarded(evaluate: Evaluate, job: ChunkJob, seconds: float, watch: str) -> list[Row]:
-    """Run a job in a worker; after some seconds the worker is ended and what it was doing is written to a file.
-
-    Args:
-        evaluate: the work.
-        job: its argument.
-        seconds: wall time after which the worker ends itself.
-        watch: path of the file, removed if the job ends in time.
-    """
-    path = Path(watch)
-    with path.open("w", encoding="utf-8") as file:
-        faulthandler.dump_traceback_later(seconds, exit=True, file=file)
-        try:
-            return evaluate(job)
-        finally:
-            faulthandler.cancel_dump_traceback_later()
-            path.unlink(missing_ok=True)
 
 
 class _MemoryDeaths(logging.Handler):
@@ -122,6 +103,7 @@ class ClusterPool:
         cluster = LocalCluster(
             n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, host="127.0.0.1",
             silence_logs=logging.CRITICAL, memory_limit=memory_bytes or MEMORY_LIMIT // (workers + 1), env=THREADS,
+            preload=["skillframe.campaign.worker"],
         )  # fmt: skip
         self._stack.enter_context(cluster)
         return self._stack.enter_context(Client(cluster, set_as_default=False))

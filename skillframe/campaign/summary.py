@@ -84,7 +84,8 @@ def summarize(
         stop_after: last trial of a campaign that stopped early.
         hashes: of the campaign and of its files.
     """
-    last = sessions[-1] if sessions else {}
+    opened = [session for session in sessions if "environment" in session]
+    last = opened[-1] if opened else {}
     return {
         "format": FORMAT,
         "version": VERSION,
@@ -100,7 +101,7 @@ def summarize(
         "wall_s": sum(s.get("wall_s", 0.0) for s in sessions),
         "workers": last.get("workers"),
         "versions": last.get("environment", {}),
-        "sessions": len([s for s in sessions if "environment" in s]),
+        "sessions": len(opened),
         "hashes": dict(hashes),
     }
 

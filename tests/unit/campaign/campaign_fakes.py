@@ -74,7 +74,8 @@ def good(job):
     rows = rows_of(spec, job.skill, job.trials, {
         "success": success, "failure": np.where(success, "", "stuck"), "duration_s": 2.0 + reach,
         "peak_force_n": np.where(success, 10.0 + noise, np.nan), "final_error_m": reach / 7.0,
-        "final_error_rad": np.zeros(len(reach)), "status": np.where(success, 1, 2), "reason": np.where(success, "done", ""),
+        "final_error_rad": np.zeros(len(reach)), "status": np.where(success, 1, 2),
+        "reason": np.where(success, "done", ""),
     })  # fmt: skip
     for row in rows if job.traces else ():
         row[TRACE] = f"trace of {row['trial']}".encode()

@@ -1,0 +1,135 @@
+import os
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import campaign_fakes as fakes
+import psutil
+import pytest
+
+from skillframe.campaign.cluster import SchedulerError
+
+LIMITS = {"workers": 2, "chunk": 16, "time_limit_s": 3.0, "memory_bytes": 400_000_000, "traces": 0}
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("reference")
+    out = fakes.start(fakes.write_campaign(folder), folder / "out")
+    fakes.run(out, traces=0)
+    return (out / "results.csv").read_bytes()
+
+
+@pytest.fixture
+def out(campaign, tmp_path):
+    return fakes.start(campaign(), tmp_path / "out")
+
+
+def workers_of_this_process():
+    return [c for c in psutil.Process().children(recursive=True) if "spawn_main" in " ".join(c.cmdline())]
+
+
+def changed(out, reference):
+    mine = (out / "results.csv").read_bytes()
+    return [a for a, b in zip(mine.splitlines(), reference.splitlines(), strict=True) if a != b]
+
+
+def test_workers_give_the_table_of_one_process_listen_on_the_local_host_only_and_end(out, reference):
+    listening = set()
+
+    def look(progress):
+        for process in [psutil.Process(), *psutil.Process().children(recursive=True)]:
+            listening.update(c.laddr.ip for c in process.net_connections() if c.status == psutil.CONN_LISTEN)
+
+    summary = fakes.run(out, fakes.slow, look, **LIMITS)
+    assert changed(out, reference) == []
+    assert summary["workers"] == 2
+    assert listening == {"127.0.0.1"}
+    assert workers_of_this_process() == []
+
+
+@pytest.mark.parametrize(
+    ("misbehave", "cause"),
+    [
+        (fakes.kills, b"worker died (killed)"),
+        pytest.param(fakes.hoards, b"worker died (memory)", marks=pytest.mark.slow),
+        pytest.param(fakes.raises, b"error: ValueError: the skill tripped", marks=pytest.mark.slow),
+        pytest.param(fakes.hangs, b"worker died (time limit)", marks=pytest.mark.slow),
+        pytest.param(fakes.hangs_holding_the_lock, b"worker died (time limit)", marks=pytest.mark.slow),
+    ],
+)
+def test_exactly_the_guilty_trial_is_named(out, reference, misbehave, cause):
+    summary = fakes.run(out, misbehave, **LIMITS)
+    (line,) = changed(out, reference)
+    assert line.startswith(b"37,a.skill.json,")
+    assert line.endswith(b",0," + cause + b",nan,nan,nan,nan")
+    assert summary["complete"]
+
+
+def test_a_hang_in_a_small_chunk_is_ended_and_named(out, reference):
+    fakes.run(out, fakes.hangs_holding_the_lock, **{**LIMITS, "chunk": 2, "time_limit_s": 1.0})
+    (line,) = changed(out, reference)
+    assert line.startswith(b"37,a.skill.json,")
+    assert b"worker died (time limit)" in line
+
+
+@pytest.mark.slow
+def test_a_trial_whose_worker_was_killed_once_is_not_blamed(out, reference):
+    fakes.run(out, fakes.dies_once, **LIMITS)
+    assert (out / "died").exists()
+    assert changed(out, reference) == []
+
+
+@pytest.mark.slow
+def test_workers_killed_from_outside_cost_time_only(out, reference):
+    victims = []
+
+    def kill_one(progress):
+        workers = workers_of_this_process()
+        if progress.done and len(victims) < 3 and workers:
+            victims.append(workers[0].pid)
+            os.kill(workers[0].pid, 9)
+
+    fakes.run(out, fakes.slow, kill_one, **LIMITS)
+    assert len(victims) == 3
+    assert changed(out, reference) == []
+
+
+def free_port():
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+@pytest.mark.slow
+def test_a_campaign_runs_on_a_scheduler_that_is_there_already(out, reference, tmp_path):
+    address = f"tcp://127.0.0.1:{free_port()}"
+    environment = {**os.environ, "PYTHONPATH": str(Path(fakes.__file__).parent)}
+    dask = [sys.executable, "-m", "distributed.cli"]
+    commands = [
+        [*dask[:2], "distributed.cli.dask_scheduler", "--host", address, "--no-dashboard", "--no-show"],
+        [*dask[:2], "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard",
+         "--local-directory", str(tmp_path)],
+    ]  # fmt: skip
+    processes = [
+        subprocess.Popen(c, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) for c in commands
+    ]
+    try:
+        fakes.run(out, fakes.good, scheduler=address, chunk=16, traces=0)
+    finally:
+        for process in reversed(processes):
+            process.terminate()
+        for process in processes:
+            process.wait(timeout=20)
+    assert changed(out, reference) == []
+
+
+def test_a_scheduler_that_does_not_answer_is_refused_and_the_folder_stays_usable(out, monkeypatch):
+    monkeypatch.setattr("skillframe.campaign.cluster.CONNECT_S", 1.0)
+    begin = time.monotonic()
+    with pytest.raises(SchedulerError, match="cannot be used"):
+        fakes.run(out, fakes.good, scheduler=f"tcp://127.0.0.1:{free_port()}")
+    assert time.monotonic() - begin < 20.0
+    assert fakes.run(out)["complete"]
