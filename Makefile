@@ -1,46 +1,59 @@
+# skillframe: `make demo` shows what it does, `make test` says whether it still does. Each target installs what it needs
+# into .venv, once.
+
 PYTHON ?= python3
+OUT ?= demo
 VENV := .venv
 BIN := $(VENV)/bin
-STAMP := $(VENV)/.installed
-PLUGINS := $(wildcard plugins/*/pyproject.toml)
-OUT ?= demo
+PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
+PYTEST := $(BIN)/python -m pytest -q --timeout 900
+PROJECTS := pyproject.toml plugins/all.txt $(wildcard plugins/*/pyproject.toml)
 
-.PHONY: demo install test test-core test-slow figures bench docs lint clean
+.PHONY: demo install test test-core test-all test-slow figures bench docs lint clean
 
-demo: $(STAMP)
+demo: install
 	$(BIN)/skillframe quickstart --out $(OUT)
 
-install: $(STAMP)
+install: $(VENV)/.installed
 
-$(STAMP): pyproject.toml plugins/all.txt $(PLUGINS)
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e . -r plugins/all.txt
-	touch $@
+$(VENV)/.installed: $(PROJECTS)
+	@$(BIN)/python -c "" 2>/dev/null || $(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11))" || \
+	  { echo "skillframe needs Python 3.11 or newer; type for example: make PYTHON=python3.12 demo"; exit 1; }
+	@$(PIP) --version >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(VENV) || \
+	  { echo "could not make $(VENV); on Debian and Ubuntu type: sudo apt install python3-venv"; exit 1; }
+	$(PIP) install -e . -r plugins/all.txt
+	@touch $@
 
-$(VENV)/.test: $(STAMP)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check "pip>=25.1"
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group test
-	touch $@
+$(VENV)/.test: $(VENV)/.installed
+	$(PIP) install "pip>=25.1"
+	$(PIP) install --group test
+	@touch $@
 
 $(VENV)/.dev: $(VENV)/.test
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group dev
-	touch $@
+	$(PIP) install --group dev
+	@touch $@
 
-test: $(VENV)/.test
-	SKILLFRAME_PLUGINS= $(BIN)/python -m pytest tests/unit -q -m "not slow and not figures and not needs_plugins"
-	$(BIN)/python -m pytest -q -m "not slow and not figures"
+test: test-core test-all
+
+# The core on its own: no plug-in is loaded.
+test-core: $(VENV)/.test
+	SKILLFRAME_PLUGINS= $(PYTEST) -m "not slow and not figures and not needs_plugins" tests/unit
+
+test-all: $(VENV)/.test
+	$(PYTEST) -m "not slow and not figures"
 
 test-slow: $(VENV)/.test
-	$(BIN)/python -m pytest -q -m "slow and not figures"
+	$(PYTEST) -m "slow and not figures"
 
 figures: $(VENV)/.test
-	$(BIN)/python -m pytest -q -s -m figures
+	$(PYTEST) -s -m figures
 
 bench: $(VENV)/.test
 	$(BIN)/python tests/benchmarks/run.py
 
 docs: $(VENV)/.dev
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	@echo "docs/_build/html/index.html"
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .

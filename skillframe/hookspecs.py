@@ -1,6 +1,6 @@
 """The five hooks a plug-in can implement; each yields records and runs once per process, never in the loop.
 
-A plug-in is a distribution with an entry point in the group `skillframe` that names a module:
+A plug-in is a distribution with an entry point in the group `skillframe` that names a module::
 
     from skillframe import hookimpl
     from skillframe.records import SkillType

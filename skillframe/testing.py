@@ -1,4 +1,4 @@
-"""For plug-in authors: conformance suites to inherit, and small skills to test with.
+"""For plug-in authors: conformance suites to inherit, and small skills to test with::
 
     from skillframe.testing import SkillConformance
 

@@ -303,22 +303,3 @@ def test_every_listing_command_has_json():
         if words and words[-1] == "list" and "--json" not in {o for p in c.params for o in p.opts}
     ]  # fmt: skip
     assert not lacking
-
-
-def test_every_example_in_help_names_a_command_and_options_that_exist():
-    known = {" ".join(words): command for words, command in every_command()}
-    wrong = []
-    for words, command in known.items():
-        for line in re.findall(r"^\s*(?:\$ )?skillframe (.+)$", command.help or "", re.MULTILINE):
-            wrong += _problems_of_example(line.split(), words, known)
-    assert not wrong, "\n".join(wrong)
-
-
-def _problems_of_example(parts, words, known):
-    name = ""
-    while parts and f"{name} {parts[0]}".strip() in known:
-        name = f"{name} {parts.pop(0)}".strip()
-    options = {o for p in known[name].params for o in [*p.opts, *p.secondary_opts]}
-    unknown = [part for part in parts if part.startswith("--") and part.partition("=")[0] not in options]
-    problems = [f"help of '{words}': its example gives '{name}' {option}, which does not exist" for option in unknown]
-    return problems + ([f"help of '{words}': no command in '{' '.join(parts)}'"] if not name else [])

@@ -1,16 +1,22 @@
-"""Shared by every test: what needs plug-ins is skipped where none may load; a registry can be loaded anew."""
+"""For every test, of the core and of plug-ins: what needs plug-ins is skipped where none may load."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
 
+import hypothesis
 import pytest
 
 from skillframe.registry import registry
 
+# A law that holds slowly on a loaded machine still holds; speed has its benchmarks.
+hypothesis.settings.register_profile("skillframe", deadline=None)
+hypothesis.settings.load_profile("skillframe")
+
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Skip what is marked `needs_plugins` where `SKILLFRAME_PLUGINS` is empty."""
     if os.environ.get("SKILLFRAME_PLUGINS") != "":
         return
     skip = pytest.mark.skip(reason="SKILLFRAME_PLUGINS is empty: no plug-in is loaded")

@@ -1,0 +1,19 @@
+r"""Docstrings write maths as LaTeX does, \(x\); Sphinx reads it as a role."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+MATHS = re.compile(r"\\\((.+?)\\\)", re.DOTALL)
+
+
+def mark(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
+    """Replace the maths of a docstring in place."""
+    lines[:] = MATHS.sub(r":math:`\1`", "\n".join(lines)).split("\n")
+
+
+def setup(app: Any) -> dict[str, bool]:
+    """Register with Sphinx."""
+    app.connect("autodoc-process-docstring", mark)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
