@@ -115,10 +115,11 @@ def simulate(
         SkillframeError: rates that do not divide.
     """
     check_quantities(draws)
-    loop = _Loop(skill, setup, draws, rngs, trace_hz)
-    loop.tare()
-    loop.run(duration_s, progress)
-    return loop.result()
+    with np.errstate(invalid="ignore", over="ignore"):  # a diverging trial is the limits' business, not a warning
+        loop = _Loop(skill, setup, draws, rngs, trace_hz)
+        loop.tare()
+        loop.run(duration_s, progress)
+        return loop.result()
 
 
 def _joint_limits(robot: RobotModel) -> Limits:

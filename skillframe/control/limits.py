@@ -10,6 +10,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -60,8 +62,8 @@ class LimitGuard:
         force, torque, speed = norm(wrench[:, :3]), norm(wrench[:, 3:]), norm(twist[:, :3])
         limits = self._limits
         fine = self._inside(position) & (speed <= SPEED_CEILING) & (self._saturated < RATE_PERSISTENCE)
-        fine &= (force <= _or_infinite(limits.force_n)) & (torque <= _or_infinite(limits.torque_n_m))
-        fine &= self.energy <= _or_infinite(limits.energy_j)
+        fine &= (force <= _or_largest(limits.force_n)) & (torque <= _or_largest(limits.torque_n_m))
+        fine &= self.energy <= _or_largest(limits.energy_j)
         if fine.all():
             return []
         values = np.concatenate([position, twist, wrench, command], axis=-1)
@@ -84,16 +86,17 @@ class LimitGuard:
             return "diverged: state or command is not a finite number"
         if speed > SPEED_CEILING:
             return f"diverged: the tool moves at {speed:.1f} m/s"
-        if force > _or_infinite(limits.force_n):
+        if force > _or_largest(limits.force_n):
             return f"force limit: {force:.1f} N is above {limits.force_n:g} N"
-        if torque > _or_infinite(limits.torque_n_m):
+        if torque > _or_largest(limits.torque_n_m):
             return f"torque limit: {torque:.2f} Nm is above {limits.torque_n_m:g} Nm"
         if self._saturated[i] >= RATE_PERSISTENCE:
             return f"torque rate limit: above {limits.torque_rate_nm_s:g} Nm/s for {RATE_PERSISTENCE} ticks"
-        if self.energy[i] > _or_infinite(limits.energy_j):
+        if self.energy[i] > _or_largest(limits.energy_j):
             return f"energy limit: {self.energy[i]:.2f} J put into the tool, above {limits.energy_j:g} J"
         return f"workspace limit: tool point at {np.round(values[:3], 3).tolist()} m"
 
 
-def _or_infinite(limit: float | None) -> float:
-    return np.inf if limit is None else limit
+def _or_largest(limit: float | None) -> float:
+    """A limit, or the largest finite number, so that what is infinite or not a number is above every limit."""
+    return sys.float_info.max if limit is None else limit

@@ -1,0 +1,124 @@
+import numpy as np
+import pytest
+
+from skillframe.control.limits import RATE_PERSISTENCE, SPEED_CEILING, LimitGuard
+from skillframe.robot.spec import Limits
+
+NONE = {"force_n": None, "torque_rate_nm_s": None}
+DT = 1e-3
+
+
+def guard(count=1, **limits):
+    return LimitGuard(Limits(**{**NONE, **limits}), count, DT)
+
+
+def check(limit_guard, position=(0.0, 0.0, 0.0), twist=np.zeros(6), wrench=np.zeros(6), command=np.zeros(6), count=1):
+    def rows(value):
+        return np.broadcast_to(np.asarray(value, dtype=float), (count, np.shape(value)[-1]))
+
+    found = limit_guard.violations(rows(position), rows(twist), rows(wrench), rows(command), np.arange(count))
+    return [cause for _, cause in found]
+
+
+@pytest.mark.parametrize(
+    ("limits", "axis", "below", "above", "text"),
+    [
+        ({"force_n": 80.0}, 1, 79.9, 80.1, "force limit: 80.1 N is above 80 N"),
+        ({"torque_n_m": 5.0}, 4, 4.99, 5.01, "torque limit: 5.01 Nm is above 5 Nm"),
+    ],
+)
+def test_a_wrench_above_its_limit_stops_the_trial_and_one_just_below_does_not(limits, axis, below, above, text):
+    wrench = np.zeros(6)
+    wrench[axis] = below
+    assert check(guard(**limits), wrench=wrench) == []
+    wrench[axis] = -above
+    assert check(guard(**limits), wrench=wrench) == [text]
+
+
+def test_the_workspace_is_a_closed_box():
+    box = ((-0.1, -0.1, 0.0), (0.1, 0.1, 0.5))
+    assert check(guard(workspace_m=box), position=(0.1, -0.1, 0.5)) == []
+    for outside in ((0.101, 0.0, 0.2), (0.0, -0.101, 0.2), (0.0, 0.0, -0.001)):
+        (cause,) = check(guard(workspace_m=box), position=outside)
+        assert cause == f"workspace limit: tool point at {list(outside)} m"
+
+
+def test_energy_is_the_work_of_the_law_on_the_tool():
+    """10 N along 0.1 m/s is 1 W: 1 J after 1000 ticks of 1 ms."""
+    twist, push = np.array([0.1, 0, 0, 0, 0, 0]), np.array([10.0, 0, 0, 0, 0, 0])
+    limited = guard(energy_j=0.9995)
+    for tick in range(1000):
+        causes = check(limited, twist=twist, command=push)
+        assert bool(causes) == (tick >= 999)
+    assert causes == ["energy limit: 1.00 J put into the tool, above 0.9995 J"]
+    np.testing.assert_allclose(limited.energy, 1.0)
+
+
+@pytest.mark.parametrize("what", ["position", "twist", "wrench", "command"])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_number_that_is_not_finite_is_a_divergence(what, value):
+    row = np.zeros(3 if what == "position" else 6)
+    row[1] = value
+    # an infinite position is the workspace's and the law's business; its law is not finite, which is what is seen
+    others = {"command": np.full(6, np.nan), "twist": np.ones(6)} if what == "position" else {"twist": np.ones(6)}
+    with np.errstate(invalid="ignore"):  # as the executor runs it
+        assert check(guard(), **{**others, what: row}) == ["diverged: state or command is not a finite number"]
+
+
+def test_a_tool_faster_than_the_ceiling_is_a_divergence():
+    assert check(guard(), twist=np.array([0.99 * SPEED_CEILING, 0, 0, 0, 0, 0])) == []
+    (cause,) = check(guard(), twist=np.array([0, 1.01 * SPEED_CEILING, 0, 0, 0, 0]))
+    assert cause == f"diverged: the tool moves at {1.01 * SPEED_CEILING:.1f} m/s"
+
+
+def test_torques_are_held_to_their_rate_joint_by_joint():
+    limited = guard(torque_rate_nm_s=1000.0)
+    np.testing.assert_array_equal(limited.rate_limited(np.array([[5.0, 5.0]])), [[5.0, 5.0]])
+    np.testing.assert_array_equal(limited.rate_limited(np.array([[5.5, 9.0]])), [[5.5, 6.0]])
+    np.testing.assert_array_equal(limited.rate_limited(np.array([[5.5, 3.0]])), [[5.5, 5.0]])
+
+
+def run_ramp(rate, ticks):
+    limited = guard(torque_rate_nm_s=1000.0)
+    for tick in range(ticks + 1):
+        limited.rate_limited(np.array([[rate * tick * DT]]))
+    return check(limited)
+
+
+def test_a_torque_rate_above_the_limit_for_some_ticks_running_stops_the_trial():
+    """A ramp just above the limit lags the limiter more each tick; just below it never touches the limiter."""
+    assert run_ramp(999.0, 100) == []
+    assert run_ramp(1500.0, RATE_PERSISTENCE - 1) == []
+    assert run_ramp(1500.0, RATE_PERSISTENCE) == [f"torque rate limit: above 1000 Nm/s for {RATE_PERSISTENCE} ticks"]
+
+
+def test_one_calm_tick_starts_the_count_anew():
+    limited = guard(torque_rate_nm_s=1000.0)
+    for torque in [0.0, *[1e3] * (RATE_PERSISTENCE - 1)]:
+        limited.rate_limited(np.array([[torque]]))
+    limited.rate_limited(np.array([[1.0 * (RATE_PERSISTENCE - 1)]]))
+    limited.rate_limited(np.array([[1e3]]))
+    assert check(limited) == []
+
+
+def test_rows_are_limited_independently():
+    """A row beside one that saturates keeps its torque to the last bit."""
+    quiet, rng = guard(1, torque_rate_nm_s=1000.0), np.random.default_rng(0)
+    both = guard(2, torque_rate_nm_s=1000.0)
+    for _ in range(20):
+        calm, wild = 1e-3 * rng.normal(size=(1, 7)), 1e3 * rng.normal(size=(1, 7))
+        np.testing.assert_array_equal(both.rate_limited(np.concatenate([calm, wild]))[:1], quiet.rate_limited(calm))
+    wrench = np.zeros((2, 6))
+    found = both.violations(np.zeros((2, 3)), np.zeros((2, 6)), wrench, wrench, np.arange(2))
+    assert [i for i, _ in found] == [1]
+
+
+def test_trials_that_have_ended_are_not_reported_again():
+    limited = guard(2, force_n=1.0)
+    wrench = np.full((2, 6), 9.0)
+    zero = np.zeros((2, 6))
+    assert [i for i, _ in limited.violations(zero[:, :3], zero, wrench, zero, np.array([1]))] == [1]
+
+
+def test_no_limit_is_no_limit():
+    assert check(guard(), position=(9, 9, 9), wrench=np.full(6, 1e6), command=np.full(6, 1e3), twist=np.ones(6)) == []
