@@ -53,7 +53,8 @@ def _refuse_text_settings(path: Path, options: ReadOptions) -> None:
 
 def _load(path: Path) -> dict[str, Any]:
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as handle:
+            file = np.load(handle, allow_pickle=False)
             if isinstance(file, np.ndarray):
                 raise ValueError("a single array")
             return {name: file[name] for name in file.files}

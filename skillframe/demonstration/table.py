@@ -72,7 +72,7 @@ def read_table(path: Path, header: bool | None = None) -> Table:
     """
     lines = [(i, line.strip()) for i, line in enumerate(read_text(path).splitlines(), start=1)]
     lines = [(i, line) for i, line in lines if line]
-    delimiter = _delimiter(lines[0][1])
+    delimiter = _delimiter(next((line for _, line in lines if line[0] not in "#%"), lines[0][1]))
     names: list[str] = []
     while lines and lines[0][1][0] in "#%" and not header and not _looks_like_header(lines, delimiter):
         lines = lines[1:]
@@ -104,7 +104,7 @@ def _looks_like_header(lines: list[tuple[int, str]], delimiter: str | None) -> b
     """Whether a commented row names the columns of the row after it ("%time,x,y" of a topic's export)."""
     names = _split(lines[0][1].lstrip("#% "), delimiter)
     following = next((line for _, line in lines[1:] if line[0] not in "#%"), "")
-    same = len(names) == len(_split(following, _delimiter(following))) if following else len(names) > 1
+    same = len(names) == len(_split(following, delimiter)) if following else len(names) > 1
     return same and not _is_numeric(lines[0][1].lstrip("#% "), delimiter)
 
 
