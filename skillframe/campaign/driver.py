@@ -130,7 +130,8 @@ def reason_of(answer: Died | Raised) -> str:
     """What a row says about a trial that left no outcome."""
     if isinstance(answer, Died):
         return f"worker died ({answer.cause})"
-    return f"error: {type(answer.error).__name__}: {answer.error}"
+    kind = "" if isinstance(answer.error, SkillframeError) else f"{type(answer.error).__name__}: "
+    return f"error: {kind}{answer.error}"
 
 
 def halves(job: ChunkJob) -> list[ChunkJob]:

@@ -26,6 +26,7 @@ from skillframe.world.drawing import geom_json
 from skillframe.world.scene import Scene
 
 TRACE_HZ = 100.0
+ANALYTIC_SAMPLES = 33
 
 
 def evaluate(job: ChunkJob) -> list[Row]:
@@ -66,8 +67,20 @@ def describe(spec: CampaignSpec) -> dict[str, Any]:
     }
     return {
         "world": scene.name, "params": scene.params, "analytic": scene.analytic, "friction": scene.friction,
+        "analytic_over": _analytic_over(spec),
         "fixture": [geom_json(g) for g in scene.fixture], "tool": tool,
     }  # fmt: skip
+
+
+def _analytic_over(spec: CampaignSpec) -> dict[str, dict[str, list[float]]]:
+    """The analytic figures along each world parameter that varies between two numbers: {name: {"values", figure: list}}."""
+    result = {}
+    for name, axis in spec.vary.items():
+        if name.startswith("world.") and axis.kind in ("uniform", "sobol") and _scene(spec, {}).analytic:
+            values = [float(v) for v in np.linspace(float(axis.numbers[0]), float(axis.numbers[1]), ANALYTIC_SAMPLES)]
+            figures = [_scene(spec, {name: value}).analytic for value in values]
+            result[name] = {"values": values} | {key: [f[key] for f in figures] for key in figures[0]}
+    return result
 
 
 def _shapes_scene(name: str) -> bool:

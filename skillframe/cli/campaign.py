@@ -177,10 +177,9 @@ def _conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any]) -> int:
 
     _show_rates(summary["skills"])
     for pair in summary["comparisons"]:
-        click.echo(
-            f"{pair['first']} against {pair['second']} on the same {pair['trials']} draws: only the first succeeds in "
-            f"{pair['only_first']}, only the second in {pair['only_second']}; p = {pair['p_value']:.2g} ({pair['method']})"
-        )
+        click.echo(f"{pair['first']} against {pair['second']} on the same {pair['trials']} draws:")
+        click.echo(f"  only the first succeeds in {pair['only_first']}, only the second in {pair['only_second']}")
+        click.echo(f"  p = {pair['p_value']:.2g}, {pair['method']}")
     if summary["stopped_after_trial"] is not None:
         click.echo(f"stopped early after trial {summary['stopped_after_trial']}: the intervals are narrow enough")
     click.echo(f"results: {folder / 'results.csv'}")
