@@ -5,7 +5,8 @@
   `RATE_PERSISTENCE` ticks running is stopped (one tick of saturation is what the limiter is for);
 - workspace: the tool point outside its box;
 - energy: work the controller has done on the tool at the centre of compliance since the start, above `energy_j`;
-- divergence: a state, wrench or command that is not finite, or a tool faster than `SPEED_CEILING`.
+- divergence: a state, wrench or command that is not finite, a tool faster than `SPEED_CEILING` [m/s], or a law that asks
+  for more than `WRENCH_CEILING` [N, Nm].
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from skillframe.frames import Float, norm
 from skillframe.robot.spec import Limits
 
 RATE_PERSISTENCE = 5
-SPEED_CEILING = 20.0
+SPEED_CEILING, WRENCH_CEILING = 20.0, 1e6
 
 
 class LimitGuard:
@@ -63,7 +64,7 @@ class LimitGuard:
         limits = self._limits
         fine = self._inside(position) & (speed <= SPEED_CEILING) & (self._saturated < RATE_PERSISTENCE)
         fine &= (force <= _or_largest(limits.force_n)) & (torque <= _or_largest(limits.torque_n_m))
-        fine &= self.energy <= _or_largest(limits.energy_j)
+        fine &= (self.energy <= _or_largest(limits.energy_j)) & (norm(command) <= WRENCH_CEILING)
         if fine.all():
             return []
         values = np.concatenate([position, twist, wrench, command], axis=-1)
@@ -86,6 +87,8 @@ class LimitGuard:
             return "diverged: state or command is not a finite number"
         if speed > SPEED_CEILING:
             return f"diverged: the tool moves at {speed:.1f} m/s"
+        if norm(values[-6:]) > WRENCH_CEILING:
+            return f"diverged: the law asks for {norm(values[-6:]):.1e} N"
         if force > _or_largest(limits.force_n):
             return f"force limit: {force:.1f} N is above {limits.force_n:g} N"
         if torque > _or_largest(limits.torque_n_m):

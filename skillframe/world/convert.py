@@ -59,6 +59,7 @@ def _set_options(spec: mujoco.MjSpec, timestep: float) -> None:
     spec.option.iterations = 50
     spec.option.tolerance = 1e-10
     spec.option.noslip_iterations = 0
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # or a diverging trial would start over unseen
     spec.memory = 2 * 1024 * 1024  # the default arena of 13.6 MB a trial trips memory limits at 256 trials
 
 

@@ -1,4 +1,4 @@
-"""A plain compliant push, the yardstick of the tests of loop, world and control: no plug-in, no learning, nothing random."""
+"""A plain compliant push, the yardstick of the tests of loop, world and control: no plug-in, no learning, no chance."""
 
 import numpy as np
 
@@ -48,7 +48,7 @@ class Push(Skill):
         return Command(Pose(self.position, self.rotation), self.twist, self.impedance, self.zero, status, reason)
 
     def _stalled(self, observation):
-        """Position and tool axis have stayed within twice a small box for `STALL_S`; noise alone does not count as motion."""
+        """Position and tool axis have stayed in a small box for `STALL_S`; sensor noise alone is no motion."""
         now = np.concatenate([observation.pose.position, observation.pose.rotation[..., 2]], axis=-1)
         far = np.abs(now - self.anchor)
         moved = (far[:, :3] > 2.0 * STALL_M).any(-1) | (far[:, 3:] > 2.0 * STALL_RAD).any(-1)

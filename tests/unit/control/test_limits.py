@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from skillframe.control.limits import RATE_PERSISTENCE, SPEED_CEILING, LimitGuard
+from skillframe.control.limits import RATE_PERSISTENCE, SPEED_CEILING, WRENCH_CEILING, LimitGuard
 from skillframe.robot.spec import Limits
 
 NONE = {"force_n": None, "torque_rate_nm_s": None}
@@ -12,11 +12,9 @@ def guard(count=1, **limits):
     return LimitGuard(Limits(**{**NONE, **limits}), count, DT)
 
 
-def check(limit_guard, position=(0.0, 0.0, 0.0), twist=np.zeros(6), wrench=np.zeros(6), command=np.zeros(6), count=1):
-    def rows(value):
-        return np.broadcast_to(np.asarray(value, dtype=float), (count, np.shape(value)[-1]))
-
-    found = limit_guard.violations(rows(position), rows(twist), rows(wrench), rows(command), np.arange(count))
+def check(limit_guard, position=(0.0, 0.0, 0.0), twist=(0.0,) * 6, wrench=(0.0,) * 6, command=(0.0,) * 6):
+    position, twist, wrench, command = (np.array([value], dtype=float) for value in (position, twist, wrench, command))
+    found = limit_guard.violations(position, twist, wrench, command, np.arange(1))
     return [cause for _, cause in found]
 
 
@@ -69,6 +67,11 @@ def test_a_tool_faster_than_the_ceiling_is_a_divergence():
     assert check(guard(), twist=np.array([0.99 * SPEED_CEILING, 0, 0, 0, 0, 0])) == []
     (cause,) = check(guard(), twist=np.array([0, 1.01 * SPEED_CEILING, 0, 0, 0, 0]))
     assert cause == f"diverged: the tool moves at {1.01 * SPEED_CEILING:.1f} m/s"
+
+
+def test_a_law_that_asks_for_absurd_forces_is_a_divergence():
+    assert check(guard(), command=[0.99 * WRENCH_CEILING, 0, 0, 0, 0, 0]) == []
+    assert check(guard(), command=[0, 0, 2.0 * WRENCH_CEILING, 0, 0, 0]) == ["diverged: the law asks for 2.0e+06 N"]
 
 
 def test_torques_are_held_to_their_rate_joint_by_joint():
