@@ -1,4 +1,6 @@
-"""For plug-in authors: conformance suites to inherit, and small skills to test with::
+"""For plug-in authors: conformance suites to inherit, and small skills to test with.
+
+Inherit and name what is to be checked::
 
     from skillframe.testing import SkillConformance
 
