@@ -111,7 +111,7 @@ def inverse_kinematics(robot: RobotModel, arm: str | int, pose: Pose, q0: Float)
     if robot.spec.base == "free":
         return _place_base(robot.model, frame, pose, q0)
     best, error = q0, np.full(6, np.inf)
-    for start in _starts(robot.model, q0):
+    for start in _starts(robot.model, frame, q0):
         q, left = _descend(robot.model, frame, pose, start)
         if np.abs(left).max() < _TOLERANCE:
             return q
@@ -160,11 +160,16 @@ def _bounds(model: pin.Model) -> tuple[Float, Float, Flags]:
     return low, high, single & (low < high)
 
 
-def _starts(model: pin.Model, q0: Float) -> Iterator[Float]:
+def _starts(model: pin.Model, frame: int, q0: Float) -> Iterator[Float]:
+    """First q0, then random configurations of the joints that move the frame; every other joint stays."""
     yield q0
+    moves = np.zeros(model.nq, dtype=bool)
+    for index in list(model.supports[model.frames[frame].parentJoint])[1:]:
+        joint = model.joints[index]
+        moves[joint.idx_q : joint.idx_q + joint.nq] = True
     rng = np.random.default_rng(0)  # fixed: the same question has the same answer
     for _ in range(_RESTARTS):
-        yield random_configuration(model, rng)
+        yield np.where(moves, random_configuration(model, rng), q0)
 
 
 def _descend(model: pin.Model, frame: int, pose: Pose, q0: Float) -> tuple[Float, Float]:

@@ -41,7 +41,7 @@ def smallest_pivots(model: pin.Model, home: Float) -> Pivots:
     for q in configurations:
         upper = np.triu(pin.crba(model, data, q))
         mass = upper + np.triu(upper, 1).T
-        inertia = np.minimum(inertia, np.diag(mass) / _carried(model, data))
+        inertia = np.minimum(inertia, _relative(np.diag(mass), _carried(model, data)))
         ratio = np.minimum(ratio, pivot_ratios(mass))
     return Pivots(inertia, ratio)
 
@@ -60,15 +60,21 @@ def pivot_ratios(mass: Float) -> Float:
     return ratios
 
 
+def _relative(moved: Float, carried: Float) -> Float:
+    """Ratio where something is carried; elsewhere (a follower may have all the inertia) 1, 0 or -1."""
+    there = carried > 0.0
+    return np.where(there, moved / np.where(there, carried, 1.0), np.sign(moved))
+
+
 def _carried(model: pin.Model, data: pin.Data) -> Float:
     """(nv,) what each joint carries: mass if it slides, trace of the inertia about its origin if it turns."""
-    carried = np.ones(model.nv)
+    carried = np.zeros(model.nv)
     for index in range(1, model.njoints):
         joint, load = model.joints[index], data.Ycrb[index]
         lever = np.asarray(load.lever)
         turning = float(np.trace(load.inertia)) + 2.0 * load.mass * float(lever @ lever)
         for i in range(joint.nv):
-            carried[joint.idx_v + i] = max(load.mass if i < _sliding(joint) else turning, np.finfo(float).tiny)
+            carried[joint.idx_v + i] = load.mass if i < _sliding(joint) else turning
     return carried
 
 

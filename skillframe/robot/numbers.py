@@ -8,6 +8,7 @@ from pathlib import Path
 
 from skillframe.errors import InputError
 
+LARGEST = 1e15  # SI; squares and products of such numbers still fit a double; limits may be any number
 INERTIA = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 _JOINT_NUMBERS = {
     "limit": ("lower", "upper", "effort", "velocity"),
@@ -92,7 +93,9 @@ def _check(where: str, element: ET.Element | None, attribute: str, count: int, r
     if required and given is None:
         raise InputError(where, f"has no {attribute!r}", "add it")
     try:
-        numbers(element, attribute, count, ())
+        large = max((abs(x) for x in numbers(element, attribute, count, ())), default=0.0)
     except ValueError:
         wanted = "one finite number" if count == 1 else f"{count} finite numbers"
         raise InputError(f"{where}: {attribute}", f"expected {wanted}, got {given!r}", "correct it") from None
+    if large > LARGEST and not where.endswith("limit"):
+        raise InputError(f"{where}: {attribute}", f"{given} is beyond any physical size", "correct it")

@@ -14,6 +14,7 @@ from typing import Any, Literal
 from skillframe.config import build, read_toml
 from skillframe.errors import InputError, UnknownName
 from skillframe.paths import data_dirs
+from skillframe.robot.numbers import LARGEST
 
 Vector = tuple[float, float, float]
 _URDF_SUFFIXES = (".urdf", ".xml", ".xacro", ".sdf")
@@ -222,5 +223,5 @@ def _check_values(declared: RobotFile, where: str) -> None:
     if len(set(names)) < len(names):
         raise InputError(f"{where}: arm", f"two arms have one name ({', '.join(names)})", "rename one")
     for link, inertia in declared.inertia.items():
-        if not all(math.isfinite(x) for x in (inertia.mass, *inertia.com, *inertia.inertia)):
-            raise InputError(f"{where}: inertia.{link}", "holds a number that is not finite", "correct it")
+        if not all(abs(x) <= LARGEST for x in (inertia.mass, *inertia.com, *inertia.inertia)):
+            raise InputError(f"{where}: inertia.{link}", "holds a number beyond any physical size", "correct it")

@@ -1,8 +1,12 @@
 """What cannot be loaded is said in one sentence, and never reaches a parser that would crash on it."""
 
+import random
+import re
+
 import pytest
 
-from skillframe.errors import InputError
+from skillframe.errors import InputError, SkillframeError
+from skillframe.robot.audit import audit
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot
 from skillframe.robot.urdf import read_urdf
@@ -108,3 +112,22 @@ def test_a_default_namespace_and_utf16_do_no_harm(tmp_path, urdf):
     text = urdf.tree(1, 3).replace("<robot ", '<robot xmlns="http://example.org/urdf" ')
     (tmp_path / "wide.urdf").write_bytes(text.replace('"1.0"', '"1.0" encoding="utf-16"').encode("utf-16"))
     assert load_model(load_robot(tmp_path / "wide.urdf")).model.nv == 3
+
+
+def test_a_damaged_file_is_refused_or_judged_and_never_raises_anything_else(save, urdf):
+    rng = random.Random(0)
+    for case in range(120):
+        text = urdf.tree(case, rng.randrange(1, 5), kinds=("revolute", "prismatic", "fixed", "planar"))
+        place, harm = rng.randrange(len(text)), case % 4
+        if harm == 0:  # a piece is lost
+            text = text[:place] + text[place + rng.randrange(1, 40) :]
+        elif harm == 1:  # a character is typed
+            text = text[:place] + rng.choice('"<>&-e.9 ') + text[place:]
+        else:  # attributes are exchanged, or are extreme numbers
+            values = re.findall(r'="[^"]*"', text)
+            others = values if harm == 2 else ['="1e308"', '="-5"', '="0"', '="1e-320"', '="nan"', '=""']
+            text = text.replace(rng.choice(values), rng.choice(others), 1)
+        try:
+            audit(load_robot(save(text)))
+        except SkillframeError as error:
+            assert "\n" not in str(error)  # noqa: PT017
