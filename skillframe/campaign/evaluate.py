@@ -73,7 +73,7 @@ def describe(spec: CampaignSpec) -> dict[str, Any]:
 
 
 def _analytic_over(spec: CampaignSpec) -> dict[str, dict[str, list[float]]]:
-    """The analytic figures along each world parameter that varies between two numbers: {name: {"values", figure: list}}."""
+    """The analytic figures along each world parameter that varies between two numbers, for the report's map."""
     result = {}
     for name, axis in spec.vary.items():
         if name.startswith("world.") and axis.kind in ("uniform", "sobol") and _scene(spec, {}).analytic:
