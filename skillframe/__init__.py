@@ -13,7 +13,7 @@ _PUBLIC = {
     "Demonstration": "skillframe.demonstration.record",
     "Impedance": "skillframe.skill",
     "Observation": "skillframe.skill",
-    "Pose": "skillframe.skill",
+    "Pose": "skillframe.frames",
     "Skill": "skillframe.skill",
     "SkillframeError": "skillframe.errors",
     "Status": "skillframe.skill",
@@ -25,12 +25,12 @@ __all__ = ["__version__", *sorted(_PUBLIC)]
 if TYPE_CHECKING:
     from skillframe.demonstration.record import Demonstration as Demonstration
     from skillframe.errors import SkillframeError as SkillframeError
+    from skillframe.frames import Pose as Pose
     from skillframe.hookspecs import hookimpl as hookimpl
     from skillframe.skill import (
         Command as Command,
         Impedance as Impedance,
         Observation as Observation,
-        Pose as Pose,
         Skill as Skill,
         Status as Status,
         per_trial as per_trial,

@@ -78,7 +78,7 @@ def coerce(value: Any, hint: Any, where: str) -> Any:
     if dataclasses.is_dataclass(hint):
         if not isinstance(value, Mapping):
             raise InputError(where, f"expected a table, got {value!r}")
-        return build(hint, value, where)  # type: ignore[type-var]
+        return build(hint, value, where)  # type: ignore[type-var, arg-type]
     return _coerce_scalar(value, hint, where)
 
 

@@ -1,7 +1,7 @@
 """What a run leaves behind: a table over time and what is needed to draw it again, in one npz file.
 
-A trace file needs nothing else to be plotted, replayed in 3-D or reported on: the scene's geometry is in its metadata and
-the bodies' poses are in its arrays.
+A trace file needs nothing else to be plotted, replayed in 3-D or reported on: the scene's geometry is in its metadata
+and the bodies' poses are in its arrays.
 """
 
 from __future__ import annotations

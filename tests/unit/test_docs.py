@@ -87,7 +87,9 @@ def shown():
     """(place, line) of every command line that help texts and pages show."""
     pages = [*DOCS.rglob("*.md"), DOCS.parent / "README.md", *DOCS.parent.glob("plugins/*/README.md")]
     texts = {f"help of skillframe {words}": command.help or "" for words, command in commands().items()}
-    texts |= {page.relative_to(DOCS.parent).as_posix(): page.read_text(encoding="utf-8") for page in pages}
+    for page in pages:
+        blocks = re.findall(r"^ *```\w*\n(.*?)^ *```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+        texts[page.relative_to(DOCS.parent).as_posix()] = "\n".join(blocks)
     for place, text in texts.items():
         for line in re.findall(r"^ *(?:\$ )?skillframe (.+)$", text.replace("\\\n", " "), re.MULTILINE):
             yield place, line
