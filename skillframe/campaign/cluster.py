@@ -100,10 +100,11 @@ class ClusterPool:
         from distributed import Client, LocalCluster
         from distributed.system import MEMORY_LIMIT
 
+        # even without a dashboard the scheduler listens for health checks, on port 8787 unless told otherwise
         cluster = LocalCluster(
             n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, host="127.0.0.1",
             silence_logs=logging.CRITICAL, memory_limit=memory_bytes or MEMORY_LIMIT // (workers + 1), env=THREADS,
-            preload=["skillframe.campaign.worker"],
+            preload=["skillframe.campaign.worker"], scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
         )  # fmt: skip
         self._stack.enter_context(cluster)
         return self._stack.enter_context(Client(cluster, set_as_default=False))
