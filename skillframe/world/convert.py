@@ -92,13 +92,12 @@ def _add_joint(body: Any, model: pin.Model, index: int) -> None:
     if kind == "JointModelFreeFlyer":
         body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_FREE)
         return
-    sliding = "P" in kind.removeprefix("JointModel")[:2] and "Planar" not in kind
-    turning = kind.startswith("JointModelR") and "Composite" not in kind
-    if not (sliding or turning):
-        raise SkillframeError(f"joint {name!r} is a {kind}, which the simulated world cannot hold; use revolute joints")
-    axis = np.array(joint.createData().S[:3] if sliding else joint.createData().S[3:], dtype=float).ravel()
-    if "Unaligned" in kind:
-        axis = np.array(joint.extract().axis if hasattr(joint, "extract") else joint.axis)
+    subspace = np.array(joint.createData().S, dtype=float).reshape(6, -1)
+    sliding = joint.nv == 1 and not subspace[3:].any()
+    if joint.nv != 1 or not (sliding or not subspace[:3].any()):
+        cure = "set mimic = false in robot.toml" if kind == "JointModelMimic" else "use revolute and prismatic joints"
+        raise SkillframeError(f"joint {name!r} is a {kind}, which the simulated world cannot hold; {cure}")
+    axis = subspace[:3, 0] if sliding else subspace[3:, 0]
     v = joint.idx_v
     made = body.add_joint(
         name=name, axis=axis, type=mujoco.mjtJoint.mjJNT_SLIDE if sliding else mujoco.mjtJoint.mjJNT_HINGE
