@@ -16,8 +16,8 @@ import click
 
 MARKER = ".skillframe-quickstart"
 VALLEY = """\
-# Where does the learned slide work, when the valley is tipped and its friction is not what it was?
-name = "Valley: tipped, with other friction"
+# Where does the learned slide work, when the valley is shifted and tipped and nobody tells the robot?
+name = "Valley: shifted and tipped"
 seed = 11
 trials = {trials}
 robot = "{robot}"
@@ -27,8 +27,8 @@ duration_s = 6.0
 [set]
 "start.offset_x" = 0.02
 [vary]
+"fixture.offset_x" = {{ sobol = [-0.012, 0.012] }}
 "fixture.tilt_y" = {{ sobol = [-0.05, 0.9] }}
-"world.friction" = {{ sobol = [0.05, 0.6] }}
 """
 PEG = """\
 # Where does the learned insertion work, when the hole is shifted and tilted and nobody tells the robot?
