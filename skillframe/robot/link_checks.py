@@ -20,6 +20,7 @@ from skillframe.robot.numbers import INERTIA, numbers
 from skillframe.robot.problems import Problem, guessed_inertia, overlay_fix
 
 _ROUNDING = 1e-3  # relative: URDFs carry three to four digits, and flat plates meet the triangle inequality exactly
+_NEGLIGIBLE = 1e-15  # of the whole robot: exporters leave rounding such as 1e-18 kg m^2 on decorative links
 _GYRATION = 3.0  # contract: radius of gyration over size
 
 
@@ -66,8 +67,11 @@ def mending_lines(links: list[str], given: Mapping[str, Given], bodies: list[Bod
 
 def impossible_inertias(given: Mapping[str, Given], bodies: list[Body]) -> Iterator[Problem]:
     """Links whose mass is negative or whose moments no distribution of mass can have."""
+    whole = sum(abs(g.mass) for g in given.values()) * max(body.reach for body in bodies) ** 2
     for name, inertia in given.items():
         low, middle, high = (float(x) for x in inertia.principal)
+        if inertia.mass >= 0.0 and max(high - low - middle, -low) <= _NEGLIGIBLE * whole:
+            continue
         if inertia.mass < 0.0:
             text = f"has a negative mass ({inertia.mass:g} kg)"
         elif low < -_ROUNDING * max(abs(high), abs(low)):

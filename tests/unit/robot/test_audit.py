@@ -5,8 +5,7 @@ import tomllib
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 
 from skillframe.robot.audit import audit
 from skillframe.robot.mass_matrix import SINGULAR, pivot_ratios
@@ -276,3 +275,10 @@ def test_pivot_ratios_do_not_depend_on_units_and_find_what_is_singular(seed, siz
     assert math.prod(ratios * np.diag(mass)) == pytest.approx(np.linalg.det(mass), rel=1e-6)
     copied = np.block([[mass, mass[:, :1]], [mass[:1], mass[:1, :1]]])
     assert (pivot_ratios(copied) < SINGULAR).sum() == 1
+
+
+def test_rounding_on_a_decorative_link_is_not_called_impossible(save, urdf):
+    moments = 'ixx="1e-18" iyy="-1e-18" izz="3e-18" ixy="0" ixz="0" iyz="0"'
+    dust = f'<inertial><mass value="1e-12"/><inertia {moments}/></inertial>'
+    text = pair(urdf, urdf.inertial(2.0, 0.3)).replace('<link name="tip"></link>', urdf.link("tip", dust))
+    assert check(save(text)).problems == ()
