@@ -6,15 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from skillframe.demonstration.assemble import assemble
-from skillframe.demonstration.checks import refuse_w_first_header
-from skillframe.demonstration.columns import CANONICAL, Columns, left_out, name_columns
-from skillframe.demonstration.delimited import read_wrench_file
-from skillframe.demonstration.metafile import meta_path, read_meta, toml_text
-from skillframe.demonstration.options import read_options
+from skillframe.demonstration.columns import CANONICAL, Columns
+from skillframe.demonstration.delimited import read_delimited
+from skillframe.demonstration.metafile import meta_path, toml_text
 from skillframe.demonstration.record import Demonstration
 from skillframe.demonstration.safe import replace_file
-from skillframe.demonstration.table import read_table
 from skillframe.errors import InputError
 
 
@@ -28,12 +24,7 @@ def read_csv(path: Path, options: Mapping[str, Any]) -> Demonstration:
     Raises:
         InputError: anything of the contract's list of bad input.
     """
-    chosen = read_options(options)
-    table = read_table(path)
-    if chosen.columns is None:
-        refuse_w_first_header(table.source, table.names)
-    columns = name_columns(table, chosen.columns, chosen.units)
-    return assemble(columns, read_meta(path), chosen, left_out(table), read_wrench_file(chosen))
+    return read_delimited(path, options)
 
 
 def demonstration_columns(demonstration: Demonstration) -> Columns:

@@ -1,0 +1,154 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from skillframe.demonstration.audit import audit, odd_ones
+from skillframe.demonstration.record import Demonstration
+from skillframe.frames import Float, rotate_spatial
+
+
+def with_time(demo: Demonstration, change: Callable[[Float], Float]) -> Demonstration:
+    return replace(demo, time=change(demo.time.copy()))
+
+
+def with_wrench(demo: Demonstration, change: Callable[[Float], Float | None]) -> Demonstration:
+    wrench = demo.wrench.copy()
+    result = change(wrench)
+    return replace(demo, wrench=wrench if result is None else result)
+
+
+def gap(time: Float) -> Float:
+    time[120:] += 0.5
+    return time
+
+
+def jittered(time: Float) -> Float:
+    return time + np.random.default_rng(0).uniform(0.0, 0.004, len(time))
+
+
+def spiked(wrench: Float) -> None:
+    wrench[30, 2] = 277.0
+
+
+def drifted(wrench: Float) -> None:
+    wrench[100:140, 2] += 30.0
+    wrench[140:, :] = np.random.default_rng(4).normal(scale=0.02, size=(60, 6))
+    wrench[140:, 2] += 1.0
+
+
+def zeroed(wrench: Float) -> None:
+    wrench[:, 4] = 0.0
+
+
+def pasted(wrench: Float) -> None:
+    wrench[:, 3] = wrench[:, 1]
+
+
+def held(wrench: Float) -> None:
+    wrench[:] = np.repeat(wrench[::5], 5, axis=0)
+
+
+WARNINGS: dict[str, tuple[Callable[[Demonstration], Demonstration], str]] = {
+    "a gap": (lambda d: with_time(d, gap), "gaps: 1 of more than 3 periods, the longest 0.51 s at t = 1.190 s"),
+    "jitter": (lambda d: with_time(d, jittered), "jitter:"),
+    "nanoseconds": (lambda d: with_time(d, lambda t: t * 1e9), "looks like another unit of time"),
+    "a rate that is not the metadata's": (lambda d: replace(d, meta={"rate": 125}), "metadata says 125 Hz"),
+    "w-first values": (
+        lambda d: replace(d, quaternion=np.roll(d.quaternion, 1, axis=1).copy()),
+        "quaternion: the first value stays near 1",
+    ),
+    "millimetres": (lambda d: replace(d, position=d.position * 1e3), "millimetres"),
+    "a jump in position": (
+        lambda d: replace(d, position=d.position + 0.2 * (np.arange(200) > 80)[:, None]),
+        "position: jumps by 34",
+    ),
+    "a channel of zeros": (lambda d: with_wrench(d, zeroed), "ty: is exactly 0 throughout"),
+    "a pasted channel": (lambda d: with_wrench(d, pasted), "fy and tx are identical"),
+    "held values": (lambda d: with_wrench(d, held), "rate is about 19.6"),
+    "forces of 1e6 N": (lambda d: with_wrench(d, lambda w: w * 1e5), "force: up to 1.0"),
+    "torques in Nmm": (lambda d: with_wrench(d, lambda w: np.add(w, [0, 0, 0, 0, 90.0, 0])), "lever arm of"),
+    "a spike": (lambda d: with_wrench(d, spiked), "spikes: 1 samples, the largest 277.0 N at t = 0.300 s"),
+    "bias": (lambda d: with_wrench(d, lambda w: np.add(w, [1.0, -2.0, 20.0, 0, 0, 0])), "bias: 20.1"),
+    "drift": (lambda d: with_wrench(d, drifted), "drift: the free-air level moved by 1.0"),
+    "no contact": (lambda d: with_wrench(d, lambda w: 0.05 * w), "contact: none found"),
+    "the teacher's wrench": (lambda d: with_wrench(d, lambda w: -w), "wrench sign: it pushes the tool along"),
+    "no motion": (
+        lambda d: replace(d, position=0 * d.position + 0.3, quaternion=np.tile([0.0, 0, 0, 1], (200, 1))),
+        "nothing to learn",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WARNINGS)
+def test_what_the_data_suggest_is_a_warning_with_its_evidence(demo: Demonstration, name: str) -> None:
+    change, text = WARNINGS[name]
+    assert not any(text in w for w in audit(demo).warnings)
+    assert any(text in w for w in audit(change(demo)).warnings), audit(change(demo)).warnings
+
+
+def test_a_clean_demonstration_has_no_warnings(demo: Demonstration) -> None:
+    found = audit(demo)
+    assert found.warnings == []
+    assert found.usable
+    json.dumps(found.as_json(), allow_nan=False)
+
+
+def test_the_figures_are_those_the_demonstration_was_made_with(demo: Demonstration) -> None:
+    found = audit(demo)
+    assert found.rate_hz == pytest.approx(100.0)
+    assert found.duration_s == pytest.approx(1.99)
+    assert found.path_m == pytest.approx(np.sqrt(0.05**2 + 0.02**2 + 0.1**2), rel=1e-6)
+    assert found.turned_rad == pytest.approx(0.5, rel=1e-6)
+    # the quietest quarter of eight windows of 25 samples: each scatters by 1/sqrt(50) = 14 %, chosen low
+    assert found.noise[0] == pytest.approx(0.05, rel=0.4)
+    assert found.contacts[0][0] == pytest.approx(1.0, abs=0.02)
+    assert found.contacts[0][1] == pytest.approx(1.99)
+    assert found.contacts[0][2] == pytest.approx(np.sqrt(109.0), abs=0.3)
+
+
+def test_stillness_is_not_usable_and_turning_on_the_spot_is(demo: Demonstration) -> None:
+    still = replace(demo, position=0 * demo.position)
+    assert audit(still).usable
+    assert not audit(replace(still, quaternion=np.tile([0.0, 0, 0, 1], (200, 1)))).usable
+
+
+def test_stating_the_quaternions_order_silences_the_suspicion(demo: Demonstration) -> None:
+    down = replace(demo, quaternion=np.roll(demo.quaternion, 1, axis=1).copy())
+    assert any("w-first" in w for w in audit(down).warnings)
+    assert not any("w-first" in w for w in audit(replace(down, meta={"quaternion": "xyzw"})).warnings)
+
+
+def test_a_wrench_left_in_tool_axes_is_suspected(demo: Demonstration) -> None:
+    from skillframe.demonstration.convention import weight_wrench
+    from skillframe.frames import quaternion_from_matrix, rotation_matrix
+
+    rotation = rotation_matrix(np.linspace(0.0, 2.0, 200)[:, None] * np.array([1.0, 0.3, 0.1]))
+    base = rotate_spatial(rotation, np.array([5.0, -3, 8, 0, 0, 0])) + weight_wrench(rotation, 0.9, np.zeros(3))
+    turning = replace(demo, quaternion=quaternion_from_matrix(rotation))
+    noise = np.random.default_rng(0).normal(scale=0.05, size=(200, 6))
+    tool = replace(turning, wrench=rotate_spatial(np.swapaxes(rotation, -1, -2), base) + noise)
+    assert any("wrench frame" in w for w in audit(tool).warnings)
+    assert not any("wrench frame" in w for w in audit(replace(turning, wrench=base + noise)).warnings)
+
+
+def test_the_one_demonstration_of_five_that_wanders_off_is_named(demo: Demonstration) -> None:
+    turn = np.array([[np.cos(0.42), -np.sin(0.42), 0], [np.sin(0.42), np.cos(0.42), 0], [0, 0, 1]])
+    flat = replace(demo, position=demo.position * [1, 1, 0])
+    demos = [flat, flat, replace(flat, position=flat.position @ turn.T), flat, flat]
+    found = odd_ones(demos, [audit(d) for d in demos])
+    assert ["direction: 24 degrees off the other recordings' mean" in a.warnings for a in found] == [
+        False, False, True, False, False,
+    ]  # fmt: skip
+
+
+def test_a_recording_of_two_samples_can_be_audited() -> None:
+    tiny = Demonstration(
+        time=np.array([0.0, 0.1]), position=np.array([[0.0, 0, 0], [0.01, 0, 0]]),
+        quaternion=np.tile([0.0, 0, 0, 1], (2, 1)), wrench=np.arange(12.0).reshape(2, 6),
+    )  # fmt: skip
+    assert audit(tiny).usable
