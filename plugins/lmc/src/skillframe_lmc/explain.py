@@ -7,7 +7,6 @@ from collections.abc import Callable
 from math import degrees
 from typing import TYPE_CHECKING, Any
 
-
 from skillframe.records import Document, Illustration
 from skillframe_lmc import pictures
 from skillframe_lmc.phase import Part, read_phase
@@ -55,7 +54,7 @@ def _held(part: Part) -> bool:
 def _directions(name: str, part: Part, axes: str) -> Illustration:
     drawing = _svg(lambda: pictures.directions(name, part, axes))
     angle = degrees(part.evidence["pyramid_angle_rad"])
-    what = "push" if name == "translation" else "turning push"
+    what, load = ("push", "force") if name == "translation" else ("turning push", "torque")
     if part.desired_direction is None:
         end = (
             f"The pyramids would have to open to {angle:.0f} degrees before one direction explained everything, so no "
@@ -64,13 +63,14 @@ def _directions(name: str, part: Part, axes: str) -> Illustration:
     else:
         end = (
             f"The black outline holds every {what} that explains all demonstrations "
-            f"({part.evidence['feasible_solid_angle_sr']:.2f} sr); the star is the one that was chosen, where it lies deepest."
+            f"({part.evidence['feasible_solid_angle_sr']:.2f} sr); the star is the one that was chosen, where it lies "
+            "deepest."
         )
     caption = (
-        f"Each coloured patch is one interval of a demonstration: the {what}es that would have caused the motion that was "
-        f"seen, between the motion itself and the negative of the measured {'force' if name == 'translation' else 'torque'}, "
-        f"widened for a wavering hand. One colour per demonstration. {end}"
-    ).replace("pushs", "pushes")
+        f"Each coloured patch is one interval of a demonstration: the {what}es that would have caused the motion that "
+        f"was seen, between the motion itself and the negative of the measured {load}, widened for a wavering hand. "
+        f"One colour per demonstration. {end}"
+    )
     return Illustration(f"Which {what}es explain the {name}?", caption, drawing)
 
 
@@ -79,8 +79,8 @@ def _axes(name: str, part: Part, axes: str) -> Illustration:
     count = len(part.compliant_axes)
     without = "" if part.desired_direction is None else ", less what the desired direction explains (green)"
     caption = (
-        f"Left: the mean direction of motion of each demonstration (blue){without}, and the principal axes (red, those that "
-        "became compliant drawn strong). What remains was caused by the environment, so the tool must give way there. "
+        f"Left: the mean direction of motion of each demonstration (blue){without}, and the principal axes (red, those "
+        "that became compliant drawn strong). What remains was caused by the environment, so the tool gives way there. "
         f"Right: the criterion weighs what stays unexplained against the number of axes; the lowest bar wins: "
         f"{count} compliant {'axis' if count == 1 else 'axes'}."
     )
@@ -104,12 +104,10 @@ def _svg(draw: Callable[[], Figure]) -> str:
     import matplotlib
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
-    with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
+    with matplotlib.rc_context(STYLE):
         figure: Any = draw()
         FigureCanvasSVG(figure)
         file = io.StringIO()
         figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None}, bbox_inches="tight")
     text = file.getvalue()
     return text[text.index("<svg") :]
-
-

@@ -6,6 +6,7 @@ from math import radians
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
@@ -93,7 +94,7 @@ def _frame_marks(canvas: Axes, plane: Plane, extent: float) -> None:
 
 
 def _legend(canvas: Axes, count: int, part: Part) -> None:
-    handles = [Polygon([(0, 0)], facecolor=c, alpha=0.5) for c in _cycle(count)]
+    handles: list[Artist] = [Polygon([(0, 0)], facecolor=c, alpha=0.5) for c in _cycle(count)]
     labels = [f"demonstration {i + 1}" for i in range(count)]
     if part.desired_direction is not None:
         handles += canvas.plot([], [], color=INK, lw=2.0) + canvas.plot([], [], marker="*", color=INK, ms=11, ls="none")
@@ -109,7 +110,9 @@ def axes(name: str, part: Part, frame: str) -> Figure:
     _means(left, part, frame)
     criterion = part.evidence["criterion"]
     best = int(np.argmin(criterion))
-    bars = right.bar(range(len(criterion)), criterion, color=[RED if i == best else GREY for i in range(len(criterion))])
+    bars = right.bar(
+        range(len(criterion)), criterion, color=[RED if i == best else GREY for i in range(len(criterion))]
+    )
     right.bar_label(bars, fmt="%.3g", padding=2, color=INK)
     right.set_xticks(range(len(criterion)))
     right.set_xlabel("compliant axes")

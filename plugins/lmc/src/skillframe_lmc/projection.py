@@ -1,7 +1,7 @@
 r"""Directions as points of a plane: azimuthal equidistant about a centre, in degrees.
 
-A direction at the angle a from the centre is drawn at the distance a, whichever way it lies; straight pictures up to 180
-degrees, where a gnomonic one ends at 90.
+A direction at the angle a from the centre is drawn at the distance a, whichever way it lies; straight pictures up to
+180 degrees, where a gnomonic one ends at 90.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def outline(v: Float, m: Float, contact: bool, alpha: float, count: int = 24) ->
 
 
 def need_map(plane: Plane, given: Sequence[Sectors], quantile: float, extent: float, count: int = 121) -> Float:
-    """The alpha (count, count) [rad] that every demonstration needs to accept the directions of a square of the plane."""
+    """The alpha (count, count) [rad] that all demonstrations need to accept the directions of a square of the plane."""
     side = np.linspace(-extent, extent, count)
     points = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
     directions = plane.to_sphere(points)

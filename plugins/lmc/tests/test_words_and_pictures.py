@@ -1,0 +1,113 @@
+import math
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+import synthetic as syn
+from skillframe_lmc.describe import describe
+from skillframe_lmc.explain import explain
+from skillframe_lmc.learner import learn
+from skillframe_lmc.projection import Plane
+from skillframe_lmc.words import axis_words, direction_words, listed
+
+from skillframe.frames import norm, unit
+from skillframe.records import Document, LearnOptions, SkillType
+from skillframe.registry import registry
+from skillframe.skillsource import learned
+from skillframe.testing import SkillConformance
+
+NOISE = syn.Recipe(noise_m=5e-5, noise_n=0.3)
+CASES = {
+    "valley": syn.valley(45, 0.2, NOISE),
+    "single": syn.valley(45, 0.2, NOISE)[:1],
+    "levering": [syn.levering(NOISE)],
+    "alignment": syn.pair_of_alignments(NOISE),
+    "contradiction": [syn.straight([s, 0, -1], 0.06, [0, 0, 0], NOISE) for s in (1.0, -1.0)],
+    "still": [syn.straight([0, 0, -1], 0.0004, [0, 0, 40.0], syn.Recipe(speed=1e-4))],
+    "screw": [syn.turning([0, 0, 1], 2.0, [0, 0, -0.5], force=[0, 0, 5.0], pitch=-0.01)],
+    "environment turns": [syn.turning([0.0, 0.0, 1.0], 1.0, [0.0, 0.0, 0.5])],
+}
+
+
+def document(case: str) -> Document:
+    return learn(CASES[case], LearnOptions())
+
+
+class TestLmc(SkillConformance):
+    skill_type = "lmc"
+
+
+class TestLmcInTheAxesOfTheStart(SkillConformance):
+    skill_type = "lmc"
+
+    def _document(self) -> Document:
+        kind: SkillType = registry().skill("lmc")
+        return learned(kind, CASES["screw"], LearnOptions(axes="phase_start"))
+
+
+@pytest.mark.parametrize(
+    ("case", "headline"),
+    [
+        ("valley", "push along -z at 20 mm/s; free along x; holds its attitude"),
+        ("alignment", "push along -z at 20 mm/s; free along x; turns freely about y"),
+        ("levering", "position free in every direction; turn about +y at 5 degrees/s; holds its attitude otherwise"),
+        ("still", "holds its position; holds its attitude"),
+        ("screw", "push along -z at 0.873 mm/s; turn about +z at 5 degrees/s; holds its attitude otherwise"),
+    ],
+)
+def test_the_headline_says_what_the_skill_does(case: str, headline: str) -> None:
+    words = headline.removesuffix("; holds its attitude otherwise")
+    assert describe(document(case))[0] == words
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_every_skill_can_be_told_and_drawn(case: str) -> None:
+    found = document(case)
+    lines = describe(found)
+    assert len(lines) >= 4
+    assert all(lines)
+    for picture in explain(found):
+        assert ElementTree.fromstring(picture.svg).tag.endswith("svg")
+        assert picture.title
+        assert picture.caption
+        assert "pushs" not in picture.caption
+
+
+def test_an_open_direction_is_said_in_a_line() -> None:
+    assert any("record another demonstration from the other side" in line for line in describe(document("single")))
+    assert not any("other side" in line for line in describe(document("valley")))
+
+
+def test_drawing_twice_gives_the_same_text() -> None:
+    assert [p.svg for p in explain(document("valley"))] == [p.svg for p in explain(document("valley"))]
+
+
+def test_pictures_reach_for_nothing_outside() -> None:
+    for picture in explain(document("alignment")):
+        addresses = [part.split('"')[0] for part in picture.svg.split('href="')[1:]]
+        assert all(address.startswith(("#", "data:")) for address in addresses)
+
+
+def test_the_file_stays_small_however_long_the_demonstrations() -> None:
+    import json
+
+    long = [syn.slide(45, 0.2, NOISE, side=s, length=1.0) for s in (1.0, -1.0)] * 5
+    assert len(json.dumps(learn(long, LearnOptions()))) < 300_000
+
+
+def test_directions_near_an_axis_are_named_after_it() -> None:
+    assert direction_words(np.array([0.0, 0.1, -0.995])) == "-z"
+    assert direction_words(unit(np.array([1.0, 0.0, -1.0]))) == "(0.71, 0.00, -0.71)"
+    assert axis_words(np.array([-1.0, 0.0, 0.0])) == "x"
+    assert listed(["x", "y", "z"]) == "x, y and z"
+
+
+@pytest.mark.parametrize("centre", [[0, 0, -1], [1, 0, 0], [0.6, -0.64, 0.48]])
+def test_the_projection_keeps_angles_from_its_centre_and_can_be_undone(centre: list[float]) -> None:
+    plane = Plane(np.array(centre, dtype=float))
+    directions = unit(np.random.default_rng(0).normal(size=(50, 3)))
+    points = plane.to_plane(directions)
+    assert np.allclose(plane.to_sphere(points), directions, atol=1e-9)
+    assert np.allclose(norm(points), np.degrees(np.arccos(np.clip(directions @ plane.centre, -1, 1))), atol=1e-6)
+    for tangent, k in ((plane.right, plane.labels[0]), (plane.up, plane.labels[1])):
+        assert tangent["xyz".index(k)] > 0.0 or math.isclose(tangent["xyz".index(k)], 0.0)
