@@ -1,0 +1,145 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from skillframe.cli.main import run
+from skillframe.conformance.examples import example_demonstrations
+from skillframe.demonstration.files import write_demonstration
+from skillframe.skillfile import load
+
+pytestmark = pytest.mark.needs_plugins
+
+
+@pytest.fixture
+def demos(tmp_path: Path) -> list[str]:
+    paths = [tmp_path / "left.npz", tmp_path / "right.csv"]
+    for path, demonstration in zip(paths, example_demonstrations(), strict=True):
+        write_demonstration(demonstration, path)
+    return [str(path) for path in paths]
+
+
+def test_learn_writes_a_skill_file_and_says_what_was_learned(
+    demos: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "slide.skill.json"
+    assert run(["learn", *demos, "--out", str(out)]) == 0
+    document = load(out)
+    assert document["type"] == "lmc"
+    assert [s["file"] for s in document["learned_from"]] == demos
+    assert all(len(s["sha256"]) == 64 for s in document["learned_from"])
+    part = document["phases"][0]["translation"]
+    assert set(part) == {
+        "desired_direction", "speed", "compliant_axes", "fully_compliant", "stiffness", "damping", "evidence",
+    }  # fmt: skip
+    keys = {
+        "votes",
+        "pyramid_angle_rad",
+        "feasible_solid_angle_sr",
+        "work_teacher_j",
+        "work_environment_j",
+        "criterion",
+    }
+    assert keys <= set(part["evidence"])
+    assert "push along -z at 20 mm/s; free along x; holds its attitude" in capsys.readouterr().out
+
+
+def test_learning_twice_gives_the_same_bytes(demos: list[str], tmp_path: Path) -> None:
+    outs = [tmp_path / "1.json", tmp_path / "2.json"]
+    for out in outs:
+        run(["learn", *demos, "--out", str(out)])
+    assert outs[0].read_bytes() == outs[1].read_bytes()
+
+
+def test_ambiguity_is_a_sentence_and_no_exit_code(
+    demos: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["learn", demos[0], "--out", str(tmp_path / "one.json")]) == 0
+    said = capsys.readouterr().out
+    assert "record another demonstration from the other side" in said
+    assert " sr" in said
+
+
+def test_points_axes_and_settings_reach_the_file(demos: list[str], tmp_path: Path) -> None:
+    out = tmp_path / "a.json"
+    options = ["--at", "wrist", "--hand", "0,0,0.1", "--axes", "phase_start", "--set", "stiffness_n_m=1500"]
+    assert run(["learn", *demos, "--out", str(out), *options]) == 0
+    document = load(out)
+    assert document["frame"]["learned_at"] == [0.0, 0.0, -0.15]
+    assert document["frame"]["center_of_compliance"] == [0.0, 0.0, -0.15]
+    assert document["frame"]["work_at"] == [0.0, 0.0, 0.1]
+    assert document["frame"]["axes"] == "phase_start"
+    assert document["settings"]["stiffness_n_m"] == 1500.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--skill", "lcm"], "did you mean 'lmc'"),
+        (["--at", "wrst"], "did you mean 'wrist'"),
+        (["--set", "step=3"], "unknown key 'step'"),
+        (["--set", "step_m"], "is not KEY=VALUE"),
+        (["--axes", "tool"], "phase_start"),
+    ],
+)
+def test_bad_requests_exit_2_with_a_sentence_and_write_nothing(
+    demos: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
+) -> None:
+    out = tmp_path / "a.json"
+    assert run(["learn", *demos, "--out", str(out), *arguments]) == 2
+    assert message in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_a_missing_demonstration_exits_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["learn", str(tmp_path / "none.npz"), "--out", str(tmp_path / "a.json")]) == 2
+    assert "no such file" in capsys.readouterr().err
+
+
+def test_show_says_it_in_words_and_json_stands_alone(
+    demos: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "a.json"
+    run(["learn", *demos, "--out", str(out)])
+    capsys.readouterr()
+    assert run(["skill", "show", str(out)]) == 0
+    assert capsys.readouterr().out.startswith("push along -z at 20 mm/s; free along x")
+    assert run(["skill", "show", str(out), "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)
+    assert shown["phases"] == load(out)["phases"]
+    assert shown["words"][0].startswith("push along -z")
+
+
+def test_learn_with_json_keeps_words_off_stdout(
+    demos: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "a.json"
+    assert run(["learn", *demos, "--out", str(out), "--json"]) == 0
+    captured = capsys.readouterr()
+    assert json.loads(captured.out) == load(out)
+    assert "push along" in captured.err
+
+
+def test_explain_writes_one_page_that_needs_nothing_else(demos: list[str], tmp_path: Path) -> None:
+    out, page = tmp_path / "a.json", tmp_path / "deep" / "a.html"
+    run(["learn", *demos, "--out", str(out)])
+    assert run(["skill", "explain", str(out), "--out", str(page)]) == 0
+    text = page.read_text()
+    assert text.startswith("<!doctype html>")
+    assert text.count("<img") == 3
+    assert "http" not in text.replace("data:image", "")
+    assert "push along -z" in text
+
+
+@pytest.mark.parametrize("command", [["skill", "show"], ["skill", "explain", "--out", "x.html"]])
+def test_a_damaged_skill_file_exits_2_and_names_the_key(
+    demos: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], command: list[str]
+) -> None:
+    out = tmp_path / "a.json"
+    run(["learn", *demos, "--out", str(out)])
+    document = json.loads(out.read_text())
+    document["phases"][0]["translation"]["stiffness"] = [[1.0, 0.0], [0.0, 1.0]]
+    out.write_text(json.dumps(document))
+    capsys.readouterr()
+    assert run([*command, str(out)]) == 2
+    assert "phases[0].translation.stiffness" in capsys.readouterr().err
