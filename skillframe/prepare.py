@@ -82,5 +82,7 @@ def prepare(robot: RobotModel, scene: Scene, document: Document, coc: str | None
     Raises:
         UnknownName: the skill's type or the centre of compliance is unknown.
     """
-    skill = registry().skill(document["type"]).build(document)
-    return skill, Setup(robot=robot, scene=scene, center_of_compliance=center_of_compliance(document, scene, coc))
+    center = center_of_compliance(document, scene, coc)
+    placed = {**document, "frame": {**document["frame"], "center_of_compliance": center.tolist()}}
+    skill = registry().skill(document["type"]).build(placed)
+    return skill, Setup(robot=robot, scene=scene, center_of_compliance=center)
