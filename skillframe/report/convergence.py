@@ -2,34 +2,27 @@
 
 Cells and points hold counts and exact 95 % Clopper-Pearson intervals. Quantities are ranked by the mutual information
 between their quintile and success, the largest over skills (our choice: it sees "too far to either side" as well as
-"too much"). Theory's region is drawn from the scene file's `analytic` figures.
+"too much"). Theory's region (`theory`) is drawn over both.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from skillframe.frames import Float
-from skillframe.report.markup import Markup, escape, figure, join, number, percent, tag
+from skillframe.report.markup import Markup, figure, join, percent, tag
 from skillframe.report.quantities import Quantity, quantity
 from skillframe.report.results import Rate, Results, Row, rate_of
-from skillframe.report.svg import LEFT, Axes, padded, picture, text
+from skillframe.report.svg import Axes, padded, picture, text
+from skillframe.report.theory import Region, boundary, mark
 
 FEW_VALUES, MOST_CELLS, TRIALS_PER_CELL = 8, 7, 5
 MOST_CURVES, CURVE_BINS = 4, 8
 FAILS, BETWEEN, WORKS = np.array([224, 132, 80]), np.array([244, 240, 232]), np.array([98, 162, 216])
-
-
-class Region(NamedTuple):
-    """Theory says: it works while |quantity| stays below the limit (in the units of the file)."""
-
-    name: str
-    limit: float
 
 
 def influence(results: Results) -> list[str]:
@@ -53,19 +46,6 @@ def _information(rows: Sequence[Row], name: str) -> float:
             apart = float(np.mean(bins == b) * np.mean(wins == outcome))
             total += joint * math.log(joint / apart) if joint > 0.0 else 0.0
     return total
-
-
-def regions(scene: Mapping[str, Any], varied: Sequence[str]) -> list[Region]:
-    """Theory's limits: `analytic` figures keyed by a varied quantity, or `largest_tilt_rad` for tilts about y."""
-    analytic = scene.get("analytic")
-    found = []
-    for key, value in sorted(analytic.items() if isinstance(analytic, Mapping) else ()):
-        if not isinstance(value, int | float) or not math.isfinite(value):
-            continue
-        found += [
-            Region(n, float(value)) for n in varied if n == key or (key == "largest_tilt_rad" and n.endswith(".tilt_y"))
-        ]
-    return found
 
 
 def edges_of(values: Float, trials: int) -> Float:
@@ -94,7 +74,7 @@ def cell_map(results: Results, skill: str, names: Sequence[str], limits: Sequenc
     rate = results.rate(skill)
     cells = [_cell(axes, rows, (across, up), x, y) for x in pairwise(xs) for y in pairwise(ys)]
     dots = [_dot(axes, x, y, r) for x, y, r in zip(values_of(rows, across), values_of(rows, up), rows, strict=True)]
-    lines = [axes.frame(), *(_region(axes, (across, up), limit) for limit in limits)]
+    lines = [axes.frame(), *(boundary(axes, (across, up), limit) for limit in limits)]
     parts = [*(cell for cell, _ in cells), *lines, *dots, *(words for _, words in cells)]
     svg = picture(axes, f"Success of {skill} over {across.label} and {up.label}", *parts, class_="map")
     return figure(skill, f"{rate.successes} of {rate.trials} trials succeeded.", svg, class_="plot")
@@ -144,26 +124,6 @@ def _dot(axes: Axes, x: float, y: float, row: Row) -> Markup:
     return tag("path", title, d=f"M{px - 2.6:.1f} {py - 2.6:.1f}l5.2 5.2m0 -5.2l-5.2 5.2", class_="lost")
 
 
-def _region(axes: Axes, names: tuple[Quantity, Quantity], limit: Region) -> Markup:
-    parts = []
-    for index, name in enumerate(names):
-        if name.name != limit.name:
-            continue
-        for value in (-limit.limit * name.factor, limit.limit * name.factor):
-            parts.append(_limit_line(axes, value, vertical=index == 0))
-    return join(parts)
-
-
-def _limit_line(axes: Axes, value: float, *, vertical: bool) -> Markup:
-    if not axes.inside(value, vertical=not vertical):
-        return Markup("")
-    if vertical:
-        x = round(float(axes.across(value)), 1)
-        return tag("line", x1=x, x2=x, y1=axes.top, y2=axes.bottom, class_="theory")
-    y = round(float(axes.up(value)), 1)
-    return tag("line", x1=LEFT, x2=axes.right, y1=y, y2=y, class_="theory")
-
-
 def rate_curves(results: Results, name: str, limits: Sequence[Region]) -> Markup:
     """Success over one quantity, all skills on the same axes, a point with its interval per bin."""
     across = quantity(name)
@@ -171,9 +131,7 @@ def rate_curves(results: Results, name: str, limits: Sequence[Region]) -> Markup
     borders = edges_of(values, TRIALS_PER_CELL * CURVE_BINS**2)
     axes = Axes(x=padded(borders[0], borders[-1], 0.02), y=(-4.0, 104.0), x_label=across.axis, y_label="success [%]")
     parts = [axes.frame(y_ticks=[0, 25, 50, 75, 100])]
-    parts += [
-        _limit_line(axes, s * r.limit * across.factor, vertical=True) for r in limits if r.name == name for s in (-1, 1)
-    ]
+    parts += [mark(axes, across, limit) for limit in limits if limit.name == name]
     parts += [_curve(axes, results.of(skill), across, borders, i) for i, skill in enumerate(results.skills)]
     svg = picture(axes, f"Success over {across.label}", *parts)
     return figure(f"Over {across.label}", "", svg, class_="plot")
@@ -198,20 +156,3 @@ def _bar(axes: Axes, x: float, rate: Rate, stroke: str) -> Markup:
     tip = tag("title", f"{rate.successes} of {rate.trials}, {percent(rate.low)} to {percent(rate.high)}")
     line = tag("line", x1=px, x2=px, y1=low, y2=high, class_=f"bar {stroke}")
     return join([line, tag("circle", tip, cx=px, cy=middle, r=3.4, class_=f"point {stroke}")])
-
-
-def theory_sentence(limits: Sequence[Region], scene: Mapping[str, Any], varied: Sequence[str]) -> Markup:
-    """What the dashed lines are."""
-    if not limits:
-        return Markup("")
-    said = [
-        f"|{quantity(r.name).label}| < {number(r.limit * quantity(r.name).factor)} {quantity(r.name).unit}".strip()
-        for r in limits
-    ]
-    moved = [quantity(n).label for n in varied if n.startswith("world.")]
-    nominal = f" (with the nominal {', '.join(moved)}, which vary here)" if moved else ""
-    return tag(
-        "p",
-        tag("span", class_="key theory-key"),
-        escape(f" Dashed: the region that closed-form theory predicts, {'; '.join(said)}{nominal}."),
-    )

@@ -63,6 +63,7 @@ def _origin(document: dict[str, Any] | None) -> str:
 def _setting(chapter: Chapter, results: Results) -> str:
     """Who did what, and over which ranges."""
     robot, world = (str(chapter.spec.get(key) or chapter.summary.get(key) or "") for key in ("robot", "world"))
+    robot = robot.removesuffix("/robot.toml").rsplit("/", 1)[-1]
     where = f"Robot {robot}, world {world}" if robot and world else "Every trial"
     ranges = [_range(results, name) for name in results.varied]
     return f"{where}; varied from trial to trial: {', '.join(ranges)}." if ranges else f"{where}; nothing varied."

@@ -98,12 +98,12 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def percent(value: float) -> str:
-    """A share as a percentage, a decimal near the ends; 0 % and 100 % only where it is exactly that."""
+    """A share as a percentage, with a decimal below 1 and above 99; 0 % and 100 % only where it is exactly that."""
     if not math.isfinite(value):
         return "–"
     if value in (0.0, 1.0):
         return f"{value:.0%}".replace("%", " %")
-    if 0.1 <= value < 0.9:
-        return f"{100.0 * value:.0f} %"
+    if 0.01 <= value <= 0.99:
+        return f"{math.floor(100.0 * value + 0.5)} %"
     text = f"{100.0 * value:.1f} %"
     return {"0.0 %": "< 0.1 %", "100.0 %": "> 99.9 %"}.get(text, text)

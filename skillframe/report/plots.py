@@ -20,6 +20,8 @@ from skillframe.trace import Trace
 AXES = ("x", "y", "z")
 LEAST_RANGE = {"N": 1.0, "Nm": 0.05, "mm": 0.5, "°": 0.5}
 MOST_EVENTS = 12
+CONTACT_N = 0.5
+LABEL_GAP = 12.0
 FORCE_CAPTION = "What the environment does to the tool, filtered; x, y, z are the robot's base axes."
 POSITION_CAPTION = (
     "Of the centre of compliance, from the start. Dashed: asked for by the skill; where they part, the environment led."
@@ -39,10 +41,12 @@ class Curve:
 
 def time_plot(
     title: str, unit: str, time: Float, curves: Sequence[Curve], *, caption: str = "",
-    limit: float | None = None, events: Sequence[tuple[float, str]] = (),
+    limit: float | None = None, events: Sequence[tuple[float, str]] = (), width: float = 460.0,
 ) -> Markup:  # fmt: skip
     """A plot over time; a limit is drawn when it is near enough to matter."""
-    axes = Axes(x=_time_range(time), y=_value_range(curves, unit, limit), x_label="time [s]", y_label=f"[{unit}]")
+    axes = Axes(
+        width=width, x=_time_range(time), y=_value_range(curves, unit, limit), x_label="time [s]", y_label=f"[{unit}]"
+    )
     names = [(c.name, c.stroke) for c in curves if c.name]
     content = [
         axes.frame(),
@@ -75,19 +79,28 @@ def _limit_line(axes: Axes, limit: float | None, unit: str) -> Markup:
         return Markup("")
     y = float(axes.up(limit))
     line = tag("line", x1=LEFT, x2=axes.right, y1=round(y, 1), y2=round(y, 1), class_="limit")
-    return join([line, text(axes.right - 4, y - 5, f"limit {limit:g} {unit}", "limit-text", "end")])
+    return join([line, text(LEFT + 4, y - 5, f"limit {limit:g} {unit}", "limit-text")])
 
 
 def _event_marks(axes: Axes, events: Sequence[tuple[float, str]]) -> Markup:
-    marks = []
+    """Numbered lines at events; numbers that would overlap are written together."""
+    lines: list[Markup] = []
+    labels: list[tuple[float, str]] = []
     for index, (when, what) in enumerate(events[:MOST_EVENTS], start=1):
         if axes.inside(when, vertical=False):
             x = round(float(axes.across(when)), 1)
-            line = tag(
-                "line", tag("title", f"{when:.2f} s: {what}"), x1=x, x2=x, y1=axes.top, y2=axes.bottom, class_="event"
+            tip = tag("title", f"{when:.2f} s: {what}")
+            lines.append(tag("line", tip, x1=x, x2=x, y1=axes.top, y2=axes.bottom, class_="event"))
+            together = bool(labels) and x - labels[-1][0] < LABEL_GAP
+            labels = (
+                [*labels[:-1], (labels[-1][0], f"{labels[-1][1]}, {index}")] if together else [*labels, (x, f"{index}")]
             )
-            marks += [line, text(x + 3, axes.top + 9, index, "event-text")]
-    return join(marks)
+    return join([*lines, *(_event_label(axes, x, label) for x, label in labels)])
+
+
+def _event_label(axes: Axes, x: float, label: str) -> Markup:
+    at_edge = x > axes.right - LABEL_GAP
+    return text(x - 3 if at_edge else x + 3, axes.top + 9, label, "event-text", "end" if at_edge else "start")
 
 
 def _cursor(axes: Axes) -> Markup:
@@ -97,13 +110,25 @@ def _cursor(axes: Axes) -> Markup:
 def events_of(trace: Trace) -> list[tuple[float, str]]:
     """Events of a trace as (time [s], text), in order."""
     pairs = [e for e in trace.meta.get("events") or [] if isinstance(e, list | tuple) and len(e) == 2]
-    return sorted((float(when), str(what)) for when, what in pairs if isinstance(when, int | float))
+    told = [(float(when), str(what)) for when, what in pairs if isinstance(when, int | float)]
+    return sorted(told or _read_off(trace))
 
 
-def run_plots(trace: Trace) -> list[Markup]:
-    """Force, position, attitude and torque of a run."""
+def _read_off(trace: Trace) -> list[tuple[float, str]]:
+    """What the curves themselves tell: first contact, highest force, the end."""
+    time, force = np.asarray(trace.time, dtype=float), np.nan_to_num(norm(trace.wrench[:, :3]))
+    touching = np.flatnonzero(np.nan_to_num(norm(trace.wrench_true[:, :3])) > CONTACT_N)
+    events = [(float(time[touching[0]]), "first contact")] if len(touching) else []
+    if force.max() > CONTACT_N:
+        events.append((float(time[np.argmax(force)]), f"highest force, {force.max():.0f} N"))
+    reason = str(trace.meta.get("reason") or trace.meta.get("failure") or "")
+    return [*events, (float(time[-1]), f"the end: {reason}" if reason else "the end")]
+
+
+def run_plots(trace: Trace, force_limit: float | None = None) -> list[Markup]:
+    """Force, position, attitude and torque of a run; the force limit [N] if the trace does not know it."""
     time, events = np.asarray(trace.time, dtype=float), events_of(trace)
-    limit = (trace.meta.get("limits") or {}).get("force_n")
+    limit = (trace.meta.get("limits") or {}).get("force_n", force_limit)
     true_size = Curve(name="in the simulator", values=norm(trace.wrench_true[:, :3]), stroke="line faint")
     size = Curve(name="size", values=norm(trace.wrench[:, :3]), stroke="line ink")
     origin, first = trace.position[0], trace.quaternion[:1]
@@ -127,9 +152,9 @@ def demonstration_plots(demonstration: Demonstration) -> Markup:
     force = demonstration.wrench[:, :3]
     size = Curve(name="size", values=norm(force), stroke="line ink")
     return join([
-        time_plot("Force", "N", time, [*_components(force, "thin"), size]),
-        time_plot("Motion", "mm", time, _components(moved, "")),
-        time_plot("Turn", "°", time, _components(turn, "")),
+        time_plot("Force", "N", time, [*_components(force, "thin"), size], width=350),
+        time_plot("Motion", "mm", time, _components(moved, ""), width=350),
+        time_plot("Turn", "°", time, _components(turn, ""), width=350),
     ])  # fmt: skip
 
 

@@ -33,7 +33,7 @@ def scene_data(stage: Stage) -> dict[str, Any]:
 
 
 def run_data(trace: Trace, stage: Stage, scene: str) -> dict[str, Any]:
-    """One run: poses, the point that is controlled, the point that was wanted, and the force, frame by frame."""
+    """One run: poses, the tip, where it was wanted, and the force, frame by frame."""
     times = frame_times(np.asarray(trace.time, dtype=float))
     poses = np.concatenate([stage.position, continuous(stage.quaternion)], axis=-1)
     sample = _sampler(np.asarray(trace.time, dtype=float), times)
@@ -43,8 +43,8 @@ def run_data(trace: Trace, stage: Stage, scene: str) -> dict[str, Any]:
         "start": float(times[0]),
         "stop": float(times[-1]),
         "poses": _floats(sample(poses)),
-        "point": _floats(sample(trace.position)),
-        "wanted": _floats(sample(trace.desired_position)),
+        "point": _floats(sample(stage.tip)),
+        "wanted": _floats(sample(stage.wanted)),
         "force": _floats(sample(trace.wrench[:, :3])),
         "peak": float(np.nanmax(norm(np.nan_to_num(trace.wrench[:, :3])), initial=0.0)),
         "close": _camera(stage.close),

@@ -11,6 +11,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -48,6 +49,18 @@ class Rate(NamedTuple):
     def share(self) -> float:
         """Successes by trials."""
         return self.successes / self.trials if self.trials else math.nan
+
+
+def cause_of(failure: str) -> str:
+    """A failure without the clauses that hold figures, which differ from trial to trial.
+
+    "force limit: 80.1 N is above 80 N (at 2.2 s)" and its like are all "force limit".
+    """
+    clauses = re.split(r"(: |, )", re.sub(r"\s*\(at [^)]*\)", "", failure).strip())
+    kept = clauses[0]
+    for separator, clause in zip(clauses[1::2], clauses[2::2], strict=True):
+        kept += "" if re.search(r"\d", clause) else separator + clause
+    return kept or "no cause given"
 
 
 def rate_of(rows: Sequence[Row], fixed: bool = True) -> Rate:
@@ -101,10 +114,10 @@ class Results:
 
     def causes(self, skill: str) -> list[tuple[str, list[int]]]:
         """Failures by cause, most frequent first, each with its trials."""
-        lost = [row for row in self.of(skill) if not row.success]
-        counts = Counter(row.failure or "no cause given" for row in lost)
+        lost = [(cause_of(row.failure), row.trial) for row in self.of(skill) if not row.success]
+        counts = Counter(cause for cause, _ in lost)
         order = sorted(counts, key=lambda cause: (-counts[cause], cause))
-        return [(cause, [r.trial for r in lost if (r.failure or "no cause given") == cause]) for cause in order]
+        return [(cause, [trial for c, trial in lost if c == cause]) for cause in order]
 
     def pairs(self, first: str, second: str) -> tuple[int, int, int, int]:
         """Trials of both skills on the same draws: both succeed, only the first, only the second, neither."""

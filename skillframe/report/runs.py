@@ -27,7 +27,9 @@ def runs_section(chapter: Chapter, prefix: str, scenes: dict[str, Markup]) -> Ma
     """
     if not chapter.runs:
         return note("There is no trace here, so there is no replay.")
-    blocks = [run_block(run, f"{prefix}-run{i}", scenes) for i, run in enumerate(chapter.runs, start=1)]
+    blocks = [
+        run_block(run, f"{prefix}-run{i}", scenes, chapter.force_limit) for i, run in enumerate(chapter.runs, start=1)
+    ]
     hidden = chapter.traces - len(chapter.runs)
     more = (
         note(f"{hidden} more traces are in the folder; give them to skillframe report by name to see them.")
@@ -37,7 +39,7 @@ def runs_section(chapter: Chapter, prefix: str, scenes: dict[str, Markup]) -> Ma
     return join([*blocks, more])
 
 
-def run_block(run: Run, identifier: str, scenes: dict[str, Markup]) -> Markup:
+def run_block(run: Run, identifier: str, scenes: dict[str, Markup], force_limit: float | None = None) -> Markup:
     """One run."""
     meta, stage = run.trace.meta, stage_of(run.trace)
     won = bool(meta.get("success"))
@@ -48,7 +50,7 @@ def run_block(run: Run, identifier: str, scenes: dict[str, Markup]) -> Markup:
         if stage
         else note("This trace holds no geometry, so it can only be plotted.")
     )
-    plots = run_plots(run.trace)
+    plots = run_plots(run.trace, force_limit)
     beside = tag("div", show, tag("div", *plots[:2], class_="plots"), class_="stagebox")
     return tag("article", head, beside, tag("div", *plots[2:], class_="stagebox"), _stills(run, stage), class_="run")
 
@@ -130,7 +132,7 @@ def cover(chapter: Chapter) -> Markup:
     stage = stage_of(chapter.runs[0].trace) if chapter.runs else None
     if stage is None:
         return Markup("")
-    return tag("div", still_image(stage, len(stage.point) // 2, "The tool and the fixture"), class_="cover")
+    return tag("div", still_image(stage, len(stage.tip) // 2, "The tool and the fixture"), class_="cover")
 
 
 def demonstrations_section(chapter: Chapter) -> Markup:

@@ -44,6 +44,7 @@ class Chapter:
         skills: skill documents by file name.
         runs: the traces that are shown; traces: how many there are.
         demonstrations: by file name.
+        force_limit: of the robot as run [N], or None.
         notes: sentences about what is missing or was left out.
         hashes: (file, sha256) of everything read.
     """
@@ -59,6 +60,7 @@ class Chapter:
     runs: list[Run] = field(default_factory=list)
     traces: int = 0
     demonstrations: dict[str, Demonstration] = field(default_factory=dict)
+    force_limit: float | None = None
     notes: list[str] = field(default_factory=list)
     hashes: list[tuple[str, str]] = field(default_factory=list)
 
@@ -112,9 +114,18 @@ def read_folder(folder: Path) -> Chapter:
     chapter.scene = _json_if_there(chapter, folder / "scene.json")
     for path in sorted({*folder.glob("*.skill.json"), *folder.glob("skills/*.json")}):
         chapter.skills[path.name] = _json_if_there(chapter, path)
+    chapter.force_limit = _force_limit(folder)
     _read_folder_traces(chapter, folder)
     _read_demonstrations(chapter, folder)
     return chapter
+
+
+def _force_limit(folder: Path) -> float | None:
+    for path in sorted(folder.glob("robots/*/robot.toml")):
+        limit = (read_toml(path).get("limits") or {}).get("force_n")
+        if isinstance(limit, int | float):
+            return float(limit)
+    return None
 
 
 def _declared(spec: dict[str, Any]) -> tuple[list[str], int | None]:
@@ -166,7 +177,8 @@ def _read_folder_traces(chapter: Chapter, folder: Path) -> None:
         if trace is not None:
             found.append((path, trace))
     chapter.traces = len(found)
-    for path, trace in _telling(found):
+    order = list(chapter.results.skills) if chapter.results else []
+    for path, trace in sorted(_telling(found), key=lambda pair: _rank(pair[1], order)):
         chapter.runs.append(Run(path.name, trace))
         _remember(chapter, path, f"traces/{path.name}")
 
@@ -181,9 +193,15 @@ def _telling(found: list[tuple[Path, Trace]]) -> list[tuple[Path, Trace]]:
     return chosen if len(chosen) > 1 else [*chosen, *rest][: min(2, MOST_RUNS)]
 
 
+def _rank(trace: Trace, order: list[str]) -> tuple[int, bool]:
+    """Skills in the table's order, successes first."""
+    skill = str(trace.meta.get("skill", ""))
+    return (order.index(skill) if skill in order else len(order)), not trace.meta.get("success")
+
+
 def _read_demonstrations(chapter: Chapter, folder: Path) -> None:
     places = [*sorted((folder / "demonstrations").glob("*")), *sorted((folder / "skills").glob("*"))]
-    paths = list({_digest(p): p for p in reversed(places) if p.suffix in (".npz", ".csv")}.values())[::-1]
+    paths = sorted({_digest(p): p for p in reversed(places) if p.suffix in (".npz", ".csv")}.values())
     for path in paths[:MOST_DEMONSTRATIONS]:
         demonstration = _readable(chapter, path, read_demonstration)
         if demonstration is not None:

@@ -1,7 +1,7 @@
 """What is shown of a trace: its bodies as meshes, which of them stand still, where to look from, where to cut.
 
-The close view looks at the tool from the front right; fixtures near it are cut along the vertical plane through the
-tool's middle that faces the viewer (normal -y of base), so that what happens inside a hole is seen.
+The close view looks at the tool's tip from the front right; fixtures near it are cut along the vertical plane through
+the tip that faces the viewer (normal -y of base), so that what happens inside a hole is seen.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from skillframe.trace import Trace
 CUT_NORMAL = np.array([0.0, -1.0, 0.0])
 STILL_MM, STILL_QUATERNION = 1e-6, 1e-6
 AZIMUTH, ELEVATION, FIELD_OF_VIEW = np.radians(-62.0), np.radians(24.0), np.radians(32.0)
+CLOSE = 0.13
+"""How far from the tip [m] things belong to the close view."""
 
 
 class Camera(NamedTuple):
@@ -51,7 +53,8 @@ class Stage:
         names: of the bodies.
         whole: meshes per body, in the body's frame, one per geometry (planes included).
         position, quaternion: (T, B, 3), (T, B, 4) poses.
-        point: (T, 3) the centre of compliance.
+        tip: (T, 3) the tool's tip; the centre of compliance where the trace does not know it.
+        wanted: (T, 3) where the skill wanted it.
     """
 
     names: tuple[str, ...]
@@ -59,7 +62,8 @@ class Stage:
     flat: tuple[bool, ...]
     position: Float
     quaternion: Float
-    point: Float
+    tip: Float
+    wanted: Float
 
     @cached_property
     def still(self) -> tuple[bool, ...]:
@@ -79,24 +83,28 @@ class Stage:
 
     @cached_property
     def tool(self) -> int | None:
-        """The body that is looked at: the one called "tool", else the moving one nearest the centre of compliance."""
+        """The body that is looked at: the one called "tool", else the moving one nearest the tip."""
         moving = [b for b, still in enumerate(self.still) if not still and len(self.meshes[b].vertices)]
         named = [b for b in moving if self.names[b].rsplit("/", 1)[-1] == "tool"]
-        near = sorted(moving, key=lambda b: float(norm(self.placed(b, -1).vertices - self.point[-1]).min()))
+        near = sorted(moving, key=lambda b: float(norm(self.placed(b, -1).vertices - self.tip[-1]).min()))
         return next(iter([*named, *near]), None)
 
     @cached_property
     def close(self) -> Camera:
-        """The close view: the tool from start to end."""
-        seen = self._around_tool()
+        """The close view: what lies near the tool's tip at the start and at the end."""
+        seen = self._near_tip()
         low, high = seen.min(axis=0), seen.max(axis=0)
         radius = float(np.clip(0.5 * norm(high - low), 0.03, 0.6))
-        return Camera(0.5 * (low + high), 1.25 * radius / np.sin(0.5 * FIELD_OF_VIEW))
+        return Camera(0.5 * (low + high), 1.05 * radius / np.sin(0.5 * FIELD_OF_VIEW))
 
-    def _around_tool(self) -> Float:
-        if self.tool is None:
-            return self._everything() if any(len(m.vertices) for m in self.meshes) else self.point
-        return np.concatenate([self.placed(self.tool, 0).vertices, self.placed(self.tool, -1).vertices])
+    def _near_tip(self) -> Float:
+        parts = [self.tip[[0, -1]]]
+        for body in range(len(self.names)):
+            if body == self.tool or (self.still[body] and not self.flat[body]):
+                for frame in (0, -1):
+                    vertices = self.placed(body, frame).vertices
+                    parts.append(vertices[norm(vertices - self.tip[frame]) < CLOSE])
+        return np.concatenate(parts)
 
     def _everything(self) -> Float:
         solid = [b for b in range(len(self.names)) if not self.flat[b] and len(self.meshes[b].vertices)]
@@ -121,13 +129,12 @@ class Stage:
     def _cut_body(self, body: int) -> Mesh | None:
         if not self.still[body] or self.flat[body] or self.tool is None or not len(self.meshes[body].vertices):
             return None
-        reach = self.close.distance * np.sin(0.5 * FIELD_OF_VIEW)
         world = self.placed(body, 0).vertices
-        outside = np.maximum(world.min(axis=0) - self.close.target, self.close.target - world.max(axis=0))
-        if outside.max() > reach:
+        outside = np.maximum(world.min(axis=0) - self.tip[-1], self.tip[-1] - world.max(axis=0))
+        if outside.max() > CLOSE:
             return None
         back = np.swapaxes(matrix_from_quaternion(self.quaternion[0, body]), -1, -2)
-        point = rotate(back, self.close.target - self.position[0, body])
+        point = rotate(back, self.tip[-1] - self.position[0, body])
         return merge([section(mesh, point, rotate(back, CUT_NORMAL)) for mesh in self.whole[body]])
 
 
@@ -144,5 +151,16 @@ def stage_of(trace: Trace) -> Stage | None:
     return Stage(
         names=tuple(str(body.get("name", f"body {i}")) for i, body in enumerate(bodies)),
         whole=whole, flat=flat, position=poses.astype(float), quaternion=np.asarray(trace.body_quaternion, dtype=float),
-        point=np.asarray(trace.position, dtype=float),
+        tip=at_tip(trace, trace.position, trace.quaternion),
+        wanted=at_tip(trace, trace.desired_position, trace.desired_quaternion),
     )  # fmt: skip
+
+
+def at_tip(trace: Trace, position: Float, quaternion: Float) -> Float:
+    """Where the tool's tip is (T, 3) for poses (T, 3), (T, 4) of the centre of compliance; that itself if unknown."""
+    tip, center = (trace.meta.get("frames") or {}).get("tip"), trace.meta.get("center_of_compliance")
+    start = np.asarray(position, dtype=float)
+    if tip is None or center is None:
+        return start
+    offset = np.asarray(tip, dtype=float) - np.asarray(center, dtype=float)
+    return start + rotate(matrix_from_quaternion(quaternion), offset)

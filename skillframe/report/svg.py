@@ -140,7 +140,7 @@ def envelope(x: Float, y: Float, most: int = 260) -> tuple[Float, Float]:
     return x[index], y[index]
 
 
-def legend(axes: Axes, entries: Sequence[tuple[str, str]], start: float = 120.0) -> Markup:
+def legend(axes: Axes, entries: Sequence[tuple[str, str]], start: float = 60.0) -> Markup:
     """Names of curves in one line above the plot, right-aligned: (name, class of its stroke)."""
     widths = [24.0 + 6.6 * len(name) for name, _ in entries]
     x = max(start, axes.right - sum(widths))

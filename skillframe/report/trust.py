@@ -8,14 +8,16 @@ from itertools import combinations
 
 import numpy as np
 
-from skillframe.report.convergence import MOST_CURVES, cell_map, influence, rate_curves, regions, theory_sentence
+from skillframe.report.convergence import MOST_CURVES, cell_map, influence, rate_curves
 from skillframe.report.markup import Markup, figure, join, note, number, percent, table, tag
 from skillframe.report.quantities import quantity
 from skillframe.report.results import Results
 from skillframe.report.sources import Chapter
-from skillframe.report.svg import Axes, padded, picture
+from skillframe.report.svg import Axes, padded, picture, text
+from skillframe.report.theory import regions, theory_sentence
 
 MOST_TRIALS_NAMED = 6
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def trust_section(chapter: Chapter) -> Markup:
@@ -38,7 +40,7 @@ def _map(chapter: Chapter, results: Results) -> Markup:
     pair = [name for name in results.varied if name in ranked[:2]]
     parts = [
         tag("p", _how_to_read(results, pair, ranked), class_="lead"),
-        theory_sentence(limits, chapter.scene, results.varied),
+        theory_sentence(limits, results.varied),
     ]
     if len(pair) == 2:
         maps = [cell_map(results, skill, pair, limits) for skill in results.skills]
@@ -104,7 +106,9 @@ def p_value(p: float) -> str:
     """A p-value for people."""
     if p >= 0.001:
         return f"{p:.3f}"
-    return "< 10⁻¹⁵" if p < 1e-15 else f"{p:.0e}".replace("e-0", " · 10^−").replace("e-", " · 10^−")
+    digit, exponent = f"{max(p, 1e-15):.0e}".split("e")
+    power = f"10{str(int(exponent)).translate(RAISED)}"
+    return f"< {power}" if p < 1e-15 else f"{digit} · {power}"
 
 
 def _failures(results: Results, folder: str) -> Markup:
@@ -152,6 +156,10 @@ def _forces(chapter: Chapter, results: Results) -> Markup:
     for i, skill in enumerate(results.skills):
         xs, ys = np.repeat(edges, 2), np.concatenate([[0], np.repeat(counts[skill], 2), [0]])
         parts.append(axes.line(xs, ys.astype(float), f"histogram s{i % 4 + 1}"))
+    if chapter.force_limit is not None and axes.inside(chapter.force_limit, vertical=False):
+        x = round(float(axes.across(chapter.force_limit)), 1)
+        parts.append(tag("line", x1=x, x2=x, y1=axes.top, y2=axes.bottom, class_="limit"))
+        parts.append(text(x - 4, axes.top + 10, f"limit {chapter.force_limit:g} N", "limit-text", "end"))
     words = "; ".join(
         f"{s}: median {number(float(np.median(f)))} N, highest {number(float(f.max()))} N"
         for s, f in finite.items()

@@ -81,6 +81,21 @@
     return { vertices: buffer(gl, gl.ARRAY_BUFFER, points), normals: buffer(gl, gl.ARRAY_BUFFER, normals), colors: buffer(gl, gl.ARRAY_BUFFER, colors), count };
   }
 
+  /* One WebGL context draws for every viewer on the page (browsers allow about sixteen); null where there is none. */
+  let shared;
+  function studio() {
+    if (shared !== undefined) return shared;
+    const canvas = document.createElement("canvas"), gl = canvas.getContext("webgl", { antialias: true, alpha: true });
+    if (!gl) return (shared = null);
+    gl.getExtension("OES_element_index_uint");
+    const linked = program(gl), at = {};
+    gl.useProgram(linked);
+    for (const name of ["turn", "place", "stretch", "view", "eye", "plain"]) at[name] = gl.getUniformLocation(linked, name);
+    gl.enable(gl.DEPTH_TEST); gl.enable(gl.BLEND); gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.enable(gl.POLYGON_OFFSET_FILL); gl.polygonOffset(1, 1);
+    return (shared = { canvas, gl, at, scenes: {} });
+  }
+
   const sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -115,21 +130,18 @@
     }
 
     open() {
-      const gl = this.canvas.getContext("webgl", { antialias: true, alpha: true, preserveDrawingBuffer: true });
-      if (!gl) {
+      const place = studio();
+      if (!place) {
         this.find("screen").classList.add("missing");
         this.find("readout").textContent = "This browser has no WebGL; the stills and plots show the run.";
         return false;
       }
-      gl.getExtension("OES_element_index_uint");
-      this.gl = gl; this.program = program(gl); gl.useProgram(this.program);
-      this.at = {};
-      for (const name of ["turn", "place", "stretch", "view", "eye", "plain"]) this.at[name] = gl.getUniformLocation(this.program, name);
-      const scene = data(this.run.scene);
-      this.bodies = scene.bodies.map((body) => ({ whole: mesh(gl, body.mesh), cut: body.cut && mesh(gl, body.cut) }));
+      const gl = place.gl, key = this.run.scene;
+      this.gl = gl; this.at = place.at; this.paper = this.canvas.getContext("2d");
+      place.scenes[key] = place.scenes[key] || data(key).bodies.map((body) => ({ whole: mesh(gl, body.mesh), cut: body.cut && mesh(gl, body.cut) }));
+      this.bodies = place.scenes[key];
       this.arrow = arrow(gl, [214, 64, 69]);
       this.paths = [path(gl, this.run.wanted, [120, 130, 145]), path(gl, this.run.point, [29, 120, 200])];
-      gl.enable(gl.DEPTH_TEST); gl.enable(gl.BLEND); gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
       new ResizeObserver(() => this.draw()).observe(this.canvas);
       return true;
     }
@@ -260,7 +272,9 @@
       if (!gl) return;
       const ratio = Math.min(window.devicePixelRatio || 1, 2);
       const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio)), height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
-      if (this.canvas.width !== width || this.canvas.height !== height) { this.canvas.width = width; this.canvas.height = height; }
+      for (const canvas of [this.canvas, shared.canvas]) {
+        if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
+      }
       gl.viewport(0, 0, width, height); gl.clearColor(0, 0, 0, 0); gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
       const { target, distance, fov } = this.camera, back = this.backward(), eye = target.map((t, i) => t + distance * back[i]);
       gl.uniformMatrix4fv(this.at.view, false, viewMatrix(eye, target, fov, width / height, 0.02 * distance, 20 * distance + 4));
@@ -272,6 +286,7 @@
       });
       if (this.find("path").checked) this.drawPaths();
       if (this.find("arrow").checked) this.drawForce();
+      this.paper.clearRect(0, 0, width, height); this.paper.drawImage(shared.canvas, 0, 0);
     }
 
     paint(item, place, turn, mode) {
@@ -302,16 +317,9 @@
     }
   }
 
-  window.skillframeViewers = [];
-  const start = (root) => { window.skillframeViewers.push(new Viewer(root)); };
-  const roots = document.querySelectorAll(".viewer");
-  if (!("IntersectionObserver" in window)) roots.forEach(start);
-  else {
-    const watch = new IntersectionObserver((entries) => entries.forEach((entry) => {
-      if (entry.isIntersecting) { watch.unobserve(entry.target); start(entry.target); }
-    }), { rootMargin: "400px" });
-    roots.forEach((root) => watch.observe(root));
-  }
+  const viewers = Array.from(document.querySelectorAll(".viewer"));
+  const startNext = () => { if (viewers.length) { new Viewer(viewers.shift()); setTimeout(startNext, 0); } };
+  startNext();
   const toggle = document.getElementById("theme");
   toggle.addEventListener("click", () => {
     const root = document.documentElement, dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
