@@ -105,9 +105,8 @@ def _settings(options: dict[str, Any]) -> dict[str, Any]:
     for name in ("start", "stop", "wrench_shift"):
         if settings[name] is not None and not math.isfinite(settings[name]):
             raise click.UsageError(f"{settings[name]} is not a time")
-    return {
-        k: v for k, v in settings.items() if (v is not None and v is not False and v != 0.0) or k in ("start", "stop")
-    }
+    unset = {"zero_time": False, "wrench_shift": 0.0, "clock": "auto"}
+    return {k: v for k, v in settings.items() if v is not None and (k not in unset or v != unset[k])}
 
 
 @command.command()

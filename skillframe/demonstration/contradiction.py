@@ -5,9 +5,9 @@ Two signatures, both our choice:
 - Weight and bias. A sensor on a turning tool reads a bias fixed in the tool and a weight fixed in base. In tool axes
   \(F = b + R^T w\), in base axes \(F = w + R b\). Both are fitted robustly to the first quarter, half, three quarters
   and all of the recording, since contact comes late; the declared frame is refused if its median residual exceeds
-  0.5 N and five times the other's in one of them. Constant forces in either frame satisfy both models, so that a contact force
-  that turns with the tool is no contradiction. A weight that is declared to be in the wrench must also turn in tool
-  axes (and not in base axes).
+  0.5 N and five times the other's in one of them. Constant forces in either frame satisfy both models, so that a
+  contact force that turns with the tool is no contradiction. A weight that is declared to be in the wrench must also
+  turn in tool axes (and not in base axes).
 - Work. A passive environment cannot push the tool along. Over the motion in contact, with
   \(c = \int F \cdot dx / \int |F| |dx|\), the declared frame is refused if its c is above 0.3, the other's below -0.3.
 """
