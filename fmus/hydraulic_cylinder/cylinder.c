@@ -1,0 +1,311 @@
+/* The hydraulic cylinder as a model of fmus/common: start, step, outputs, rates and events. Equations: README.md. */
+#include <stdio.h>
+
+#include "chambers.h"
+#include "integrate.h"
+
+#define PI 3.14159265358979323846
+#define LEAST_SUBSTEP 1e-9   /* s */
+#define REPORT(...) (snprintf(r->text, sizeof r->text, __VA_ARGS__))
+
+/* ---- command ---- */
+
+static double demand_at(const Model *m, double time)
+{
+    const Own *o = &m->own;
+    double slew = m->value[SPOOL_SLEW], way = o->target - o->demand, done = slew * (time - o->demand_time);
+    if (slew <= 0.0 || done >= fabs(way)) return o->target;
+    return o->demand + (way < 0.0 ? -done : done);
+}
+
+/* Saturation, then play: the spool's target follows the command only once the play is used up (README eq. 1). */
+static void take_command(Model *m)
+{
+    double u = clip(m->value[COMMAND], -1.0, 1.0), half = 0.5 * m->value[HYSTERESIS];
+    double target = clip(m->own.target, u - half, u + half);
+    m->own.demand = demand_at(m, m->time);
+    m->own.demand_time = m->time;
+    m->own.target = target;
+}
+
+static double ramp_end(const Model *m)
+{
+    double slew = m->value[SPOOL_SLEW], way = fabs(m->own.target - m->own.demand);
+    return slew > 0.0 && way > 0.0 ? m->own.demand_time + way / slew : -HUGE_VAL;
+}
+
+/* The spool at `t` after a step's start, where it was `s`. */
+static Spool spool_at(const Model *m, Spool s, double t)
+{
+    const Own *o = &m->own;
+    double slew = m->value[SPOOL_SLEW], way = o->target - o->demand, damping = m->value[SPOOL_DAMPING];
+    double ramp = way < 0.0 ? -slew : slew, arrival = slew > 0.0 ? fabs(way) / slew : 0.0;
+    if (t <= arrival) return spool_after(s, o->demand, way == 0.0 ? 0.0 : ramp, t, o->omega, damping);
+    if (arrival > 0.0) s = spool_after(s, o->demand, ramp, arrival, o->omega, damping);
+    return spool_after(s, o->target, 0.0, t - arrival, o->omega, damping);
+}
+
+/* ---- force ---- */
+
+static double end_stop(const Model *m, double x, double v)
+{
+    double low = -x, high = x - m->value[STROKE], k = m->value[ENDSTOP_STIFFNESS], d = m->value[ENDSTOP_DAMPING];
+    if (low > 0.0) return fmax(0.0, k * low - d * v);
+    if (high > 0.0) return -fmax(0.0, k * high + d * v);
+    return 0.0;
+}
+
+static double limit_at(const Model *m, double v)
+{
+    const double *p = m->value;
+    return sliding_deflection(v, p[PRESLIDING_LENGTH], p[COULOMB_FRICTION], p[STATIC_FRICTION], p[STRIBECK_VELOCITY]);
+}
+
+static double deflection_rate(const Model *m, double z, double v) { return v - fabs(v) * z / limit_at(m, v); }
+
+static double friction(const Model *m, double z, double v) { return m->own.stiffness * z + m->value[VISCOUS_FRICTION] * v; }
+
+/* Force and its rate at one instant: what the quadrature of impulse and work needs. */
+typedef struct { double smooth, rate, stop; } Push;
+
+static Push push(const Model *m, const double p[3], const Chambers *c, double z, const Motion *w)
+{
+    const Own *o = &m->own;
+    Push f = {o->area_a * p[A] - o->area_b * p[B] - friction(m, z, w->velocity),
+              o->area_a * c->rate[A] - o->area_b * c->rate[B]
+                  - o->stiffness * deflection_rate(m, z, w->velocity) - m->value[VISCOUS_FRICTION] * w->acceleration,
+              end_stop(m, w->position, w->velocity)};
+    return f;
+}
+
+/* Impulse and work over one internal step: corrected trapezoidal rule (order 4), plain for the end stops. */
+static void accumulate(const Push *f, const Motion *a, const Push *g, const Motion *b, double h, double *impulse,
+                       double *work)
+{
+    double fv = f->rate * a->velocity + f->smooth * a->acceleration;
+    double gv = g->rate * b->velocity + g->smooth * b->acceleration;
+    *impulse += 0.5 * h * (f->smooth + f->stop + g->smooth + g->stop) + h * h / 12.0 * (f->rate - g->rate);
+    *work += 0.5 * h * ((f->smooth + f->stop) * a->velocity + (g->smooth + g->stop) * b->velocity)
+             + h * h / 12.0 * (fv - gv);
+}
+
+static void write_outputs(Model *m, const Chambers *c)
+{
+    double *v = m->value, z = v[DEFLECTION], speed = m->own.velocity;
+    v[FRICTION] = friction(m, z, speed);
+    v[FORCE] = m->own.area_a * v[PRESSURE_A] - m->own.area_b * v[PRESSURE_B] - v[FRICTION]
+               + end_stop(m, m->own.position, speed);
+    v[FLOW_A] = c->flow_a, v[FLOW_B] = c->flow_b, v[FLOW_SUPPLY] = c->flow_supply;
+    m->own.stale = 0.0;
+}
+
+static Motion present(const Model *m)
+{
+    const double *v = m->value;
+    Motion w = {m->own.position, m->own.velocity, v[ACCELERATION], {v[SPOOL], v[SPOOL_VELOCITY]}};
+    return w;
+}
+
+/* ---- checks ---- */
+
+static Outcome check_position(const Model *m, double x, Report *r)
+{
+    double slack = fmin(0.02 + 0.02 * m->value[STROKE],
+                        0.5 * fmin(m->value[DEAD_VOLUME_A] / m->own.area_a, m->value[DEAD_VOLUME_B] / m->own.area_b));
+    if (x >= -slack && x <= m->value[STROKE] + slack) return OK;
+    REPORT("position %.4g m is outside the stroke 0 to %.4g m by more than %.3g m; check the start pose and the end stops",
+           x, m->value[STROKE], slack);
+    return DISCARD;
+}
+
+static Outcome require(int fine, const char *name, const char *rule, double value, Report *r)
+{
+    if (fine) return OK;
+    REPORT("parameter %s is %g; it must be %s", name, value, rule);
+    return FAILED;
+}
+
+#define POSITIVE(i) require(v[i] > 0.0, VARIABLES[i].name, "greater than zero", v[i], r)
+#define NOT_NEGATIVE(i) require(v[i] >= 0.0, VARIABLES[i].name, "zero or more", v[i], r)
+
+static Outcome check_parameters(const Model *m, Report *r)
+{
+    static const int positive[] = {BORE, STROKE, DEAD_VOLUME_A, DEAD_VOLUME_B, BULK_MODULUS, RATED_FLOW,
+                                   RATED_PRESSURE_DROP, SPOOL_FREQUENCY, SPOOL_DAMPING, LAMINAR_PRESSURE,
+                                   STRIBECK_VELOCITY, PRESLIDING_LENGTH, PUMP_DROOP, SUPPLY_VOLUME, CUSHION_FLOW,
+                                   SUBSTEP, TOLERANCE};
+    static const int not_negative[] = {ROD, BULK_MODULUS_SLOPE, AIR_FRACTION, SPOOL_SLEW, DEADBAND, HYSTERESIS, LEAKAGE,
+                                       COULOMB_FRICTION, VISCOUS_FRICTION, STATIC_FRICTION, PUMP_FLOW,
+                                       ENDSTOP_STIFFNESS, ENDSTOP_DAMPING, CUSHION_LENGTH, RELIEF_CONDUCTANCE,
+                                       CHECK_CONDUCTANCE};
+    const double *v = m->value;
+    Outcome out = OK;
+    for (size_t i = 0; i < sizeof positive / sizeof *positive && out == OK; i++) out = POSITIVE(positive[i]);
+    for (size_t i = 0; i < sizeof not_negative / sizeof *not_negative && out == OK; i++)
+        out = NOT_NEGATIVE(not_negative[i]);
+    if (out == OK) out = require(v[ROD] < v[BORE], "rod", "smaller than bore", v[ROD], r);
+    if (out == OK) out = require(v[AIR_FRACTION] < 0.5, "air_fraction", "below 0.5", v[AIR_FRACTION], r);
+    if (out == OK) out = require(v[DEADBAND] < 1.0, "deadband", "below 1", v[DEADBAND], r);
+    if (out == OK) out = require(v[SUBSTEP] >= 1e-6, "substep", "at least 1e-6 s", v[SUBSTEP], r);
+    if (out == OK)
+        out = require(v[SUPPLY_PRESSURE] > v[RETURN_PRESSURE], "supply_pressure", "above return_pressure",
+                      v[SUPPLY_PRESSURE], r);
+    return out;
+}
+
+/* ---- what the faces call ---- */
+
+static void derive(Model *m)
+{
+    const double *v = m->value;
+    double drop = v[RATED_PRESSURE_DROP] * (v[RATED_DROP_IS_PER_EDGE] != 0.0 ? 1.0 : 0.5);
+    m->own.area_a = 0.25 * PI * v[BORE] * v[BORE];
+    m->own.area_b = m->own.area_a - 0.25 * PI * v[ROD] * v[ROD];
+    m->own.edge = v[RATED_FLOW] / sqrt(drop);
+    m->own.cushion = v[CUSHION_FLOW] / sqrt(v[RATED_PRESSURE_DROP]);
+    m->own.omega = 2.0 * PI * v[SPOOL_FREQUENCY];
+    m->own.stiffness = v[COULOMB_FRICTION] / v[PRESLIDING_LENGTH];
+    m->own.pump_slope = v[PUMP_FLOW] / v[PUMP_DROOP];
+}
+
+/* Static equilibrium: closed or steadily open valve, pressures that hold initial_force (README eq. 10). */
+static void settle(Model *m)
+{
+    double *v = m->value, low = v[INITIAL_PRESSURE], u = clip(v[COMMAND], -1.0, 1.0);
+    double over = v[INITIAL_FORCE] - (m->own.area_a - m->own.area_b) * low;
+    v[PRESSURE_A] = over > 0.0 ? low + over / m->own.area_a : low;
+    v[PRESSURE_B] = over > 0.0 ? low : low - over / m->own.area_b;
+    v[PRESSURE_SUPPLY] = v[SUPPLY_PRESSURE];
+    v[SPOOL] = m->own.target = m->own.demand = u;
+    m->own.demand_time = m->time;
+    v[SPOOL_VELOCITY] = v[DEFLECTION] = v[WORK] = 0.0;
+    m->own.position = v[POSITION], m->own.velocity = v[VELOCITY];
+}
+
+Outcome model_start(Model *m, Report *r)
+{
+    Outcome out = check_parameters(m, r);
+    if (out != OK) return out;
+    derive(m);
+    out = check_position(m, m->value[POSITION], r);
+    if (out != OK) return FAILED;
+    settle(m);
+    m->own.stale = 1.0;
+    model_outputs(m, r);
+    m->value[FORCE_MEAN] = m->value[FORCE];
+    double highest = fmax(m->value[PRESSURE_A], m->value[PRESSURE_B]);
+    if (highest <= m->value[RELIEF_PRESSURE]) return OK;
+    REPORT("initial_force %g N needs %.4g bar, above the port relief at %.4g bar; the piston will give way",
+           m->value[INITIAL_FORCE], highest / 1e5, m->value[RELIEF_PRESSURE] / 1e5);
+    return WARNING;
+}
+
+void model_touch(Model *m, unsigned variable)
+{
+    if (variable == POSITION) m->own.position = m->value[POSITION];
+    if (variable == VELOCITY) m->own.velocity = m->value[VELOCITY];
+    m->own.stale = 1.0;
+}
+
+Outcome model_outputs(Model *m, Report *r)
+{
+    (void)r;
+    if (m->own.stale == 0.0) return OK;
+    Chambers c;
+    Motion w = present(m);
+    const double p[3] = {m->value[PRESSURE_A], m->value[PRESSURE_B], m->value[PRESSURE_SUPPLY]};
+    chambers(m, &w, p, &c);
+    write_outputs(m, &c);
+    return OK;
+}
+
+/* Motion at t after the step's start; piston motion is a parabola through the inputs. */
+static Motion motion_at(const Model *m, Spool s, double t)
+{
+    const double *v = m->value;
+    double a = v[ACCELERATION];
+    Motion w = {v[POSITION] + t * (v[VELOCITY] + 0.5 * a * t), v[VELOCITY] + a * t, a, spool_at(m, s, t)};
+    return w;
+}
+
+/* End of the next internal step: the usual length, or the piston's reversal, or the end of the slewed command. */
+static double next_break(double t, double usual, double step, const double breaks[2])
+{
+    double end = t + usual * 1.0001 >= step ? step : t + usual;
+    for (int i = 0; i < 2; i++)
+        if (breaks[i] > t + LEAST_SUBSTEP && breaks[i] < end - LEAST_SUBSTEP) end = breaks[i];
+    return end;
+}
+
+Outcome model_step(Model *m, double step, Report *r)
+{
+    double *v = m->value, a = v[ACCELERATION], t = 0.0, impulse = 0.0, work = 0.0, z = v[DEFLECTION];
+    double p[3] = {v[PRESSURE_A], v[PRESSURE_B], v[PRESSURE_SUPPLY]}, q[3];
+    int n = v[PUMP_FLOW] > 0.0 ? 3 : 2;
+    Spool s0 = {v[SPOOL], v[SPOOL_VELOCITY]};
+    double largest = step / ceil(step / v[SUBSTEP] * 0.9999), usual = largest;
+    double last = v[POSITION] + step * (v[VELOCITY] + 0.5 * a * step);
+    take_command(m);
+    double breaks[2] = {a != 0.0 ? -v[VELOCITY] / a : -1.0, ramp_end(m) - m->time};
+    Outcome out = check_position(m, v[POSITION], r);
+    if (out == OK) out = check_position(m, last, r);
+    if (out != OK) return out;
+    Motion here = motion_at(m, s0, 0.0), there;
+    Chambers c, d;
+    chambers(m, &here, p, &c);
+    Push f = push(m, p, &c, z, &here), g;
+    while (t < step) {
+        double end = next_break(t, usual, step, breaks), h = end - t;
+        there = motion_at(m, s0, end);
+        double error = rosenbrock(m, &c, &there, h, n, p, q);
+        if (error > v[TOLERANCE]) {
+            usual = h * clip(0.8 * cbrt(v[TOLERANCE] / error), 0.1, 0.7);
+            if (usual >= LEAST_SUBSTEP) continue;
+            REPORT("no finite pressures within %g s at %.6g s (error %.3g Pa); check velocity and parameters", h,
+                   m->time + t, error);
+            return DISCARD;
+        }
+        usual = fmin(largest, usual * clip(0.8 * cbrt(v[TOLERANCE] / fmax(error, 1e-30)), 1.0, 3.0));
+        z = deflection_after(z, h * (here.velocity + 0.5 * a * h), limit_at(m, 0.5 * (here.velocity + there.velocity)));
+        chambers(m, &there, q, &d);
+        g = push(m, q, &d, z, &there);
+        accumulate(&f, &here, &g, &there, h, &impulse, &work);
+        here = there, c = d, f = g, t = end;
+        p[A] = q[A], p[B] = q[B], p[S] = q[S];
+    }
+    v[PRESSURE_A] = p[A], v[PRESSURE_B] = p[B], v[PRESSURE_SUPPLY] = p[S];
+    v[SPOOL] = here.spool.x, v[SPOOL_VELOCITY] = here.spool.v, v[DEFLECTION] = z;
+    v[FORCE_MEAN] = impulse / step, v[WORK] = work;
+    m->own.position = here.position, m->own.velocity = here.velocity;
+    write_outputs(m, &c);
+    return OK;
+}
+
+Outcome model_rates(Model *m, double rates[], Report *r)
+{
+    double *v = m->value, demand = demand_at(m, m->time), w = m->own.omega;
+    const double p[3] = {v[PRESSURE_A], v[PRESSURE_B], v[PRESSURE_SUPPLY]};
+    Chambers c;
+    Motion now = present(m);
+    chambers(m, &now, p, &c);
+    v[DER_PRESSURE_A] = c.rate[A], v[DER_PRESSURE_B] = c.rate[B], v[DER_PRESSURE_SUPPLY] = c.rate[S];
+    v[DER_SPOOL] = v[SPOOL_VELOCITY];
+    v[DER_SPOOL_VELOCITY] = w * w * (demand - v[SPOOL]) - 2.0 * v[SPOOL_DAMPING] * w * v[SPOOL_VELOCITY];
+    v[DER_DEFLECTION] = deflection_rate(m, v[DEFLECTION], now.velocity);
+    for (unsigned i = 0; i < N_STATES; i++) {
+        rates[i] = v[RATES[i]];
+        if (isfinite(rates[i])) continue;
+        REPORT("the rate of %s is not finite at %.6g s", VARIABLES[STATES[i]].name, m->time);
+        return DISCARD;
+    }
+    return OK;
+}
+
+Outcome model_event(Model *m, double *next, Report *r)
+{
+    (void)r;
+    take_command(m);
+    double end = ramp_end(m);
+    if (end > m->time) *next = end;
+    return OK;
+}
