@@ -160,15 +160,24 @@ def check(files: tuple[Path, ...], as_json: bool, **options: Any) -> int:
     """
     from skillframe.demonstration.audit import audit, odd_ones
     from skillframe.demonstration.files import read_demonstration
+    from skillframe.errors import SkillframeError
 
-    settings = _settings(options)
-    demonstrations = [read_demonstration(path, **settings) for path in files]
+    settings, demonstrations = _settings(options), []
+    for path in files:
+        try:
+            demonstrations.append(read_demonstration(path, **settings))
+        except SkillframeError as error:
+            if len(files) == 1:
+                raise
+            click.echo(f"error: {error}", err=True)
     audits = odd_ones(demonstrations, [audit(d) for d in demonstrations])
     if as_json:
         emit_json([found.as_json() for found in audits])
     else:
         for found in audits:
             _show(found)
+    if len(demonstrations) < len(files):
+        return 2
     return 0 if all(found.usable for found in audits) else 1
 
 

@@ -32,9 +32,9 @@ QUANTITY = {
 }  # fmt: skip
 ALIASES = {
     "time": "t", "timestamp": "t", "stamp": "t", "x": "px", "y": "py", "z": "pz", "pos_x": "px", "pos_y": "py",
-    "pos_z": "pz", "mx": "tx", "my": "ty", "mz": "tz", "rx": "rvx", "ry": "rvy", "rz": "rvz",
+    "pos_z": "pz", "mx": "tx", "my": "ty", "mz": "tz",
 }  # fmt: skip
-"""Names that other tools use, for suggestions only: a header is never guessed."""
+"""Names that other tools use: suggested for a header, which is never guessed, and taken where the user wrote them."""
 
 
 class Columns(dict[str, Float]):
@@ -103,16 +103,25 @@ def _picks(table: Table, spec: str | None) -> dict[str, int]:
             f"{table.source}: row {table.rows[0]}", "has no header",
             "add the header t,px,py,pz,qx,qy,qz,qw,fx,fy,fz,tx,ty,tz or name the columns with --columns",
         )  # fmt: skip
-    names = table.names if spec is None else [name.strip() for name in spec.split(",")]
+    names = table.names if spec is None else split_names(spec)
     if spec is not None and "=" in spec:
-        pairs = [name.partition("=") for name in names]
-        return _unique(table.source, [(name, _column(table, column or name)) for name, _, column in pairs])
+        pairs = [
+            (ALIASES.get(n.strip(), n.strip()), column.strip() or n.strip())
+            for n, _, column in (p.partition("=") for p in names)
+        ]
+        return _unique(table.source, [(name, _column(table, column)) for name, column in pairs])
     if len(names) != width:
         raise InputError(
             table.source, f"has {width} columns, --columns names {len(names)}",
             'name every column in order, "_" for one to ignore, or pick by header with NAME=COLUMN',
         )  # fmt: skip
     return _unique(table.source, [(name, i) for i, name in enumerate(names) if name not in ("_", "")])
+
+
+def split_names(spec: str) -> list[str]:
+    """The names of a list of columns, separated by commas or else blanks; familiar other names are understood."""
+    names = [name.strip() for name in (spec.split(",") if "," in spec else spec.split())]
+    return [name if "=" in name else ALIASES.get(name, name) for name in names]
 
 
 def _column(table: Table, column: str) -> int:

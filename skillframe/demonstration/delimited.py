@@ -9,7 +9,7 @@ from typing import Any
 
 from skillframe.demonstration.assemble import assemble
 from skillframe.demonstration.checks import refuse_w_first_header
-from skillframe.demonstration.columns import WRENCH, Columns, left_out, name_columns
+from skillframe.demonstration.columns import WRENCH, Columns, left_out, name_columns, split_names
 from skillframe.demonstration.metafile import read_meta
 from skillframe.demonstration.options import ReadOptions, read_options
 from skillframe.demonstration.record import Demonstration
@@ -39,7 +39,7 @@ def _split_columns(table: Table, options: ReadOptions) -> ReadOptions:
     """One list of columns for two files: the wrench's names go to the wrench file, t to both."""
     if options.wrench is None or options.columns is None or options.wrench_columns is not None:
         return options
-    names = [name.strip() for name in options.columns.split(",")]
+    names = split_names(options.columns)
     if "=" in options.columns or len(names) == table.values.shape[1] or not set(WRENCH) <= set(names):
         return options
     own = ",".join(name for name in names if name not in WRENCH)

@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 from skillframe.errors import InputError
 from skillframe.frames import Float
 
+CONTROL = [chr(code) for code in range(32) if chr(code) not in "\t\n\r\f\v"]
+"""Characters that no table holds; random bytes nearly always do."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
@@ -54,8 +57,8 @@ def read_text(path: Path) -> str:
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
-        text = "\0"
-    if "\0" in text:
+        text = raw.decode("latin-1")  # a degree sign of an old editor, or not text at all
+    if any(c in text for c in CONTROL):
         raise InputError(path, "is binary, not text", "give delimited text, or name a native file .npz")
     return text
 
@@ -72,7 +75,7 @@ def read_table(path: Path, header: bool | None = None) -> Table:
     """
     lines = [(i, line.strip()) for i, line in enumerate(read_text(path).splitlines(), start=1)]
     lines = [(i, line) for i, line in lines if line]
-    delimiter = _delimiter(next((line for _, line in lines if line[0] not in "#%"), lines[0][1]))
+    delimiter = _delimiter(lines[-1][1])
     names: list[str] = []
     while lines and lines[0][1][0] in "#%" and not header and not _looks_like_header(lines, delimiter):
         lines = lines[1:]
@@ -88,10 +91,10 @@ def read_table(path: Path, header: bool | None = None) -> Table:
     return Table(source=str(path), names=names, values=values, rows=np.array([i for i, _ in lines]), text=text)
 
 
-def _delimiter(line: str) -> str | None:
-    """The separator of a row; None for runs of blanks and tabs."""
-    for candidate in (",", ";"):
-        if candidate in line:
+def _delimiter(row: str) -> str | None:
+    """The separator of a row of data; None for runs of blanks and tabs."""
+    for candidate in (";", ",", "\t"):
+        if candidate in row and not any(" " in cell.strip() for cell in row.split(candidate)):
             return candidate
     return None
 

@@ -56,6 +56,7 @@ NAMES = "t,px,py,pz,roll,pitch,yaw"
         ["--columns", NAMES, "--columns", "t,fx,fy,fz,tx,ty,tz"],
         ["--columns", f"{NAMES},fx,fy,fz,tx,ty,tz"],
         ["--columns", NAMES],
+        ["--columns", "time,x,y,z,roll,pitch,yaw", "--wrench-columns", "t fx fy fz mx my mz"],
     ],
 )
 def test_pose_and_wrench_are_joined_however_their_columns_are_named(demo: Demonstration, columns: list[str]) -> None:
@@ -90,6 +91,15 @@ def test_check_answers_no_where_nothing_moves(demo: Demonstration) -> None:
     )
     write_demonstration(still, "still.npz")
     assert run(["demonstration", "check", "still.npz"]) == 1
+
+
+def test_a_bad_file_among_others_is_named_and_the_others_are_still_audited(
+    demo: Demonstration, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["demonstration", "check", "none.csv", "demo.csv", "--json"]) == 2
+    printed = capsys.readouterr()
+    assert [row["file"] for row in json.loads(printed.out)] == ["demo.csv"]
+    assert "none.csv: no such file" in printed.err
 
 
 SPOILED = {

@@ -141,6 +141,13 @@ def test_separators_are_told_apart(rows: list[list[str]], tmp_path: Path, separa
     assert len(read_demonstration(path)) == len(rows) - 1
 
 
+def test_a_header_with_blanks_and_a_degree_sign_of_an_old_editor_is_read(rows: list[list[str]], tmp_path: Path) -> None:
+    path = tmp_path / "demo.txt"
+    names = ["time (s)", *rows[0][1:-1], "Tz (\N{DEGREE SIGN})"]
+    path.write_bytes("\n".join("\t".join(row) for row in [names, *rows[1:]]).encode("latin-1"))
+    assert len(read_demonstration(path, columns=",".join(rows[0]))) == len(rows) - 1
+
+
 def test_columns_can_be_picked_by_header_and_units_scaled(rows: list[list[str]], write: Callable[..., Path]) -> None:
     cells = [["%stamp", "skip", *rows[0][1:]], *([str(int(i * 1e7)), "x1", *row[1:]] for i, row in enumerate(rows[1:]))]
     picks = ",".join(["t=stamp", *(f"{n}={n}" for n in rows[0][1:])])
