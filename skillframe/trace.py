@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -90,8 +90,24 @@ class Trace:
             raise InputError(path, "no such file", "check the path") from None
         except Exception as error:
             raise InputError(path, f"is not a trace file ({error})", "give a .npz written by skillframe run") from None
-        if meta.get("format") != FORMAT:
-            raise InputError(path, f"has format {meta.get('format')!r}, not {FORMAT!r}", "give a trace file")
-        if meta.get("version", 0) > VERSION:
-            raise InputError(path, f"is of version {meta['version']}, newer than {VERSION}", "update skillframe")
+        if not isinstance(meta, dict) or meta.get("format") != FORMAT:
+            said = meta.get("format") if isinstance(meta, dict) else meta
+            raise InputError(path, f"has format {said!r}, not {FORMAT!r}", "give a trace file")
+        if not isinstance(meta.get("version"), int) or meta["version"] > VERSION:
+            raise InputError(path, f"is of version {meta.get('version')}, newer than {VERSION}", "update skillframe")
+        _check_arrays(path, arrays)
         return cls(**arrays, meta=meta)
+
+
+def _check_arrays(path: Path, arrays: dict[str, Float]) -> None:
+    wanted = {f.name for f in fields(Trace)} - {"meta"}
+    if set(arrays) != wanted:
+        odd = ", ".join(sorted(set(arrays) ^ wanted))
+        raise InputError(path, f"lacks, or does not know, the arrays {odd}", "write the trace again")
+    rows = {name: len(array) if array.ndim else 0 for name, array in arrays.items()}
+    for name, shape in COLUMNS.items():
+        if rows[name] != rows["time"] or arrays[name].shape[1:] != shape:
+            raise InputError(path, f"array {name} has the shape {arrays[name].shape}", "write the trace again")
+    for name in ("q", "body_position", "body_quaternion"):
+        if rows[name] != rows["time"]:
+            raise InputError(path, f"array {name} has {rows[name]} rows, time {rows['time']}", "write the trace again")

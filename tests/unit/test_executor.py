@@ -1,0 +1,346 @@
+import numpy as np
+import pytest
+
+from skillframe.errors import SkillframeError, UnknownName
+from skillframe.frames import Pose, matrix_from_quaternion, norm, rotation_vector
+from skillframe.robot.kinematics import at
+from skillframe.robot.spec import Limits
+from skillframe.skill import Command, Impedance, Skill, Status, no_reasons
+from skillframe.world.placement import start_configurations
+from skillframe.world.sensors import SensorSettings
+from tests.laws.pushing import Push, impedance
+from tests.laws.runs import run, setup
+
+VALLEY = impedance(free_axes="x")
+DOWN = (0.0, 0.0, -1.0)
+
+
+class Hold(Skill):
+    """Stay where the run started, plus an offset and a feed-forward; end with a status when told to."""
+
+    def __init__(self, stiffness, offset=(0.0, 0.0, 0.0), feedforward=lambda time: np.zeros(6), damping=None, end=None):
+        self.stiffness, self.offset, self.feedforward, self.damping, self.end = (
+            stiffness,
+            offset,
+            feedforward,
+            damping,
+            end,
+        )
+
+    def start(self, observation, rngs):
+        self.pose = Pose(observation.pose.position + np.array(self.offset), observation.pose.rotation.copy())
+        self.impedance = Impedance(self.stiffness, self.damping)
+
+    def step(self, observation):
+        count, time = len(observation.time), observation.time[0]
+        status, reason = np.zeros(count, dtype=int), no_reasons(count)
+        if self.end is not None and time >= self.end[0]:
+            status[:], reason[:] = self.end[1], self.end[2]
+        push = np.broadcast_to(self.feedforward(time), (count, 6))
+        return Command(self.pose, np.zeros((count, 6)), self.impedance, push, status, reason)
+
+
+def push_down(**options):
+    return Push(DOWN, VALLEY, stall=False, **options)
+
+
+# --- what a run is ---
+
+
+def test_a_push_slides_a_ball_to_the_bottom_of_the_valley_from_both_sides():
+    result = run(push_down(), setup(), {"start.offset_x": [0.02, -0.02]}, count=2, duration_s=2.5)
+    assert result.success.all()
+    assert list(result.failure) == ["", ""]
+    assert (result.final_error_m < 1e-3).all()
+    assert ((result.peak_force_n > 5.0) & (result.peak_force_n < 60.0)).all()
+
+
+def test_a_start_is_bumpless():
+    """At the first tick the law asks for (almost) nothing, whatever twist and feed-forward the skill wants: gravity
+    is compensated and that is all. Noise through the springs (5e-5 m x 1000 N/m, 3.5e-4 rad x 20 Nm/rad) is left."""
+    eager = Push(DOWN, VALLEY, speed=0.2, stall=False)
+    for sensors in (SensorSettings(), SensorSettings(force_noise=0.0, torque_noise=0.0, position_noise=0.0)):
+        result = run(eager, setup("panda", sensors=sensors), duration_s=0.02, trace_hz=1000)
+        first = result.traces[0].command_wrench[0]
+        assert norm(first[:3]) < 0.2 + 0.1  # one tick of lead, 0.2 mm x 1000 N/m, and damping of the tare's last motion
+        assert norm(first[3:]) < 0.05
+    pushed = run(Hold(VALLEY, feedforward=lambda time: np.full(6, 5.0)), setup("panda"), duration_s=0.1, trace_hz=1000)
+    law = pushed.traces[0].command_wrench
+    np.testing.assert_allclose(law[0], 0.0, atol=1e-6)
+    assert np.abs(np.diff(law, axis=0)).max() < 0.3  # 5 N over a ramp of 50 ms, and the motion it makes
+
+
+@pytest.mark.parametrize("robot", ["free_tool", "panda"])
+def test_a_robot_told_to_stay_stays_through_tare_and_run(robot):
+    result = run(Hold(np.diag([1000.0] * 3 + [20.0] * 3)), setup(robot, "free"), duration_s=0.3, trace_hz=1000)
+    trace = result.traces[0]
+    assert np.abs(trace.position - trace.position[0]).max() < 1e-8
+    assert np.abs(trace.command_wrench).max() < 1e-4
+
+
+def test_a_step_of_the_desired_pose_is_followed_critically_damped():
+    """x(t) = x_d (1 - (1 + w t) exp(-w t)), w = sqrt(k / m), of the free tool with its load at the common centre of
+    mass, 2.6 kg; 1 ms of sampling is 2 % of 1/w."""
+    now = setup("free_tool", "free", point=(0.0, 0.0, 0.6 * 0.1 / 2.6))
+    result = run(Hold(np.diag([1000.0] * 3 + [20.0] * 3), offset=(0.01, 0.0, 0.0)), now, duration_s=0.6, trace_hz=1000)
+    trace = result.traces[0]
+    w = np.sqrt(1000.0 / 2.6)
+    expected = 0.01 * (1.0 - (1.0 + w * trace.time) * np.exp(-w * trace.time))
+    np.testing.assert_allclose(trace.position[:, 0] - trace.position[0, 0], expected, atol=0.02 * 0.01)
+
+
+def test_energy_is_the_integral_of_force_times_velocity():
+    result = run(push_down(), setup(), {"start.offset_x": 0.02}, duration_s=1.0, trace_hz=1000)
+    trace = result.traces[0]
+    assert result.energy_j[0] == pytest.approx((trace.command_wrench * trace.twist).sum() * 1e-3, rel=1e-9)
+
+
+def test_peak_force_is_the_largest_true_contact_force():
+    result = run(push_down(), setup(), {"start.offset_x": 0.02}, duration_s=1.0, trace_hz=1000)
+    assert result.peak_force_n[0] == pytest.approx(norm(result.traces[0].wrench_true[:, :3]).max(), rel=1e-12)
+
+
+def test_the_filtered_wrench_follows_the_true_one_in_steady_contact():
+    result = run(push_down(), setup(sensors=SensorSettings(), world="hose_coupler"), duration_s=2.0, trace_hz=100)
+    late = result.traces[0].time > 1.5
+    measured, true = result.traces[0].wrench[late], result.traces[0].wrench_true[late]
+    # 0.3 N of white noise through the 25 Hz corner leaves 0.1 N; the tare's mean of 100 samples errs by 0.03 N
+    assert norm((measured - true)[:, :3]).max() < 0.6
+    assert abs((measured - true)[:, 2].mean()) < 0.15
+
+
+# --- how a run ends ---
+
+
+def test_a_run_out_of_time_says_so():
+    result = run(push_down(), setup(), duration_s=0.05)
+    assert result.duration_s[0] == pytest.approx(0.05)
+    assert result.failure[0] == "goal not reached: time limit: 0.05 s of simulated time are over"
+    assert result.status[0] == Status.RUNNING
+
+
+def test_a_skill_s_own_failure_is_a_failure_even_at_the_goal():
+    end = (0.01, Status.FAILURE, "gave up")
+    result = run(Hold(VALLEY, end=end), setup(world="free"), duration_s=0.1)
+    assert not result.success[0]
+    assert result.reason[0] == "gave up"
+    assert result.duration_s[0] == pytest.approx(0.01)
+
+
+def test_a_skill_s_success_counts_only_at_the_goal():
+    end = (0.01, Status.SUCCESS, "")
+    at_goal = run(Hold(VALLEY, end=end), setup(world="free"), duration_s=0.1)
+    assert at_goal.success[0]
+    elsewhere = run(Hold(VALLEY, end=end), setup(world="valley"), duration_s=0.1)
+    assert elsewhere.failure[0] == "goal not reached: the skill ended"
+    assert elsewhere.status[0] == Status.SUCCESS
+
+
+def test_stop_when_ends_a_trial_as_done_and_the_others_go_on():
+    def far_right(state):
+        return state.tip.position[:, 0] > 0.0105
+
+    result = run(
+        Hold(np.diag([1000.0] * 3 + [20.0] * 3), offset=(0.02, 0, 0)), setup(world="free", stop_when=far_right),
+        {"start.offset_x": [0.0, -0.05]}, count=2, duration_s=0.4,
+    )  # fmt: skip
+    assert list(result.reason) == ["done", "time limit: 0.4 s of simulated time are over"]
+    assert result.duration_s[0] < 0.3
+
+
+def test_progress_is_told_every_ten_milliseconds_of_simulated_time():
+    told = []
+    run(push_down(), setup(), duration_s=0.05, progress=told.append)
+    np.testing.assert_allclose(told, [0.0, 0.01, 0.02, 0.03, 0.04])
+
+
+def test_an_interrupted_run_keeps_what_it_has():
+    def interrupt(time):
+        if time > 0.025:
+            raise KeyboardInterrupt
+
+    result = run(push_down(), setup(), duration_s=1.0, trace_hz=1000, progress=interrupt)
+    assert result.interrupted
+    assert not result.success[0]
+    assert 25 < len(result.traces[0].time) < 40
+
+
+# --- limits: for each, a run that trips it and one just below that does not ---
+
+
+def limited(skill_of, limits, setting, **options):
+    return run(
+        skill_of(), setup(**setting, limits=Limits(**{"force_n": None, "torque_rate_nm_s": None, **limits})), **options
+    )
+
+
+def largest(values):
+    return float(norm(values).max())
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "of"),
+    [
+        ("force_n", "force limit", lambda trace: largest(trace.wrench[:, :3])),
+        ("torque_n_m", "torque limit", lambda trace: largest(trace.wrench[:, 3:])),
+        (
+            "energy_j",
+            "energy limit",
+            lambda trace: np.cumsum((trace.command_wrench * trace.twist).sum(-1) * 1e-3).max(),
+        ),
+    ],
+)
+def test_a_limit_one_thousandth_below_what_a_run_reaches_stops_it_and_one_above_does_not(name, text, of):
+    setting = {"world": "valley", "point": "wrist"}
+    options = {"draws": {"start.offset_x": 0.015}, "duration_s": 0.8}
+    free = limited(push_down, {}, setting, trace_hz=1000, **options)
+    reached = of(free.traces[0])
+    above = limited(push_down, {name: 1.001 * reached}, setting, **options)
+    assert above.reason[0].startswith("time limit")
+    below = limited(push_down, {name: 0.999 * reached}, setting, trace_hz=1000, **options)
+    assert below.reason[0].startswith(text)
+    assert below.reason[0].endswith(f"(at {below.duration_s[0]:.3f} s)")
+    assert not below.success[0]
+    assert below.status[0] == Status.FAILURE
+    assert of(below.traces[0]) >= 0.999 * reached  # the trace is kept, up to and with the tick that tripped
+    assert below.traces[0].meta["failure"] == below.reason[0]
+
+
+def test_a_workspace_just_too_small_stops_the_run_at_its_wall():
+    setting, options = {"world": "free"}, {"duration_s": 0.5}
+    free = limited(push_down, {}, setting, trace_hz=1000, **options)
+    trace = free.traces[0]
+    reach = trace.position[:, 2].min() + 0.2  # of the wrist, which is 200 mm above the tip
+    for wall, trips in ((reach - 1e-5, False), (reach + 1e-5, True)):
+        box = ((-1.0, -1.0, wall), (1.0, 1.0, 2.0))
+        result = limited(push_down, {"workspace_m": box}, setting, **options)
+        assert result.reason[0].startswith("workspace limit" if trips else "time limit")
+
+
+@pytest.mark.parametrize(("share", "trips"), [(0.95, False), (1.10, True)])
+def test_a_torque_rate_above_its_limit_stops_the_run_and_one_below_does_not(share, trips):
+    """A feed-forward force that grows steadily; its largest joint torque per newton is measured first."""
+    limit, push = 500.0, np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    now = setup("panda", "free", point="wrist")
+    home = start_configurations(now.robot, now.scene, {}, 1)[0]
+    per_newton = np.abs(at(now.robot, home, np.zeros(7)).jacobian(now.robot.tool_frames[0]).T @ push).max()
+    rate = share * limit / per_newton
+
+    def ramp():
+        damping = np.diag([1.0] * 3 + [0.1] * 3)  # hardly any, so that the push alone makes the torque
+        return Hold(
+            np.zeros((6, 6)), feedforward=lambda time: rate * (time - 0.06) * (time > 0.06) * push, damping=damping
+        )
+
+    result = limited(
+        ramp, {"torque_rate_nm_s": limit}, {"robot_name": "panda", "world": "free", "point": "wrist"}, duration_s=0.1
+    )
+    assert result.reason[0].startswith("torque rate limit" if trips else "time limit"), result.reason[0]
+
+
+def test_a_free_flying_tool_has_no_joint_torque_to_limit():
+    result = limited(push_down, {"torque_rate_nm_s": 1.0}, {"world": "valley"}, duration_s=0.3)
+    assert result.reason[0].startswith("time limit")
+
+
+@pytest.mark.parametrize(
+    ("push", "text"), [(1e4, "the tool moves at"), (1e9, "the law asks for"), (np.nan, "not a finite")]
+)
+def test_a_diverging_run_is_stopped_with_the_cause_and_its_trace(push, text):
+    def wild():
+        return Hold(VALLEY, feedforward=lambda time: np.full(6, push if time > 0.1 else 0.0))
+
+    result = limited(wild, {}, {"world": "free"}, duration_s=0.5, trace_hz=1000)
+    assert result.reason[0].startswith("diverged")
+    assert text in result.reason[0]
+    assert not result.success[0]
+    assert len(result.traces[0].time) > 100
+    tame = Hold(VALLEY, feedforward=lambda time: np.full(6, 0.1 * (time > 0.1)))
+    assert run(tame, setup(world="free"), duration_s=0.2).reason[0].startswith("time limit")
+
+
+def test_one_trial_that_diverges_leaves_its_neighbours_alone():
+    class Odd(Hold):
+        def step(self, observation):
+            command = super().step(observation)
+            push = command.feedforward.copy()
+            push[0] = np.nan if observation.time[0] > 0.05 else 0.0
+            return command._replace(feedforward=push)
+
+    both = run(Odd(VALLEY), setup(world="free"), count=2, duration_s=0.2, trace_hz=1000)
+    alone = run(Hold(VALLEY), setup(world="free"), count=2, duration_s=0.2, trace_hz=1000)
+    assert both.reason[0].startswith("diverged")
+    assert both.success[1]
+    np.testing.assert_array_equal(both.traces[1].position, alone.traces[1].position)
+
+
+# --- what the controller may know ---
+
+
+def test_heavier_links_make_the_arm_sag_because_the_controller_is_not_told():
+    stiff = np.diag([1000.0] * 3 + [50.0] * 3)
+    result = run(
+        Hold(stiff), setup("panda", "free", point="wrist"), {"robot.mass_scale": [1.0, 1.2]}, count=2, duration_s=1.0,
+        trace_hz=100,
+    )  # fmt: skip
+    held, sagged = (trace.position[-1] - trace.desired_position[-1] for trace in result.traces)
+    assert norm(held) < 1e-6
+    assert sagged[2] < -0.001  # some newtons of unknown weight on 1000 N/m
+
+
+def test_a_wrong_grasp_leaves_its_error_in_the_wrench_and_in_nothing_the_skill_sees():
+    draws = {"grasp.tilt_y": [0.0, 0.2], "grasp.offset_x": [0.0, 0.01]}
+    result = run(
+        Hold(np.diag([1000.0] * 3 + [50.0] * 3)), setup("panda", "free"), draws, count=2, duration_s=0.05, trace_hz=100
+    )
+    right, wrong = result.traces
+    np.testing.assert_allclose(
+        wrong.position[0], right.position[0], atol=1e-3
+    )  # the nominal tip: what the robot believes
+    tools = [trace.body_position[0, -2] for trace in result.traces]
+    assert norm(tools[1] - tools[0]) > 0.005
+
+
+# --- traces and refusals ---
+
+
+def test_a_trace_holds_what_happened_at_its_rate():
+    result = run(push_down(), setup(), {"start.offset_x": 0.02}, duration_s=0.5, trace_hz=200)
+    trace = result.traces[0]
+    np.testing.assert_allclose(trace.time, np.arange(100) * 5e-3)
+    rows = len(trace.time)
+    for name in ("position", "quaternion", "twist", "wrench", "wrench_true", "desired_position", "command_wrench", "q"):
+        assert len(getattr(trace, name)) == rows
+    np.testing.assert_allclose(norm(trace.quaternion), 1.0, atol=1e-12)
+    assert trace.meta["world"] == "valley"
+    assert trace.meta["reason"] == result.reason[0]
+    assert len(trace.meta["bodies"]) == trace.body_position.shape[1]
+    velocity = np.gradient(trace.position, trace.time, axis=0)
+    np.testing.assert_allclose(velocity[2:-2], trace.twist[2:-2, :3], atol=0.01)
+
+
+def test_a_trace_ends_with_its_trial():
+    skill = Push(DOWN, VALLEY)
+    result = run(skill, setup(), {"start.offset_x": [0.0, 0.02]}, count=2, duration_s=4.0, trace_hz=100)
+    for trace, duration in zip(result.traces, result.duration_s, strict=True):
+        assert trace.time[-1] <= duration < trace.time[-1] + 0.0101
+    assert result.duration_s[0] < result.duration_s[1]
+
+
+def test_a_trace_rate_that_does_not_divide_the_control_rate_is_refused():
+    with pytest.raises(SkillframeError, match="not a whole multiple"):
+        run(push_down(), setup(), duration_s=0.1, trace_hz=300)
+
+
+def test_a_quantity_that_nothing_reads_is_refused():
+    with pytest.raises(UnknownName, match=r"world\.friction"):
+        run(push_down(), setup(), {"world.frictoin": 0.2}, duration_s=0.1)
+
+
+def test_the_measured_attitude_keeps_its_noise_small_and_stays_a_rotation():
+    result = run(push_down(), setup(sensors=SensorSettings()), duration_s=0.3, trace_hz=1000)
+    matrix = result.traces[0]
+    measured = matrix_from_quaternion(matrix.quaternion)
+    steps = rotation_vector(measured[1:] @ np.swapaxes(measured[:-1], -1, -2))
+    # difference of two draws of 3.5e-4 rad per axis, 900 of them: known to 2.4 %
+    assert steps.std() == pytest.approx(np.sqrt(2.0) * 3.5e-4, rel=0.12)
