@@ -79,7 +79,7 @@ def _limit_line(axes: Axes, limit: float | None, unit: str) -> Markup:
         return Markup("")
     y = float(axes.up(limit))
     line = tag("line", x1=LEFT, x2=axes.right, y1=round(y, 1), y2=round(y, 1), class_="limit")
-    return join([line, text(LEFT + 4, y - 5, f"limit {limit:g} {unit}", "limit-text")])
+    return join([line, text(0.5 * (LEFT + axes.right), y - 5, f"limit {limit:g} {unit}", "limit-text", "middle")])
 
 
 def _event_marks(axes: Axes, events: Sequence[tuple[float, str]]) -> Markup:

@@ -1,0 +1,58 @@
+import base64
+
+import numpy as np
+from report_fakes import PLACE, trace
+
+from skillframe.frames import matrix_from_quaternion, norm, quaternion_from_matrix, rotation_matrix
+from skillframe.report.replay import MOST_FRAMES, continuous, frame_times, run_data, scene_data, scene_key
+from skillframe.report.stage import stage_of
+
+
+def floats(text):
+    return np.frombuffer(base64.b64decode(text), dtype="<f4")
+
+
+def test_frames_carry_the_poses_of_the_trace():
+    run = trace()
+    data = run_data(run, stage_of(run), "scene")
+    poses = floats(data["poses"]).reshape(data["frames"], len(run.meta["bodies"]), 7)
+    times = np.linspace(data["start"], data["stop"], data["frames"])
+    for axis in range(3):
+        expected = np.interp(times, run.time, run.body_position[:, 1, axis])
+        assert np.abs(poses[:, 1, axis] - expected).max() < 1e-6  # float32 of lengths below a metre
+
+
+def test_an_hour_gives_no_more_frames_than_a_minute():
+    assert len(frame_times(np.linspace(0.0, 3600.0, 1000))) == MOST_FRAMES
+    assert len(frame_times(np.array([2.0]))) >= 1
+
+
+def test_quaternions_keep_their_attitude_and_never_jump():
+    turns = rotation_matrix(np.linspace(0, 9, 50)[:, None] * np.array([0.3, 0.5, 0.8]))
+    quaternion = quaternion_from_matrix(turns)
+    smooth = continuous(quaternion)
+    assert np.allclose(matrix_from_quaternion(smooth), turns)
+    assert (smooth[1:] * smooth[:-1]).sum(-1).min() > 0.0
+
+
+def test_runs_of_one_scene_share_its_geometry():
+    first, second = trace(seed=1), trace(seed=2, success=False)
+    keys = {scene_key(scene_data(stage_of(run))) for run in (first, second)}
+    assert len(keys) == 1
+
+
+def test_the_stage_knows_the_tool_and_cuts_only_what_stands_still_nearby():
+    stage = stage_of(trace())
+    assert stage.names[stage.tool] == "tool"
+    assert [cut is not None for cut in stage.cut] == [True, False, False, False, False]
+    assert stage.cut[0].placed(stage.position[0, 0], stage.quaternion[0, 0]).vertices[:, 1].min() > PLACE[1] - 1e-9
+
+
+def test_the_close_view_looks_at_the_tip_from_near():
+    stage = stage_of(trace())
+    assert norm(stage.close.target - stage.tip[-1]) < 0.1
+    assert stage.close.distance < 0.5 * stage.far.distance
+
+
+def test_a_trace_without_bodies_has_no_stage():
+    assert stage_of(trace(bodies=[])) is None
