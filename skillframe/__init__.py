@@ -27,14 +27,12 @@ if TYPE_CHECKING:
     from skillframe.errors import SkillframeError as SkillframeError
     from skillframe.frames import Pose as Pose
     from skillframe.hookspecs import hookimpl as hookimpl
-    from skillframe.skill import (
-        Command as Command,
-        Impedance as Impedance,
-        Observation as Observation,
-        Skill as Skill,
-        Status as Status,
-        per_trial as per_trial,
-    )
+    from skillframe.skill import Command as Command
+    from skillframe.skill import Impedance as Impedance
+    from skillframe.skill import Observation as Observation
+    from skillframe.skill import Skill as Skill
+    from skillframe.skill import Status as Status
+    from skillframe.skill import per_trial as per_trial
 
 
 def __getattr__(name: str) -> Any:
