@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
+from skillframe.frames import Float
 from skillframe.report.convergence import MOST_CURVES, cell_map, influence, rate_curves
 from skillframe.report.markup import Markup, figure, join, note, number, percent, table, tag
 from skillframe.report.quantities import quantity
@@ -140,35 +141,31 @@ def _forces(chapter: Chapter, results: Results) -> Markup:
     finite = {s: f[np.isfinite(f)] for s, f in forces.items()}
     if not any(len(f) for f in finite.values()):
         return note("The table holds no peak forces.")
-    everything = np.concatenate(list(finite.values()))
-    edges = np.linspace(0.0, max(float(everything.max()), 1e-3), 25)
-    counts = {s: np.histogram(f, edges)[0] for s, f in finite.items()}
-    top = max(int(c.max()) for c in counts.values())
+    said = [
+        f"{s}: median {number(float(np.median(f)))} N, highest {number(float(f.max()))} N" for s, f in finite.items() if len(f)
+    ]  # fmt: skip
+    drawn = figure(
+        "", "; ".join(said) + ".", _histogram(list(finite.values()), chapter.force_limit), class_="plot wide"
+    )
+    return join([tag("h3", "How hard it pushed"), _skill_key(results), drawn])
+
+
+def _histogram(forces: Sequence[Float], limit: float | None) -> Markup:
+    """Outlines of the skills' histograms over each other, in common bins."""
+    edges = np.linspace(0.0, max(float(np.concatenate(forces).max()), 1e-3), 25)
+    counts = [np.histogram(f, edges)[0] for f in forces]
     axes = Axes(
-        width=600,
-        height=260,
-        x=padded(0.0, edges[-1], 0.01),
-        y=(0.0, 1.08 * top),
-        x_label="peak contact force [N]",
-        y_label="trials",
-    )
-    parts = [axes.frame()]
-    for i, skill in enumerate(results.skills):
-        xs, ys = np.repeat(edges, 2), np.concatenate([[0], np.repeat(counts[skill], 2), [0]])
-        parts.append(axes.line(xs, ys.astype(float), f"histogram s{i % 4 + 1}"))
-    if chapter.force_limit is not None and axes.inside(chapter.force_limit, vertical=False):
-        x = round(float(axes.across(chapter.force_limit)), 1)
-        parts.append(tag("line", x1=x, x2=x, y1=axes.top, y2=axes.bottom, class_="limit"))
-        parts.append(text(x - 4, axes.top + 10, f"limit {chapter.force_limit:g} N", "limit-text", "end"))
-    words = "; ".join(
-        f"{s}: median {number(float(np.median(f)))} N, highest {number(float(f.max()))} N"
-        for s, f in finite.items()
-        if len(f)
-    )
-    return join(
-        [
-            tag("h3", "How hard it pushed"),
-            _skill_key(results),
-            figure("", words + ".", picture(axes, "Peak contact force of all trials", *parts), class_="plot wide"),
-        ]
-    )
+        width=600, height=260, x=padded(0.0, edges[-1], 0.01), y=(0.0, 1.08 * max(int(c.max()) for c in counts)),
+        x_label="peak contact force [N]", y_label="trials",
+    )  # fmt: skip
+    outlines = [np.concatenate([[0.0], np.repeat(c, 2), [0.0]]) for c in counts]
+    lines = [axes.line(np.repeat(edges, 2), y, f"histogram s{i % 4 + 1}") for i, y in enumerate(outlines)]
+    return picture(axes, "Peak contact force of all trials", axes.frame(), *lines, _force_limit(axes, limit))
+
+
+def _force_limit(axes: Axes, limit: float | None) -> Markup:
+    if limit is None or not axes.inside(limit, vertical=False):
+        return Markup("")
+    x = round(float(axes.across(limit)), 1)
+    line = tag("line", x1=x, x2=x, y1=axes.top, y2=axes.bottom, class_="limit")
+    return join([line, text(x - 4, axes.top + 10, f"limit {limit:g} N", "limit-text", "end")])
