@@ -141,9 +141,8 @@ def _forces(chapter: Chapter, results: Results) -> Markup:
     finite = {s: f[np.isfinite(f)] for s, f in forces.items()}
     if not any(len(f) for f in finite.values()):
         return note("The table holds no peak forces.")
-    said = [
-        f"{s}: median {number(float(np.median(f)))} N, highest {number(float(f.max()))} N" for s, f in finite.items() if len(f)
-    ]  # fmt: skip
+    known = [(skill, float(np.median(f)), float(f.max())) for skill, f in finite.items() if len(f)]
+    said = [f"{skill}: median {number(middle)} N, highest {number(top)} N" for skill, middle, top in known]
     drawn = figure(
         "", "; ".join(said) + ".", _histogram(list(finite.values()), chapter.force_limit), class_="plot wide"
     )
