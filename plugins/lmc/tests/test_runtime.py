@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 import synthetic as syn
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from skillframe_lmc.learner import learn
 from skillframe_lmc.runtime import build
 

@@ -3,7 +3,8 @@ import math
 import numpy as np
 import pytest
 import synthetic as syn
-from hypothesis import given, strategies as st
+from hypothesis import given
+from hypothesis import strategies as st
 from skillframe_lmc import sphere
 from skillframe_lmc.axes import compliant_axes, straightness
 from skillframe_lmc.gains import gains
@@ -163,11 +164,12 @@ def test_balanced_sideways_means_give_one_axis_square_to_the_direction(angle: fl
         assert np.allclose(found.axes, [[1.0, 0.0, 0.0]], atol=1e-9)
 
 
-def test_straightness_grows_on_short_paths_within_its_bounds() -> None:
-    assert straightness(0.015, 0.015) == 0.2
-    assert straightness(0.001, 0.015) == 0.2
-    assert straightness(0.06, 0.015) == pytest.approx(0.1)
-    assert straightness(10.0, 0.015) == 0.08
+def test_a_mean_direction_is_the_surer_the_longer_the_path_within_bounds() -> None:
+    found = [straightness(path, 0.015) for path in (1e-4, 0.015, 0.03, 0.06, 10.0)]
+    assert found == sorted(found, reverse=True)
+    assert found[0] == found[1] <= 0.3
+    assert found[2] / found[3] == pytest.approx(math.sqrt(2.0))
+    assert found[4] == 0.08
 
 
 @given(turn=st.tuples(*[st.floats(-3, 3)] * 3), free=st.integers(0, 3))

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from skillframe.frames import Float, norm, unit
+from skillframe_lmc.directions import Choice, choose
 from skillframe_lmc.intervals import Motion
 from skillframe_lmc.sectors import sectors
 from skillframe_lmc.settings import Settings
@@ -65,10 +66,7 @@ def _message(part: Learned, settings: Settings, open_direction: bool) -> str:
     if choice is None:
         return "too few intervals in which the teacher did the work to find a direction"
     if choice.direction is None:
-        return (
-            f"no one {_push(part)} explains the demonstrations: it would take pyramids of "
-            f"{degrees(choice.pyramid_angle):.0f} degrees, and {degrees(settings.pyramid_max_rad):.0f} are allowed"
-        )
+        return _no_direction_message(part, choice, settings)
     if open_direction:
         who = "one demonstration leaves" if len(part.moving) == 1 else "demonstrations from one side leave"
         return (
@@ -77,6 +75,18 @@ def _message(part: Learned, settings: Settings, open_direction: bool) -> str:
             "demonstration from the other side"
         )
     return ""
+
+
+def _no_direction_message(part: Learned, choice: Choice, settings: Settings) -> str:
+    """Why there is no direction: the demonstrations disagree, or each by itself bends too much."""
+    angle, allowed = degrees(choice.pyramid_angle), degrees(settings.pyramid_max_rad)
+    taken = f"{angle:.0f} degrees" if angle < 90.0 else "more than 90 degrees"
+    text = (
+        f"no one {_push(part)} explains what was seen: it would take pyramids of {taken}, and {allowed:.0f} are allowed"
+    )
+    if all(choose([given], settings).direction is None for given in part.given):
+        return f"{text}; not even one demonstration alone is a single linear motion, so cut it into phases"
+    return text
 
 
 def _fraction(part: Learned) -> float:
@@ -106,7 +116,7 @@ def _drawable(motion: Motion) -> dict[str, Any]:
         "excursion": motion.excursion,
         "path": motion.path,
         "intervals": len(every.contact),
-        "work_teacher_j": float(-motion.work[motion.work < 0.0].sum()),
+        "work_teacher_j": float(np.abs(motion.work[motion.work < 0.0]).sum()),
         "work_environment_j": float(motion.work[motion.work > 0.0].sum()),
         "mean_direction": _rounded(mean),
         "motion": _rounded(every.motion[chosen]),

@@ -8,7 +8,8 @@ nothing. For an interval \(k\),
     V_k = x_{k+1} - x_k   or   log(R_{k+1} R_k^T),    F_k = mean of the wrench while moving,    W_k = sum of F . dx
 
 (the seed document speaks of intervals without saying how they are cut; cutting by path is our choice). The step is 2 mm
-or 1 degree, 1 mm on paths under 20 mm, and larger where the position noise asks for it or the path is long.
+or 1 degree, 1 mm on paths under 20 mm, smaller where the whole motion is shorter than five of them, and larger where
+the position noise asks for it or the path is long.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from skillframe_lmc.settings import Settings
 
 BLOCK_S = 0.02
 MOST_INTERVALS = 80  # a longer path gets longer steps: a person's wandering is correlated over 15 mm anyway
+FEWEST_STEPS = 5.0  # a motion as short as it may be is still cut into this many
 NOISE_STEPS = 12.0  # step >= 12 sigma keeps the direction's noise under atan(sqrt(2) / 12) = 7 degrees
 MOVING_SHARE = 0.15  # of the typical speed; slower is standing still
 
@@ -159,7 +161,8 @@ def rotation(blocks: Track, settings: Settings) -> Motion:
     distance = norm(rotation_vector(R @ R[0].T))
     chord = 2.0 * blocks.quaternion  # |2 q_1 - 2 q_0| is the angle between them, to third order
     coarse = _path(chord, settings.step_rad)
-    step = _widened(settings.step_rad, coarse, _white_noise(chord), float(distance.max()))
+    excursion = float(distance.max())
+    step = _widened(min(settings.step_rad, excursion / FEWEST_STEPS), coarse, _white_noise(chord), excursion)
     knots = _knots(chord, step)
     fine = rotation_vector(R[1:] @ np.swapaxes(R[:-1], -1, -2))
     whole = rotation_vector(R[knots[1:]] @ np.swapaxes(R[knots[:-1]], -1, -2))
@@ -168,7 +171,8 @@ def rotation(blocks: Track, settings: Settings) -> Motion:
 
 def _translation_step(x: Float, excursion: float, settings: Settings) -> float:
     path = _path(x, 0.5 * settings.step_m)
-    step = settings.step_m if path >= 10.0 * settings.step_m else 0.5 * settings.step_m
+    short = min(0.5 * settings.step_m, excursion / FEWEST_STEPS)
+    step = settings.step_m if path >= 10.0 * settings.step_m else short
     return _widened(step, path, _white_noise(x), excursion)
 
 
@@ -184,7 +188,7 @@ def _knots(points: Float, step: float) -> NDArray[np.intp]:
     """Indices where the distance from the last knot reaches the step; plain floats, the fastest loop there is here."""
     rows, limit = points.tolist(), step * step
     knots, last = [0], rows[0]
-    for i, row in enumerate(rows):
+    for i, row in enumerate(rows[1:], start=1):
         square = 0.0
         for a, b in zip(row, last, strict=True):
             square += (a - b) * (a - b)

@@ -56,13 +56,13 @@ def sectors(motion: Motion, *, teacher_driven_only: bool = False) -> Sectors:
 
     Args:
         motion: the part.
-        teacher_driven_only: leave out intervals where the environment did the work. For rotations: there the angle
+        teacher_driven_only: leave out contact in which the environment did the work. For rotations: there the angle
             between axis and push exceeds 90 degrees, the sector is nearly a half circle through a random plane, and
             both +y and -y would be accepted.
     """
-    keep = motion.work <= 0.0 if teacher_driven_only else np.ones(len(motion.work), dtype=bool)
-    v, load = unit(motion.displacement[keep]), motion.load[keep]
-    size = norm(load)
+    size = norm(motion.load)
+    keep = (motion.work <= 0.0) | (size < motion.load_min) if teacher_driven_only else np.ones(len(size), dtype=bool)
+    v, load, size = unit(motion.displacement[keep]), motion.load[keep], size[keep]
     push = -unit(load)
     contact = (size >= motion.load_min) & (norm(cross(v, push)) >= 0.05)
     return Sectors(v, np.where(contact[:, None], push, 0.0), contact)

@@ -37,7 +37,7 @@ class Work(NamedTuple):
 def work(motions: Sequence[Motion]) -> Work:
     """Work of both sides over all demonstrations of one part."""
     done = np.concatenate([m.work[_counts(m)] for m in motions])
-    return Work(float(-done[done < 0.0].sum()), float(done[done > 0.0].sum()))
+    return Work(float(np.abs(done[done < 0.0]).sum()), float(done[done > 0.0].sum()))
 
 
 def _counts(motion: Motion) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
