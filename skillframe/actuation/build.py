@@ -72,7 +72,12 @@ def _headers(folder: Path) -> list[Path]:
 
 
 def _token(folder: Path, table: Table, common: Path) -> str:
-    files = [folder / "fmu.toml", *(folder / s for s in table.sources), *_headers(folder), *sorted(common.glob("*.[ch]"))]
+    files = [
+        folder / "fmu.toml",
+        *(folder / s for s in table.sources),
+        *_headers(folder),
+        *sorted(common.glob("*.[ch]")),
+    ]
     parts = [part for file in files for part in (file.name, file.read_bytes())]
     return "{" + _digest(*parts)[:32] + "}"
 

@@ -48,7 +48,9 @@ def _units(table: Table) -> str:
     lines = []
     for name, powers in table.units.items():
         base = " ".join(f'{unit}="{power}"' for unit, power in powers.items())
-        lines.append(f"    <Unit name={quoteattr(name)}><BaseUnit {base}/></Unit>".replace("<BaseUnit />", "<BaseUnit/>"))
+        lines.append(
+            f"    <Unit name={quoteattr(name)}><BaseUnit {base}/></Unit>".replace("<BaseUnit />", "<BaseUnit/>")
+        )
     return "  <UnitDefinitions>\n" + "\n".join(lines) + "\n  </UnitDefinitions>\n" if lines else ""
 
 

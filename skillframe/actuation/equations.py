@@ -1,8 +1,8 @@
 r"""The hydraulic cylinder's equations over arrays of cylinders: the readable twin of fmus/hydraulic_cylinder.
 
-States \(x_s, \dot x_s, p_a, p_b, p_S, z\): spool, its velocity, gauge pressures of both chambers and of the supply line,
-deflection of the seals. Equation numbers are those of fmus/hydraulic_cylinder/README.md, which names the sources. Every
-quantity is an array (n,) or a float; nothing here knows about steps, files or the standard.
+States \(x_s, \dot x_s, p_a, p_b, p_S, z\): spool, its velocity, gauge pressures of both chambers and of the supply
+line, deflection of the seals. Equation numbers are those of fmus/hydraulic_cylinder/README.md, which names the sources.
+Every quantity is an array (n,) or a float; nothing here knows about steps, files or the standard.
 """
 
 from __future__ import annotations

@@ -51,9 +51,7 @@ def build_named(name: str) -> list[BuiltFmu]:
     folders = fmu_folders()
     if name not in folders:
         raise UnknownName("fmu", name, folders)
-    return [
-        BuiltFmu(name=name, fmi_version=f"{v}.0", path=build_fmu(folders[name], v)) for v in VERSIONS
-    ]
+    return [BuiltFmu(name=name, fmi_version=f"{v}.0", path=build_fmu(folders[name], v)) for v in VERSIONS]
 
 
 def find_fmu(name_or_path: str | Path, base: Path | None = None, version: int = 2) -> Path:

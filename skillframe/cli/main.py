@@ -28,6 +28,7 @@ COMMANDS = {
     "campaign": "Run a skill many times over declared uncertainty.",
     "report": "Make a self-contained HTML report from results.",
     "robots": "List, check and show robots.",
+    "fmu": "List, build, check and simulate FMUs.",
     "plugins": "List, check and start plug-ins.",
     "doctor": "What is installed, what is missing, what to type.",
 }

@@ -1,0 +1,198 @@
+"""One FMU instance: fmpy creates, initialises and frees it; the loop calls its functions by address."""
+
+from __future__ import annotations
+
+import ctypes
+from collections import deque
+from collections.abc import Mapping
+from typing import Any
+
+from skillframe.actuation.extract import unpack
+from skillframe.actuation.inspection import FLOATS, FmuFacts, read_description
+from skillframe.errors import InputError, SkillframeError
+
+
+class InstanceFailed(SkillframeError):
+    """An FMU refused a call outside the loop; the sentence carries its own message."""
+
+
+class Instance:
+    """A co-simulation instance.
+
+    Attributes:
+        version: 2 or 3; component: its handle; messages: what it said last, newest last.
+    """
+
+    def __init__(self, facts: FmuFacts, name: str) -> None:
+        """Load the library and instantiate (once; `start` resets).
+
+        Raises:
+            InputError: not runnable here.
+            InstanceFailed: it does not load or instantiate.
+        """
+        facts.require_runnable()
+        self.facts, self.name = facts, name
+        self.version = int(facts.fmi_version[0])
+        self.messages: deque[str] = deque(maxlen=8)
+        self._fresh, self._states = True, {}  # type: bool, dict[str, ctypes.c_void_p]
+        self._create()
+
+    def _create(self) -> None:
+        from fmpy.fmi2 import FMU2Slave
+        from fmpy.fmi3 import FMU3Slave
+
+        description = read_description(self.facts.path)
+        self._cs = description.coSimulation
+        try:
+            self._fmu: Any = (FMU2Slave if self.version == 2 else FMU3Slave)(
+                guid=description.guid if self.version == 2 else description.instantiationToken,
+                unzipDirectory=str(unpack(self.facts.path)), modelIdentifier=self._cs.modelIdentifier,
+                instanceName=self.name,
+            )  # fmt: skip
+            self._instantiate()
+        except Exception as error:
+            raise InstanceFailed(self.sentence(f"does not load: {error}")) from None
+        self.component = int(getattr(self._fmu.component, "value", self._fmu.component))
+        self._fresh = True
+
+    def _instantiate(self) -> None:
+        if self.version == 3:
+            self._fmu.instantiate(logMessage=lambda env, status, category, text: self._hear(text))
+            return
+        from fmpy import calloc, fmi2, free
+
+        calls = fmi2.fmi2CallbackFunctions()
+        calls.logger = fmi2.fmi2CallbackLoggerTYPE(lambda env, name, status, category, text: self._hear(text))
+        calls.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
+        calls.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
+        try:
+            from fmpy.logging import addLoggerProxy
+
+            addLoggerProxy(ctypes.byref(calls))
+        except (ImportError, OSError):  # without it, messages come unformatted
+            pass
+        self._fmu.instantiate(callbacks=calls)
+
+    def _hear(self, text: bytes | None) -> None:
+        self.messages.append((text or b"").decode("utf-8", "replace").strip())
+
+    def sentence(self, problem: str) -> str:
+        """A problem with this instance, with what the FMU itself said last."""
+        said = f" ({self.messages[-1]})" if self.messages and self.messages[-1] not in problem else ""
+        return f"{self.name} ({self.facts.path.name}): {problem}{said}"
+
+    def address(self, name2: str, name3: str) -> int:
+        """Address of a function of the library, by its name in either version."""
+        function = getattr(self._fmu.dll, name2 if self.version == 2 else name3)
+        return ctypes.cast(function, ctypes.c_void_p).value or 0
+
+    def start(self, parameters: Mapping[str, Any], inputs: Mapping[int, float], time: float) -> None:
+        """Bring the instance to the start of a run: reset if it has run before, set parameters, initialise.
+
+        Args:
+            parameters: by the FMU's names.
+            inputs: start values of real inputs by value reference.
+            time: start time [s].
+
+        Raises:
+            UnknownName: a parameter that is not there.
+            InstanceFailed: the FMU refuses.
+        """
+        self.messages.clear()
+        try:
+            if not self._fresh:
+                self._fmu.reset()
+            self._fresh = False
+            for name, value in parameters.items():
+                self.set_value(name, value)
+            if self.version == 2:
+                self._fmu.setupExperiment(startTime=time)
+                self._fmu.enterInitializationMode()
+            else:
+                self._fmu.enterInitializationMode(startTime=time)
+            if inputs:
+                setter = self._fmu.setReal if self.version == 2 else self._fmu.setFloat64
+                setter(list(inputs), list(inputs.values()))
+            self._fmu.exitInitializationMode()
+        except SkillframeError:
+            raise
+        except Exception as error:
+            raise InstanceFailed(self.sentence(f"cannot be initialised: {error}")) from None
+
+    def set_value(self, name: str, value: Any) -> None:
+        """Set a parameter or input before initialisation, converted to its type.
+
+        Raises:
+            UnknownName, InputError: no such parameter, or a value that is not of its type.
+        """
+        variable = self.facts.settable(name)
+        values = list(value) if isinstance(value, list | tuple) else [value]
+        if len(values) != variable.size:
+            raise InputError(f"{self.name}: {name}", f"has {variable.size} numbers, got {len(values)}", "correct it")
+        try:
+            converted = [convert(variable.type, v) for v in values]
+        except (TypeError, ValueError):
+            raise InputError(
+                f"{self.name}: {name}", f"is of type {variable.type}, got {value!r}", "correct it"
+            ) from None
+        typed = variable.type if variable.type != "Enumeration" else ("Integer" if self.version == 2 else "Int64")
+        getattr(self._fmu, f"set{typed}")([variable.reference], converted)
+
+    def set_values(self, type_: str, references: list[int], values: list[Any]) -> None:
+        """Set variables of one type by reference."""
+        getattr(self._fmu, f"set{type_}")(references, values)
+
+    def do_step(self, time: float, step: float) -> bool:
+        """One step through fmpy, outside the loop; True if the FMU asks to end.
+
+        Raises:
+            InstanceFailed: it returned early although that was not allowed.
+            Exception: fmpy's, with the status it returned.
+        """
+        flags = self._fmu.doStep(time, step)
+        if self.version == 2:
+            return False
+        if flags[2]:
+            raise InstanceFailed(self.sentence("returned early from a step, which was not allowed"))
+        return bool(flags[1])
+
+    def get_values(self, type_: str, references: list[int], count: int) -> list[Any]:
+        """Values of variables of one type, arrays flattened."""
+        typed = type_ if type_ != "Enumeration" else ("Integer" if self.version == 2 else "Int64")
+        getter = getattr(self._fmu, f"get{typed}")
+        return list(getter(references) if self.version == 2 else getter(references, nValues=count))
+
+    def save(self, slot: str = "main") -> None:
+        """Keep the present state under a name, reusing the memory of the last one."""
+        name = "fmi2GetFMUstate" if self.version == 2 else "fmi3GetFMUState"
+        getattr(self._fmu, name)(self._fmu.component, ctypes.byref(self._states.setdefault(slot, ctypes.c_void_p())))
+
+    def restore(self, slot: str = "main") -> None:
+        """Return to a kept state."""
+        name = "fmi2SetFMUstate" if self.version == 2 else "fmi3SetFMUState"
+        getattr(self._fmu, name)(self._fmu.component, self._states[slot])
+
+    def forget(self) -> None:
+        """Free kept states."""
+        name = "fmi2FreeFMUstate" if self.version == 2 else "fmi3FreeFMUState"
+        for state in self._states.values():
+            getattr(self._fmu, name)(self._fmu.component, ctypes.byref(state))
+        self._states.clear()
+
+    def close(self) -> None:
+        """Free the instance."""
+        self.forget()
+        self._fmu.freeInstance()
+
+
+def convert(type_: str, value: Any) -> Any:
+    """A plain value as an FMI type takes it."""
+    if type_ in FLOATS or type_ == "Float32":
+        return float(value)
+    if type_ == "Boolean":
+        if isinstance(value, str):
+            return {"true": True, "false": False, "1": True, "0": False}[value.lower()] if value else False
+        return bool(value)
+    if type_ == "String":
+        return str(value)
+    return int(value)

@@ -1,0 +1,101 @@
+"""Unpack an FMU once per content, into a cache, and only what cannot leave its folder."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import stat
+import tempfile
+import zipfile
+from functools import lru_cache
+from pathlib import Path, PurePosixPath
+
+from skillframe.errors import InputError
+from skillframe.paths import cache_dir
+
+LARGEST = 2_000_000_000  # bytes unpacked; more is taken for a trap
+MOST_FILES = 20_000
+
+
+def unpack(path: Path) -> Path:
+    """The folder that holds the content of an FMU; made on the first call, the same one afterwards.
+
+    Raises:
+        InputError: not a zip, a name that would leave the folder, a link, or too much content.
+    """
+    folder = cache_dir("fmus-unpacked") / content_hash(path)[:32]
+    if (folder / "modelDescription.xml").is_file():
+        return folder
+    with tempfile.TemporaryDirectory(dir=folder.parent) as work:
+        _extract(path, Path(work) / "fmu")
+        try:
+            os.replace(Path(work) / "fmu", folder)
+        except OSError:  # another process was first
+            if not (folder / "modelDescription.xml").is_file():
+                raise
+    return folder
+
+
+def content_hash(path: Path) -> str:
+    """SHA-256 of a file's content.
+
+    Raises:
+        InputError: no such file.
+    """
+    try:
+        facts = path.stat()
+    except OSError:
+        raise InputError(path, "no such file", "check the path") from None
+    return _hash(str(path.resolve()), facts.st_mtime_ns, facts.st_size)
+
+
+@lru_cache(maxsize=256)
+def _hash(path: str, modified: int, size: int) -> str:
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def member_names(path: Path) -> list[str]:
+    """Names inside an FMU, checked.
+
+    Raises:
+        InputError: as `unpack`.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            _check(path, archive.infolist())
+            return archive.namelist()
+    except FileNotFoundError:
+        raise InputError(path, "no such file", "check the path") from None
+    except (zipfile.BadZipFile, OSError) as error:
+        raise InputError(
+            path, f"is not an FMU: {error}", "give the .fmu file (a zip with a modelDescription.xml)"
+        ) from None
+
+
+def _check(path: Path, members: list[zipfile.ZipInfo]) -> None:
+    for member in members:
+        name = member.orig_filename
+        parts = PurePosixPath(name).parts
+        if "\\" in name or ":" in name or name.startswith("/") or ".." in parts:
+            raise InputError(
+                path, f"holds {name!r}, which would be written outside its folder", "do not trust this file"
+            )
+        if stat.S_ISLNK(member.external_attr >> 16):
+            raise InputError(
+                path, f"holds a link, {name!r}, which can lead outside its folder", "do not trust this file"
+            )
+    total = sum(m.file_size for m in members)
+    if total > LARGEST or len(members) > MOST_FILES:
+        raise InputError(path, f"unpacks to {len(members)} files of {total} bytes", "do not trust this file")
+    if "modelDescription.xml" not in {m.filename for m in members}:
+        raise InputError(path, "is a zip without modelDescription.xml, so not an FMU", "give the .fmu file")
+
+
+def _extract(path: Path, folder: Path) -> None:
+    member_names(path)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            archive.extractall(folder)
+    except (zipfile.BadZipFile, OSError, EOFError) as error:
+        raise InputError(path, f"cannot be unpacked: {error}", "copy the file again") from None

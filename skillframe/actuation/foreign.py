@@ -1,0 +1,64 @@
+"""Compile the C sources that a foreign FMU carries, for this machine, against the standard headers fmpy ships."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+from skillframe.actuation.build import pack
+from skillframe.actuation.extract import content_hash, unpack
+from skillframe.actuation.inspection import inspect_fmu, read_description
+from skillframe.actuation.library import BuiltFmu
+from skillframe.actuation.toolchain import compile_library
+from skillframe.errors import InputError
+from skillframe.paths import cache_dir
+
+
+def build_from_sources(path: Path) -> BuiltFmu:
+    """An FMU like the given one, with a binary for this machine added; kept in the cache, not allowed in-process.
+
+    Raises:
+        InputError: no C sources, or none that its description lists.
+        CompilerFailed, MissingDependency: as `compile_library`.
+    """
+    import fmpy
+
+    facts = inspect_fmu(path)
+    if not facts.has_sources:
+        raise InputError(path, "carries no C sources", f"ask its maker for {fmpy.platform} or for sources")
+    out = cache_dir("fmus-compiled") / content_hash(path)[:24] / path.name
+    description = read_description(path)
+    cs = description.coSimulation
+    if cs is None:
+        raise InputError(path, f"holds {' and '.join(facts.kinds)} only", "export it as co-simulation")
+    files, defines = _sources(description, cs.modelIdentifier)
+    if not files:
+        raise InputError(path, "does not list its source files", "ask its maker for a binary")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=out.parent) as work:
+        tree = Path(work) / "tree"
+        shutil.copytree(unpack(path), tree)
+        library = cs.modelIdentifier + fmpy.sharedLibraryExtension
+        headers = Path(fmpy.__file__).parent / "c-code"
+        extra = ["-fvisibility=default", f"-I{headers}", "-std=gnu11", *defines]
+        compile_library(files, library, tree / "sources", extra)
+        where = tree / "binaries" / (fmpy.platform if facts.fmi_version.startswith("2") else fmpy.platform_tuple)
+        where.mkdir(parents=True, exist_ok=True)
+        os.replace(tree / "sources" / library, where / library)
+        os.replace(pack(tree, Path(work) / "made.fmu"), out)
+    return BuiltFmu(name=facts.name, fmi_version=facts.fmi_version, path=out)
+
+
+def _sources(description: object, identifier: str) -> tuple[list[str], list[str]]:
+    """Source files and preprocessor definitions, as the description lists them (fmpy reads both versions' lists)."""
+    files: list[str] = []
+    defines: list[str] = []
+    for configuration in getattr(description, "buildConfigurations", []):
+        if configuration.modelIdentifier != identifier:
+            continue
+        for group in configuration.sourceFileSets:
+            files += group.sourceFiles
+            defines += [f"-D{d.name}={d.value}" if d.value else f"-D{d.name}" for d in group.preprocessorDefinitions]
+    return list(dict.fromkeys(files)), defines

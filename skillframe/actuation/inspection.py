@@ -1,0 +1,203 @@
+"""What an FMU is and can do, read from its file without loading any of its code."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from skillframe.actuation.extract import content_hash, member_names, unpack
+from skillframe.errors import InputError, UnknownName
+
+FLOATS = ("Real", "Float64")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FmuVariable:
+    """A variable of an FMU.
+
+    Attributes:
+        name, reference: its name and value reference; type: "Real", "Float64", "Boolean" ...
+        causality: "input", "output", "parameter" ...; size: number of scalars (FMI 3 arrays).
+        start: as written in the model description, or None; unit: or "".
+    """
+
+    name: str
+    reference: int
+    type: str
+    causality: str
+    size: int = 1
+    start: str | None = None
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FmuFacts:
+    """What the file says.
+
+    Attributes:
+        path, digest: the file and the SHA-256 of its content.
+        fmi_version: "2.0", "3.0" ...; name: the model's name.
+        kinds: of "co_simulation", "model_exchange", "scheduled_execution".
+        platforms: folders of binaries inside that hold a library of the model; has_sources: carries C sources.
+        runs_here: one of the platforms is this machine's.
+        saves_state, serializes_state, variable_step, input_derivatives: claimed capabilities of co-simulation.
+        variables: by name.
+    """
+
+    path: Path
+    digest: str
+    fmi_version: str
+    name: str
+    kinds: tuple[str, ...]
+    platforms: tuple[str, ...]
+    has_sources: bool
+    runs_here: bool
+    saves_state: bool
+    serializes_state: bool
+    variable_step: bool
+    input_derivatives: bool
+    variables: dict[str, FmuVariable]
+
+    def names(self, causality: str) -> list[str]:
+        """Names of the variables of a causality, in the file's order."""
+        return [v.name for v in self.variables.values() if v.causality == causality]
+
+    def variable(self, name: str, causality: str, what: str = "") -> FmuVariable:
+        """The variable of a name.
+
+        Raises:
+            UnknownName: there is none, or it is not of that causality; suggests the nearest.
+        """
+        found = self.variables.get(name)
+        if found is None or found.causality != causality:
+            note = what or (f"{name!r} is there as {found.causality}" if found else "")
+            raise UnknownName(f"{causality} of {self.path.name}", name, self.names(causality), note)
+        return found
+
+    def settable(self, name: str) -> FmuVariable:
+        """The parameter or input of a name; raises `UnknownName` as `variable` does."""
+        found = self.variables.get(name)
+        if found is not None and found.causality in ("parameter", "input"):
+            return found
+        raise UnknownName(
+            f"parameter or input of {self.path.name}", name, [*self.names("input"), *self.names("parameter")]
+        )
+
+    def require_runnable(self) -> None:
+        """Refuse what cannot be driven here, saying what is inside.
+
+        Raises:
+            InputError: no co-simulation, or no binary for this machine.
+        """
+        if "co_simulation" not in self.kinds:
+            raise InputError(
+                self.path, f"holds {' and '.join(self.kinds) or 'no interface'} only", "export it as co-simulation"
+            )
+        if self.runs_here:
+            return
+        from fmpy import platform, platform_tuple
+
+        here = platform if self.fmi_version.startswith("2") else platform_tuple
+        inside = f"holds binaries for {', '.join(self.platforms)}" if self.platforms else "holds no binaries"
+        if self.has_sources:
+            fix = f"it carries C sources: type skillframe fmu build {self.path}"
+        else:
+            fix = f"and no sources; ask its maker for {here} or for sources"
+        raise InputError(self.path, f"{inside}, this machine is {here}", fix)
+
+
+def inspect_fmu(path: Path) -> FmuFacts:
+    """Facts of an FMU file.
+
+    Raises:
+        InputError: not an FMU, one that would escape its folder, or a model description that cannot be read.
+    """
+    return _inspect(path.resolve(), content_hash(path))
+
+
+@lru_cache(maxsize=64)
+def _inspect(path: Path, digest: str) -> FmuFacts:
+    names = member_names(path)
+    description = read_description(path)
+    cs = description.coSimulation
+    kinds = {
+        "co_simulation": cs, "model_exchange": description.modelExchange,
+        "scheduled_execution": description.scheduledExecution,
+    }  # fmt: skip
+    first = next((kind for kind in kinds.values() if kind is not None), None)
+    platforms = _platforms(names, first.modelIdentifier if first is not None else "")
+    return FmuFacts(
+        path=path,
+        digest=digest,
+        fmi_version=description.fmiVersion,
+        name=description.modelName,
+        kinds=tuple(kind for kind, there in kinds.items() if there is not None),
+        platforms=platforms,
+        has_sources=any(PurePosixPath(n).parts[0] == "sources" and n.endswith((".c", ".cpp")) for n in names),
+        runs_here=_here(description.fmiVersion) in platforms,
+        saves_state=bool(cs and cs.canGetAndSetFMUstate),
+        serializes_state=bool(cs and cs.canSerializeFMUstate),
+        variable_step=bool(cs and cs.canHandleVariableCommunicationStepSize),
+        input_derivatives=bool(cs and cs.canInterpolateInputs and description.fmiVersion.startswith("2")),
+        variables={v.name: _variable(v) for v in description.modelVariables},
+    )
+
+
+def read_description(path: Path) -> Any:
+    """The model description as fmpy reads it, without its strict validation (`problems_of` does that).
+
+    Raises:
+        InputError: the XML cannot be read, or is of FMI 1.
+    """
+    from fmpy import read_model_description
+
+    try:
+        description = read_model_description(str(unpack(path)), validate=False)
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(
+            path, f"has a model description that cannot be read: {_line(error)}", "export it again"
+        ) from None
+    if description.fmiVersion.startswith("1"):
+        raise InputError(path, "is an FMI 1.0 unit", "export it as FMI 2.0 or 3.0 co-simulation")
+    return description
+
+
+def problems_of(path: Path) -> list[str]:
+    """What fmpy's validation finds: schema, names, structure, units, start values."""
+    from fmpy.validation import validate_fmu
+
+    return [" ".join(str(problem).split()) for problem in validate_fmu(str(path))]
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())[:300]
+
+
+def _here(version: str) -> str:
+    from fmpy import platform, platform_tuple
+
+    return str(platform if version.startswith("2") else platform_tuple)
+
+
+def _platforms(names: list[str], identifier: str) -> tuple[str, ...]:
+    found = {
+        p.parts[1] for p in map(PurePosixPath, names)
+        if len(p.parts) == 3 and p.parts[0] == "binaries" and p.stem == identifier
+        and p.suffix in (".so", ".dll", ".dylib")
+    }  # fmt: skip
+    return tuple(sorted(found))
+
+
+def _variable(v: Any) -> FmuVariable:
+    size = 1
+    for length in v.shape or ():
+        size *= int(length)
+    start = v.start if v.start is None else str(v.start)
+    return FmuVariable(
+        name=v.name, reference=v.valueReference, type=v.type, causality=v.causality or "local", size=size,
+        start=start, unit=v.unit or "",
+    )  # fmt: skip

@@ -1,0 +1,186 @@
+"""`SandboxBank`: FMUs of other makers, each instance in its own child process with time and memory limits.
+
+A crash, a hang or a leak then ends one trial with a sentence. All children of a bank step at the same time.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from skillframe.actuation.actuator import DISCARD, LOST, OK, STATUS_TEXT, ActuatorSpec, Capabilities
+from skillframe.actuation.bindings import InstanceFailed
+from skillframe.actuation.child import Child, SandboxLimits
+from skillframe.actuation.inspection import FmuFacts
+from skillframe.actuation.wiring import columns, mapping
+from skillframe.errors import SkillframeError
+
+
+class SandboxBank:
+    """A bank of foreign FMUs (see `Actuators`), one child process per instance.
+
+    Raises:
+        InputError, UnknownName: not runnable here, or a mapping that does not fit.
+        InstanceFailed, ChildLost: on `start`, an FMU that does not load or initialise.
+    """
+
+    def __init__(
+        self, specs: Sequence[ActuatorSpec], facts: Sequence[FmuFacts], trials: int = 1,
+        limits: SandboxLimits | None = None,
+    ) -> None:  # fmt: skip
+        self.inputs, self.outputs = columns(specs)
+        self.count = trials * len(specs)
+        self.u = np.zeros((self.count, len(self.inputs)))
+        self.y = np.full((self.count, len(self.outputs)), np.nan)
+        self.active, self.status = np.ones(self.count, np.uint8), np.zeros(self.count, np.int64)
+        self.notes: tuple[str, ...] = (
+            f"{', '.join(dict.fromkeys(f.path.name for f in facts))}: in child processes, not allowed here",
+        )
+        self.limits = limits or SandboxLimits()
+        self._specs, self._facts = list(specs), list(facts)
+        self._time = 0.0
+        for spec, fact in zip(specs, facts, strict=True):
+            fact.require_runnable()
+            mapping(spec, fact)
+        self._children: list[Child | None] = [None] * self.count
+        self._problems: dict[int, str] = {}
+        self._capabilities: dict[int, Capabilities] = {}
+
+    def _kind(self, index: int) -> tuple[ActuatorSpec, FmuFacts]:
+        return self._specs[index % len(self._specs)], self._facts[index % len(self._facts)]
+
+    def _name(self, index: int) -> str:
+        spec, facts = self._kind(index)
+        name = spec.name or facts.name
+        return name if self.count == len(self._specs) else f"{name} of trial {index // len(self._specs)}"
+
+    def _ready(self, index: int) -> Child:
+        """The child of an instance; a new one where there is none or the old one has grown fat."""
+        child = self._children[index]
+        if child is not None and child.resident_bytes() > self.limits.memory_bytes // 2:
+            child.close()
+            child = None
+        if child is None:
+            spec, facts = self._kind(index)
+            child = Child(facts.path, self._name(index), self.limits)
+            self._children[index] = child
+            given = {"spec": asdict(spec), "path": str(facts.path), "name": self._name(index)}
+            given |= {"inputs": self.inputs, "outputs": self.outputs}
+            child.send(b"l", json.dumps(given).encode())
+        return child
+
+    def start(self, time: float = 0.0, parameters: Sequence[Mapping[str, Any]] | None = None) -> None:
+        """Reset every instance, load those that were lost, and initialise at `u`; see `Actuators`."""
+        self.active[:] = 1
+        self.status[:] = OK
+        self._problems.clear()
+        self._time = time
+        fresh = [child is None for child in self._children]
+        for i in range(self.count):
+            extra = dict(parameters[i]) if parameters else {}
+            child = self._ready(i)
+            fresh[i] = fresh[i] or self._children[i] is not child
+            given = {"time": time, "parameters": {**self._kind(i)[0].parameters, **extra}, "u": self.u[i].tolist()}
+            child.send(b"s", json.dumps(given).encode())
+        for i, child in enumerate(self._children):
+            if child is None:
+                continue
+            try:
+                if fresh[i]:
+                    child.receive(self.limits.start_s, "loading")
+                self.y[i] = np.frombuffer(child.receive(self.limits.start_s, "starting"))
+            except SkillframeError as error:
+                self._drop(i)
+                self.active[i], self.status[i], self._problems[i] = 0, LOST, str(error)
+        if self._problems and not self.active.any():
+            raise InstanceFailed(next(iter(self._problems.values())))
+
+    def step(self, time: float, step: float) -> bool:
+        """Advance from `time` by `step` [s] with inputs `u`; True if every active instance went well."""
+        self._time = time
+        head = struct.pack("dd", time, step)
+        running = [(i, child) for i, child in enumerate(self._children) if self.active[i] and child is not None]
+        for i, child in running:
+            child.send(b"t", head + self.u[i].tobytes())
+        fine = True
+        for i, child in running:
+            fine &= self._collect(i, child)
+        return fine
+
+    def _collect(self, index: int, child: Child) -> bool:
+        try:
+            answer = child.receive(self.limits.step_s, f"stepping from {self._time:.6g} s")
+        except SkillframeError as error:
+            self._drop(index)
+            self.active[index], self.status[index], self._problems[index] = 0, LOST, str(error)
+            return False
+        status = struct.unpack_from("q", answer)[0]
+        size = 8 + 8 * self.y.shape[1]
+        self.y[index] = np.frombuffer(answer[8:size])
+        self.status[index] = status
+        if status < DISCARD:
+            return True
+        self._problems[index] = answer[size:].decode("utf-8", "replace") or STATUS_TEXT[status]
+        self.active[index] = status == DISCARD
+        return False
+
+    def _drop(self, index: int) -> None:
+        child = self._children[index]
+        if child is not None:
+            child.kill()
+        self._children[index] = None
+
+    def refresh(self) -> bool:
+        """Outputs at the present inputs; no time passes."""
+        return self.step(self._time, 0.0)
+
+    def _all(self, letter: bytes, what: str) -> None:
+        for i, child in enumerate(self._children):
+            if self.active[i] and child is not None:
+                child.ask(letter, None, self.limits.step_s, what)
+
+    def save(self) -> None:
+        """Remember the state of every active instance."""
+        self._all(b"v", "saving its state")
+
+    def restore(self) -> None:
+        """Return to the last `save`."""
+        self._all(b"w", "restoring its state")
+
+    def capabilities(self, index: int) -> Capabilities:
+        """What one instance can do; tried out in a child of its own."""
+        kind = index % len(self._specs)
+        if kind not in self._capabilities:
+            spec, facts = self._kind(index)
+            self._capabilities[kind] = probe_in_child(spec, facts, self.limits)
+        return self._capabilities[kind]
+
+    def problem(self, index: int) -> str:
+        """Why an instance failed, one sentence; empty if it did not."""
+        return self._problems.get(index, "")
+
+    def close(self) -> None:
+        """End every child."""
+        for child in self._children:
+            if child is not None:
+                child.close()
+        self._children = [None] * self.count
+
+
+def probe_in_child(spec: ActuatorSpec, facts: FmuFacts, limits: SandboxLimits) -> Capabilities:
+    """`probe` in a child process.
+
+    Raises:
+        ChildLost, InstanceFailed: the FMU does not survive it.
+    """
+    child = Child(facts.path, spec.name or facts.name, limits)
+    try:
+        given = {"spec": asdict(spec), "path": str(facts.path)}
+        return Capabilities(*child.ask(b"p", given, limits.start_s, "its capabilities were tried out"))
+    finally:
+        child.close()

@@ -1,0 +1,195 @@
+"""Simulate one FMU on its own: inputs from a table held over each step, every output recorded.
+
+Times are k x step from the start, never a running sum, and the last step ends exactly at the stop time.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from skillframe.actuation.bindings import Instance, InstanceFailed, convert
+from skillframe.actuation.inspection import FmuFacts, FmuVariable, inspect_fmu
+from skillframe.errors import InputError
+
+BLOCK = 200  # rows between two signs of life
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """What to simulate.
+
+    Attributes:
+        path: the FMU; stop, step: end time and communication step [s]; parameters: by the FMU's names.
+        input_names, input_rows: a table of inputs, each row time then values, held until the next row's time.
+    """
+
+    path: Path
+    stop: float
+    step: float
+    parameters: dict[str, Any] = field(default_factory=dict)
+    input_names: list[str] = field(default_factory=list)
+    input_rows: list[list[float]] = field(default_factory=list)
+
+
+def output_columns(facts: FmuFacts) -> list[str]:
+    """Names of the columns: every output, arrays as name[1], name[2] ... (binary and clock outputs are left out)."""
+    names: list[str] = []
+    for v in _outputs(facts):
+        names += [v.name] if v.size == 1 else [f"{v.name}[{i + 1}]" for i in range(v.size)]
+    return names
+
+
+def check_request(facts: FmuFacts, request: Request) -> None:
+    """Refuse what cannot be simulated before anything is loaded.
+
+    Raises:
+        InputError, UnknownName: not runnable here, wrong names, or impossible times.
+    """
+    facts.require_runnable()
+    if not (0.0 < request.step <= request.stop < float("inf")):
+        raise InputError("--step, --stop", f"{request.step:g} and {request.stop:g} s", "give 0 < step <= stop")
+    for name in request.parameters:
+        facts.settable(name)
+    for name in request.input_names:
+        if facts.variable(name, "input").size != 1:
+            raise InputError(f"--input: {name}", "is an array", "leave it at its start value")
+
+
+def simulate(request: Request, sandboxed: bool, limit_s: float = 30.0) -> Iterator[list[list[Any]]]:
+    """Blocks of rows, each time then outputs; in a child process if sandboxed.
+
+    Raises:
+        InputError, UnknownName: before the first row.
+        InstanceFailed, ChildLost: when the FMU fails; rows until then have been given.
+    """
+    facts = inspect_fmu(request.path)
+    check_request(facts, request)
+    if not sandboxed:
+        yield from run(request)
+        return
+    import json
+
+    from skillframe.actuation.child import Child, SandboxLimits
+
+    child = Child(facts.path, facts.name, SandboxLimits())
+    try:
+        child.send(b"m", json.dumps({**asdict(request), "path": str(request.path)}).encode())
+        while block := json.loads(child.receive(limit_s, "simulating")):
+            yield block
+    finally:
+        child.close()
+
+
+def run(request: Request) -> Iterator[list[list[Any]]]:
+    """As `simulate`, in this process."""
+    facts = inspect_fmu(request.path)
+    instance = Instance(facts, facts.name)
+    try:
+        yield from _rows(instance, facts, request)
+    finally:
+        instance.close()
+
+
+def _rows(instance: Instance, facts: FmuFacts, request: Request) -> Iterator[list[list[Any]]]:
+    names = request.input_names
+    start = dict(zip(names, _inputs_at(request, 0.0), strict=False))
+    instance.start({**request.parameters, **start}, {}, 0.0)
+    setters = [facts.variables[name] for name in names]
+    block = [[0.0, *_read(instance, facts)]]
+    count = max(1, round(request.stop / request.step))
+    if abs(count * request.step - request.stop) > 1e-9 * request.stop:
+        count = int(request.stop / request.step) + 1
+    for k in range(count):
+        time, end = k * request.step, min((k + 1) * request.step, request.stop) if k + 1 < count else request.stop
+        values = _inputs_at(request, time)
+        try:
+            for variable, value in zip(setters, values, strict=False):
+                instance.set_value(variable.name, value)
+            ended = instance.do_step(time, end - time)
+            row = [end, *_read(instance, facts)]
+        except Exception as error:
+            if block:
+                yield block
+            raise InstanceFailed(instance.sentence(f"failed at {time:.6g} s: {error}")) from None
+        block.append(row)
+        _check_finite(instance, facts, row)
+        if len(block) >= BLOCK or ended:
+            yield block
+            block = []
+        if ended:
+            raise InstanceFailed(instance.sentence(f"asked to end at {end:.6g} s"))
+    if block:
+        yield block
+
+
+def _inputs_at(request: Request, time: float) -> list[float]:
+    """The row of the input table that holds at a time."""
+    if not request.input_rows:
+        return []
+    times = [row[0] for row in request.input_rows]
+    return request.input_rows[max(0, bisect_right(times, time + 1e-12) - 1)][1:]
+
+
+def _outputs(facts: FmuFacts) -> list[FmuVariable]:
+    return [v for v in facts.variables.values() if v.causality == "output" and v.type not in ("Binary", "Clock")]
+
+
+def _read(instance: Instance, facts: FmuFacts) -> list[Any]:
+    values: list[Any] = []
+    for v in _outputs(facts):
+        got = instance.get_values(v.type, [v.reference], v.size)
+        values += [x.decode("utf-8", "replace") if isinstance(x, bytes) else x for x in got]
+    return values
+
+
+def _check_finite(instance: Instance, facts: FmuFacts, row: list[Any]) -> None:
+    for name, value in zip(output_columns(facts), row[1:], strict=True):
+        if isinstance(value, float) and value - value != 0.0:
+            raise InstanceFailed(instance.sentence(f"output {name} is {value} at {row[0]:.6g} s"))
+
+
+def read_inputs(path: Path, facts: FmuFacts) -> tuple[list[str], list[list[float]]]:
+    """An input table: CSV with a column `time` and one per input.
+
+    Raises:
+        InputError: no time, no rows, something that is no number, or time that does not grow.
+        UnknownName: a column that is no input.
+    """
+    import csv
+
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            lines = list(csv.reader(file))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(path, f"cannot be read: {error}", "give a CSV file") from None
+    if not lines or "time" not in (names := [n.strip() for n in lines[0]]):
+        raise InputError(path, "has no column time", "give a CSV with a header: time, then inputs by name")
+    if len(lines) < 2:
+        raise InputError(path, "has a header and no rows", "add rows")
+    at = names.index("time")
+    others = [n for n in names if n != "time"]
+    for name in others:
+        facts.variable(name, "input")
+    rows = []
+    for number, line in enumerate(lines[1:], start=2):
+        try:
+            values = [float(x) for x in line]
+        except ValueError:
+            raise InputError(f"{path}: line {number}", "holds something that is no number", "correct it") from None
+        if len(values) != len(names) or any(x - x != 0.0 for x in values):
+            raise InputError(f"{path}: line {number}", f"needs {len(names)} finite numbers", "correct it")
+        rows.append([values[at], *(v for i, v in enumerate(values) if i != at)])
+        if len(rows) > 1 and rows[-1][0] <= rows[-2][0]:
+            raise InputError(f"{path}: line {number}", "time does not grow", "sort and remove repeated rows")
+    for column, name in enumerate(others, start=1):
+        _convertible(path, facts.variables[name], [row[column] for row in rows])
+    return others, rows
+
+
+def _convertible(path: Path, variable: FmuVariable, values: list[float]) -> None:
+    if variable.type not in ("Real", "Float64", "Float32") and any(convert(variable.type, v) != v for v in values):
+        raise InputError(f"{path}: {variable.name}", f"is of type {variable.type}", "give whole numbers, or 0 and 1")

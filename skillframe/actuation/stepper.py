@@ -1,0 +1,181 @@
+"""Two ways of stepping slots: one C call for all (stepper.c, built once), or cached ctypes calls without a compiler.
+
+Both work on the same table of slots: function addresses, value references and pointers into the bank's arrays, all
+prepared once, because fmpy's list interface spends more time on packing lists than the FMU on the physics.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.actuation.actuator import DISCARD, ENDED, NOT_FINITE
+from skillframe.actuation.bindings import Instance
+from skillframe.actuation.toolchain import FLAGS, CompilerFailed, compile_library, find_compiler
+from skillframe.paths import cache_dir
+
+Float = NDArray[np.float64]
+LARGEST = 64  # variables per slot, as in stepper.c
+Step = Callable[[float, float], int]
+
+
+class Wiring(NamedTuple):
+    """Which of an instance's real variables meet which columns of `u` and `y`."""
+
+    instance: Instance
+    in_refs: list[int]
+    in_columns: list[int]
+    out_refs: list[int]
+    out_columns: list[int]
+
+
+class Slot(ctypes.Structure):
+    """As in stepper.c."""
+
+    _fields_ = [
+        *((name, ctypes.c_void_p) for name in (
+            "component", "set", "get", "step", "in_refs", "out_refs", "in_columns", "out_columns", "u", "y")),
+        *((name, ctypes.c_int64) for name in ("n_in", "n_out", "version", "status")),
+    ]  # fmt: skip
+
+
+@lru_cache(maxsize=1)
+def stepper_library() -> ctypes.CDLL | None:
+    """The built stepper, or None where there is no compiler."""
+    source = Path(__file__).with_name("stepper.c")
+    compiler = find_compiler()
+    if compiler is None:
+        return None
+    key = hashlib.sha256(source.read_bytes() + " ".join([*compiler, *FLAGS]).encode()).hexdigest()[:24]
+    library = cache_dir("stepper") / key / "stepper.so"
+    if not library.is_file():
+        library.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=library.parent) as work:
+            (Path(work) / "stepper.c").write_bytes(source.read_bytes())
+            try:
+                compile_library(["stepper.c"], "stepper.so", Path(work))
+            except CompilerFailed:
+                return None
+            os.replace(Path(work) / "stepper.so", library)
+    return ctypes.CDLL(str(library))
+
+
+class SlotTable:
+    """The slots of a bank and the arrays that they point into; kept alive together."""
+
+    def __init__(self, wirings: Sequence[Wiring], u: Float, y: Float) -> None:
+        self._keep: list[NDArray[np.generic]] = []
+        self.wirings, self.u, self.y = wirings, u, y
+        self.slots = (Slot * max(len(wirings), 1))()
+        for slot, wiring, row_u, row_y in zip(self.slots, wirings, u, y, strict=False):
+            self._fill(slot, wiring, row_u, row_y)
+
+    def _fill(self, slot: Slot, wiring: Wiring, row_u: Float, row_y: Float) -> None:
+        instance = wiring.instance
+        slot.component, slot.version = instance.component, instance.version
+        slot.set = instance.address("fmi2SetReal", "fmi3SetFloat64")
+        slot.get = instance.address("fmi2GetReal", "fmi3GetFloat64")
+        slot.step = instance.address("fmi2DoStep", "fmi3DoStep")
+        slot.in_refs, slot.out_refs = (self._pin(refs, np.uint32) for refs in (wiring.in_refs, wiring.out_refs))
+        slot.in_columns = self._pin(wiring.in_columns, np.int64)
+        slot.out_columns = self._pin(wiring.out_columns, np.int64)
+        slot.u, slot.y = row_u.ctypes.data, row_y.ctypes.data
+        slot.n_in, slot.n_out = len(wiring.in_refs), len(wiring.out_refs)
+
+    def _pin(self, numbers: list[int], dtype: type[np.generic]) -> int:
+        array = np.array(numbers or [0], dtype=dtype)
+        self._keep.append(array)
+        return int(array.ctypes.data)
+
+    def statuses(self) -> list[int]:
+        """Status of every slot after the last call."""
+        return [int(self.slots[i].status) for i in range(len(self.wirings))]
+
+
+def compiled_step(table: SlotTable, active: NDArray[np.uint8]) -> Step | None:
+    """A function (time, step) -> worst status that steps every slot in one call; None without a compiler."""
+    library = stepper_library()
+    if library is None:
+        return None
+    function = library.skillframe_step
+    function.argtypes = [ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p, ctypes.c_double, ctypes.c_double]
+    slots, count, flags = ctypes.addressof(table.slots), len(table.wirings), active.ctypes.data
+    return lambda time, step: function(slots, count, flags, time, step)  # type: ignore[no-any-return]
+
+
+def python_step(table: SlotTable, active: NDArray[np.uint8]) -> Step:
+    """The same by cached ctypes calls, one slot after the other."""
+    cells = [(i, _Cell(table, i).step) for i in range(len(table.wirings))]
+    flags, slots = active.data, table.slots
+
+    def step_all(time: float, step: float) -> int:
+        worst = 0
+        for i, step_cell in cells:
+            if flags[i]:
+                status = step_cell(time, step)
+                if status >= DISCARD:
+                    slots[i].status = status
+                if status > worst:
+                    worst = status
+        return worst
+
+    return step_all
+
+
+class _Cell:
+    """One slot's functions with ready arguments: pointers into the bank's arrays where columns are adjacent."""
+
+    def __init__(self, table: SlotTable, index: int) -> None:
+        slot, wiring = table.slots[index], table.wirings[index]
+        real, size, pointer = ctypes.c_double, ctypes.c_size_t, ctypes.c_void_p
+        tail = [] if slot.version == 2 else [size]
+        self._set = ctypes.CFUNCTYPE(ctypes.c_int, pointer, pointer, size, pointer, *tail)(slot.set)
+        self._get = ctypes.CFUNCTYPE(ctypes.c_int, pointer, pointer, size, pointer, *tail)(slot.get)
+        flags = [ctypes.c_int] if slot.version == 2 else [ctypes.c_bool, *[pointer] * 4]
+        self._go = ctypes.CFUNCTYPE(ctypes.c_int, pointer, real, real, *flags)(slot.step)
+        self._gather, values = _moved(table.u[index], wiring.in_columns)
+        self._scatter, taken = _moved(table.y[index], wiring.out_columns)
+        self._taken = taken.data
+        self._flags, self._last = (ctypes.c_bool * 3)(), ctypes.c_double()
+        n_in, n_out, base = slot.n_in, slot.n_out, ctypes.addressof(self._flags)
+        count_in, count_out = ([], []) if slot.version == 2 else ([n_in], [n_out])
+        self._set_args = (slot.component, slot.in_refs, n_in, values.ctypes.data, *count_in)
+        self._get_args = (slot.component, slot.out_refs, n_out, taken.ctypes.data, *count_out)
+        self._more = (1,) if slot.version == 2 else (True, base, base + 1, base + 2, ctypes.addressof(self._last))
+        self._component, self._more3, self._keep = slot.component, slot.version == 3, (values, taken)
+
+    def step(self, time: float, step: float) -> int:
+        if self._gather:
+            self._gather[0][:] = self._gather[1][self._gather[2]]
+        status: int = self._set(*self._set_args)
+        if status < DISCARD and step > 0.0:
+            status = self._go(self._component, time, step, *self._more) or status
+            if self._more3 and (self._flags[1] or self._flags[2]):
+                status = max(status, DISCARD if self._flags[2] else ENDED)
+        if status >= DISCARD:
+            return status
+        status = self._get(*self._get_args) or status
+        if self._scatter:
+            self._scatter[1][self._scatter[2]] = self._scatter[0]
+        total = sum(self._taken)
+        return status if total - total == 0.0 or status >= DISCARD else NOT_FINITE
+
+
+_Move = tuple[Float, Float, NDArray[np.int64]] | None
+
+
+def _moved(row: Float, chosen: list[int]) -> tuple[_Move, Float]:
+    """(How to move numbers between a buffer and the row, the buffer): no move where the columns are adjacent."""
+    if chosen and chosen == list(range(chosen[0], chosen[0] + len(chosen))):
+        return None, row[chosen[0] : chosen[0] + len(chosen)]
+    buffer = np.zeros(len(chosen))
+    return (buffer, row, np.array(chosen, dtype=np.int64)), buffer

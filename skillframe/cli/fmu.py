@@ -1,0 +1,133 @@
+"""`skillframe fmu`: functional mock-up units, listed, built, checked and simulated."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+
+@click.group(name="fmu")
+def command() -> None:
+    """List, build, check and simulate FMUs (FMI 2 and 3).
+
+    \b
+    Example:
+      skillframe fmu simulate hydraulic_cylinder --stop 1 --step 0.001 --out out.csv
+    """
+
+
+@command.command("list")
+@click.option("--json", "as_json", is_flag=True, help="As JSON on stdout.")
+def list_(as_json: bool) -> None:
+    """List the FMUs that are built; name those that are not.
+
+    \b
+    Example:
+      skillframe fmu list --json
+    """
+    from skillframe.actuation.library import built, fmu_folders
+
+    rows = built()
+    if as_json:
+        click.echo(json.dumps([{"name": r.name, "fmi_version": r.fmi_version, "path": str(r.path)} for r in rows]))
+        return
+    for row in rows:
+        click.echo(f"{row.name}  FMI {row.fmi_version}  {row.path}")
+    for name in fmu_folders():
+        if name not in {row.name for row in rows}:
+            click.echo(f"{name}  not built yet (skillframe fmu build {name})")
+
+
+@command.command("build")
+@click.argument("names", nargs=-1, metavar="[NAME|FILE.fmu]...")
+@click.option("--json", "as_json", is_flag=True, help="What was built as JSON on stdout.")
+def build(names: tuple[str, ...], as_json: bool) -> int:
+    """Build FMUs from source: all of fmus/ by default, or a foreign FMU's own sources for this machine.
+
+    \b
+    Example:
+      skillframe fmu build hydraulic_cylinder
+    """
+    from skillframe.actuation.foreign import build_from_sources
+    from skillframe.actuation.library import BuiltFmu, build_named, fmu_folders
+    from skillframe.errors import SkillframeError
+
+    rows: list[BuiltFmu] = []
+    failed = 0
+    for name in names or tuple(fmu_folders()):
+        try:
+            foreign = name.endswith(".fmu")
+            made = [build_from_sources(Path(name))] if foreign else build_named(name)
+        except SkillframeError as error:
+            if names:
+                raise
+            click.echo(f"error: {error}", err=True)
+            failed += 1
+            continue
+        rows += made
+        for row in made:
+            click.echo(f"{row.name}  FMI {row.fmi_version}  {row.path}", err=as_json)
+    if as_json:
+        click.echo(json.dumps([{"name": r.name, "fmi_version": r.fmi_version, "path": str(r.path)} for r in rows]))
+    return 2 if failed else 0
+
+
+@command.command("check")
+@click.argument("file")
+@click.option("--json", "as_json", is_flag=True, help="As JSON on stdout.")
+@click.option("--allow", is_flag=True, help="Let this very file run inside skillframe's process from now on.")
+def check(file: str, as_json: bool, allow: bool) -> int:
+    """Check an FMU: what it is, what is inside, whether it runs here; exit 1 if there are problems.
+
+    \b
+    Example:
+      skillframe fmu check actuator.fmu --json
+    """
+    from skillframe.actuation.check import check_fmu
+    from skillframe.actuation.library import find_fmu
+
+    path = find_fmu(file)
+    found = check_fmu(path)
+    if allow:
+        from skillframe.actuation.allow import allow as add
+
+        click.echo(f"allowed: {add(path)}", err=True)
+    if as_json:
+        click.echo(json.dumps(found))
+    else:
+        for key, value in found.items():
+            text = ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+            click.echo(f"{key.replace('_', ' ')}: {text or 'none'}")
+    return 1 if found["problems"] else 0
+
+
+@command.command("simulate")
+@click.argument("file")
+@click.option("--stop", required=True, type=float, help="End time [s].")
+@click.option("--step", required=True, type=float, help="Communication step [s].")
+@click.option("--input", "table", type=click.Path(path_type=Path), help="CSV: time, then inputs by name; rows hold.")
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="CSV: time, then every output by name.")
+@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter or start value of an input.")
+@click.option("--timeout", default=30.0, show_default=True, help="Wall time without a sign of life [s].")
+def simulate(
+    file: str, stop: float, step: float, table: Path | None, out: Path, settings: tuple[str, ...], timeout: float
+) -> int:
+    """Simulate an FMU on its own. FMUs of other makers run in a child process with limits.
+
+    \b
+    Example:
+      skillframe fmu simulate hydraulic_cylinder --set command=0.1 --stop 1 --step 0.001 --out out.csv
+    """
+    from skillframe.actuation.record import simulate_to_csv
+    from skillframe.config import parse_setting
+
+    ended = simulate_to_csv(
+        file, stop, step, out, table=table, settings=dict(parse_setting(text) for text in settings), limit_s=timeout
+    )
+    if ended.problem:
+        click.echo(f"{ended.problem}; {ended.rows} rows are in {out}", err=True)
+        return 1
+    click.echo(f"{out}: {ended.rows} rows, {', '.join(ended.columns[1:])}")
+    return 0
