@@ -5,6 +5,8 @@ from __future__ import annotations
 from math import degrees
 from typing import Any
 
+import numpy as np
+
 from skillframe.records import Document
 from skillframe_lmc.phase import Part, Phase, read_phase
 from skillframe_lmc.words import axis_words, direction_words, exact_words, listed
@@ -48,7 +50,11 @@ def _details(phase: Phase) -> list[str]:
     for name, part, k, unit in (
         ("translation", phase.translation, "N/m", "J"), ("rotation", phase.rotation, "Nm/rad", "J"),
     ):  # fmt: skip
-        facts = [_direction(part), *_free(part), f"stiffness {part.stiffness.diagonal().max():.4g} {k} at most"]
+        facts = [
+            _direction(part),
+            *_free(part),
+            f"stiffness {np.linalg.eigvalsh(part.stiffness).max():.4g} {k} at most",
+        ]
         seen = part.evidence
         if not seen.get("held") and "work_teacher_j" in seen:
             facts.append(f"work of the teacher {seen['work_teacher_j']:.3g} {unit}, of the environment "

@@ -84,6 +84,8 @@ def _no_direction_message(part: Learned, choice: Choice, settings: Settings) -> 
     text = (
         f"no one {_push(part)} explains what was seen: it would take pyramids of {taken}, and {allowed:.0f} are allowed"
     )
+    if not any(given.contact.any() for given in part.given):
+        text += "; nothing was touched, so it is an assumption that the axes left free are the environment's doing"
     if all(choose([given], settings).direction is None for given in part.given):
         return f"{text}; not even one demonstration alone is a single linear motion, so cut it into phases"
     return text
