@@ -32,7 +32,8 @@ BLOCK = 500
 class Hand:
     """How the hand holds: translation stiffness [N/m], damping [Ns/m], relaxation time [s]; rotation alike.
 
-    `turn_rate` [rad/s] is how fast an active hand turns the part, `torque_max` [Nm] how hard.
+    `speed` [m/s] is how fast it pushes on, `turn_rate` [rad/s] how fast an active hand turns the part, `torque_max` [Nm]
+    how hard.
     """
 
     stiffness: float
@@ -40,6 +41,7 @@ class Hand:
     relaxation: float
     turn_stiffness: float
     turn_damping: float
+    speed: float = 0.02
     turn_rate: float = 0.0
     torque_max: float = 1.5
 
@@ -47,7 +49,8 @@ class Hand:
 HANDS = {
     "sliding": Hand(stiffness=1000.0, damping=60.0, relaxation=1.0, turn_stiffness=20.0, turn_damping=1.0),
     "aligning": Hand(
-        stiffness=400.0, damping=40.0, relaxation=0.3, turn_stiffness=3.0, turn_damping=0.3, turn_rate=0.15
+        stiffness=400.0, damping=40.0, relaxation=0.3, turn_stiffness=3.0, turn_damping=0.3, turn_rate=0.15,
+        speed=0.03,
     ),
     "lever": Hand(
         stiffness=400.0, damping=40.0, relaxation=0.3, turn_stiffness=15.0, turn_damping=0.8, turn_rate=0.25,
@@ -64,7 +67,7 @@ class TeacherSettings:
     Attributes:
         kind: "kinesthetic" (the hand is on the robot) or "teleoperation" (delay and scale apply).
         aim_noise: standard deviation of the pushing direction per axis [rad].
-        speed: of the push [m/s]; force_max: [N].
+        speed: of the push [m/s]; None for the hand's own. force_max: [N].
         tremor_force: [N]; tremor_torque: [Nm].
         delay_s: one-way delay of teleoperation [s].
         scale: motion of the robot over motion of the master.
@@ -72,7 +75,7 @@ class TeacherSettings:
 
     kind: str = "kinesthetic"
     aim_noise: float = 0.13962634015954636
-    speed: float = 0.03
+    speed: float | None = None
     force_max: float = 15.0
     tremor_force: float = 0.5
     tremor_torque: float = 0.03
@@ -154,7 +157,7 @@ class Teacher(Skill):
         along = (error * direction).sum(-1, keepdims=True)
         sideways = error - along * direction
         excess = np.maximum(along - settings.force_max / hand.stiffness, 0.0)
-        velocity: Float = settings.speed * direction
+        velocity: Float = (hand.speed if settings.speed is None else settings.speed) * direction
         self._position = self._position + velocity * dt - sideways * (dt / hand.relaxation) - excess * direction
         return velocity
 

@@ -61,9 +61,9 @@ def build(params: HoseParams) -> Scene:
         fixture=(seat,),
         tool=tool((face, shaft(0.015, 0.015, FACE - params.length)), tip=FACE),
         friction=params.friction,
-        start_tip=(0.0, 0.0, 0.003),
+        start_tip=(0.0, 0.0, 0.002),
         start_quaternion=TOOL_DOWN,
-        start_lift=tilt_lift(params.radius),
+        start_lift=tilt_lift(params.radius - params.fillet),
         goal=lambda state: (tilt_of(state) < params.tolerance) & (height(state) < 0.001),
         goal_error=lambda state: (height(state), tilt_of(state)),
         task=Task(

@@ -11,9 +11,11 @@ for the singular values s and n demonstrations. The papers take "inspiration fro
 demonstrations a literal BIC is degenerate (no residual), hence the fixed sigma, which is ours: 0.12 rad for rotations,
 and
 
-    sigma = clip(0.2 sqrt(15 mm / L), 0.08, 0.2)
+    sigma = max(clip(0.25 sqrt(15 mm / L), 0.08, 0.25), min(0.6 sin alpha*, 0.18))
 
-for translations over a mean path L, because a person's wandering is correlated over 15 mm and averages out beyond.
+for translations over a mean path L, because a person's wandering is correlated over 15 mm and averages out beyond; and
+because the pyramids' opening alpha* that the demonstrations needed to agree on a direction says how much they wandered.
+The constants separate the two in simulated valleys, pegs, couplers and funnels with up to 15 degrees of aim noise.
 """
 
 from __future__ import annotations
@@ -32,9 +34,16 @@ class CompliantAxes(NamedTuple):
     criterion: list[float]
 
 
-def straightness(path: float, correlation: float) -> float:
-    """Noise of translational mean directions for a mean path [m] and a correlation length [m]."""
-    return float(np.clip(0.2 * np.sqrt(correlation / max(path, 1e-9)), 0.08, 0.2))
+def straightness(path: float, correlation: float, pyramid: float | None = None) -> float:
+    """Noise of translational mean directions, see the module's text.
+
+    Args:
+        path: mean path [m].
+        correlation: length over which a person's wandering is correlated [m].
+        pyramid: alpha* [rad], where the demonstrations agree on a direction.
+    """
+    by_length = float(np.clip(0.25 * np.sqrt(correlation / max(path, 1e-9)), 0.08, 0.25))
+    return by_length if pyramid is None else max(by_length, min(0.6 * float(np.sin(pyramid)), 0.18))
 
 
 def compliant_axes(means: Float, direction: Float | None, sigma: float) -> CompliantAxes:

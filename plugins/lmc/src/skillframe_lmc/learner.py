@@ -159,7 +159,7 @@ def _learn_part(
         if all(len(g.contact) >= min(FEWEST_INTERVALS, len(m.work)) for g, m in zip(given, moving, strict=True)):
             choice = choose(given, settings)
         direction = None if choice is None else choice.direction
-        axes = compliant_axes(means, direction, _straightness(name, moving, settings))
+        axes = compliant_axes(means, direction, _straightness(name, moving, choice, settings))
     path, time = sum(m.path for m in moving), sum(m.duration for m in moving)
     return Learned(
         name=name, motions=motions, moving=moving, given=given, work=done, choice=choice, axes=axes, means=means,
@@ -167,10 +167,11 @@ def _learn_part(
     )  # fmt: skip
 
 
-def _straightness(name: Name, moving: Sequence[Motion], settings: Settings) -> float:
+def _straightness(name: Name, moving: Sequence[Motion], choice: Choice | None, settings: Settings) -> float:
     if name == "rotation":
         return settings.straightness_rad
-    return straightness(float(np.mean([m.path for m in moving])), settings.straightness_m)
+    agreed = None if choice is None or choice.direction is None else choice.pyramid_angle
+    return straightness(float(np.mean([m.path for m in moving])), settings.straightness_m, agreed)
 
 
 def _phase(translation: Learned, rotation: Learned, settings: Settings) -> Document:

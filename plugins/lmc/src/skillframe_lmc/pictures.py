@@ -11,12 +11,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from skillframe.frames import Float, unit
+from skillframe.frames import Float, norm, unit
 from skillframe_lmc.phase import Part
 from skillframe_lmc.projection import Plane, need_map, outline
 from skillframe_lmc.sectors import Sectors
 
 COLOURS = ("#d1495b", "#2e6fba", "#3a9d6e", "#c98a1b", "#7a52a8", "#4f8f9d")
+TORN = 90.0  # degrees between neighbours: an outline that runs round the far side of the sphere cannot be filled
 INK, GREEN, BLUE, RED, GREY = "#1d2025", "#3a9d6e", "#2e6fba", "#d1495b", "#b9bec6"
 
 
@@ -32,6 +33,8 @@ def directions(name: str, part: Part, axes: str) -> Figure:
     for colour, sectors in zip(_cycle(len(given)), given, strict=True):
         for v, m, contact in zip(sectors.motion, sectors.push, sectors.contact, strict=True):
             points = plane.to_plane(outline(v, m, bool(contact), drawn))
+            if np.abs(np.diff(points, axis=0)).max() > TORN:
+                continue
             reach.append(float(np.abs(points).max()))
             opacity = min(0.5, 2.0 / len(sectors.motion))
             canvas.add_patch(Polygon(points, facecolor=colour, edgecolor=colour, alpha=opacity, lw=0.6))
@@ -61,8 +64,12 @@ def _sectors(part: Part, *, teacher_driven_only: bool) -> list[Sectors]:
 def _centre(part: Part, given: list[Sectors]) -> Float:
     if part.desired_direction is not None:
         return part.desired_direction
-    middle = unit(np.concatenate([unit(s.motion + s.push).mean(axis=0, keepdims=True) for s in given]).sum(axis=0))
-    return middle if np.abs(middle).max() > 0.0 else np.array([0.0, 0.0, 1.0])
+    middles = np.array([unit(unit(s.motion + s.push).mean(axis=0)) for s in given])
+    if norm(middles.mean(axis=0)) > 0.4:
+        return unit(middles.mean(axis=0))
+    along = np.linalg.svd(middles)[2][0]  # they oppose each other: look square to the line between them
+    k = int(np.argmin(np.abs(along)))
+    return unit(along[k] * along - np.eye(3)[k])
 
 
 def _cycle(count: int) -> list[str]:
@@ -142,6 +149,7 @@ def _means(canvas: Axes, part: Part, frame: str) -> None:
     canvas.plot([], [], color=RED, lw=2.4, label="principal axis")
     low = min(-0.3, float((means @ second).min()) - 0.2) if D is not None else -1.12
     canvas.set(xlim=(-1.12, 1.12), ylim=(low, 1.12), aspect="equal")
+    canvas.set_xticks((-1.0, -0.5, 0.0, 0.5, 1.0))
     canvas.set_xlabel(f"along {_triple(first)} ({frame})")
     canvas.set_ylabel(f"along {_triple(second)}")
     canvas.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False, fontsize=9)

@@ -42,7 +42,7 @@ class Settings:
     torque_min_nm: float = 0.08
     quantile: float = 0.8
     pyramid_min_rad: float = radians(8.0)
-    pyramid_max_rad: float = radians(20.0)
+    pyramid_max_rad: float = radians(25.0)
     slack: float = 1.25
     straightness_rad: float = 0.12
     straightness_m: float = 0.015
