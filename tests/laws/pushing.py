@@ -24,16 +24,16 @@ class Push(Skill):
     Ends as a success when the tool has not moved for `STALL_S`; the scene's goal is the judge.
     """
 
-    def __init__(self, direction, stiffness, speed=0.02, cap=FORCE_CAP, stall=True):
+    def __init__(self, direction, stiffness, speed=0.02, cap=FORCE_CAP, stall=True, damping=None):
         direction = np.asarray(direction, dtype=float)
         self.direction = direction / norm(direction)[..., None]
-        self.stiffness, self.speed, self.stall = stiffness, speed, stall
+        self.stiffness, self.damping, self.speed, self.stall = stiffness, damping, speed, stall
         self.lead = cap / float(np.max(stiffness))
 
     def start(self, observation, rngs):
         count = len(rngs)
         self.position, self.rotation = observation.pose.position.copy(), observation.pose.rotation.copy()
-        self.impedance, self.none = Impedance(self.stiffness), no_reasons(count)
+        self.impedance, self.none = Impedance(self.stiffness, self.damping), no_reasons(count)
         self.zero, self.twist = np.zeros((count, 6)), np.zeros((count, 6))
         self.twist[:, :3] = self.speed * self.direction
         self.running = np.full(count, Status.RUNNING)
