@@ -1,0 +1,42 @@
+"""skillframe plug-in: the phases of a demonstration, and policies that run them in sequence.
+
+Read in this order: `windows` and `features` (what is looked at), `emission` (how a phase moves), `chain`, `transitions`
+and `em` (the model and its fit), `merge` (which phases are one motion), `segmentation` (their flow), `gate` and
+`observer` (which phase it is, online), `policy` (the skill that runs them). This module is all that is imported when
+plug-ins are listed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from skillframe.hookspecs import hookimpl
+from skillframe.records import Document, SegmenterType
+
+if TYPE_CHECKING:
+    from skillframe.demonstration.record import Demonstration
+
+Fit = Callable[["Sequence[Demonstration]", "int | None", Mapping[str, Any]], Document]
+
+
+def _hmm(kind: str) -> Fit:
+    def fit(demonstrations: Sequence[Demonstration], phases: int | None, settings: Mapping[str, Any]) -> Document:
+        from skillframe_segmenter.segmentation import segment
+
+        return segment(demonstrations, phases, settings, kind)
+
+    return fit
+
+
+@hookimpl
+def skillframe_segmenters() -> Iterable[SegmenterType]:
+    """The ways of cutting demonstrations into phases that this plug-in provides."""
+    yield SegmenterType(
+        name="wrench_hmm", summary="phases with linear motion each; the contact wrench drives the transitions",
+        fit=_hmm("wrench_hmm"),
+    )  # fmt: skip
+    yield SegmenterType(
+        name="pose_hmm", summary="baseline: the same phases; the pose drives the transitions (Kroemer et al. 2015)",
+        fit=_hmm("pose_hmm"),
+    )  # fmt: skip

@@ -1,0 +1,77 @@
+"""Boundaries that a person moves: "2:1=3.45" puts the first boundary of the second demonstration at 3.45 s."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from pathlib import PurePath
+from typing import Any, NamedTuple
+
+from skillframe.errors import InputError, UnknownName
+from skillframe.records import Document
+
+OPTION = "--set-boundary"
+
+
+class Move(NamedTuple):
+    """Demonstration and boundary, counted from 0, and where the boundary is to be [s]."""
+
+    demonstration: int
+    boundary: int
+    time: float
+
+
+def parse_move(text: str, names: Sequence[str]) -> Move:
+    """A move out of "DEMONSTRATION:BOUNDARY=SECONDS"; the demonstration by number (from 1) or file name.
+
+    Raises:
+        InputError: not of that form, or not a time. UnknownName: no such demonstration.
+    """
+    head, equals, seconds = text.rpartition("=")
+    name, colon, number = head.rpartition(":")
+    try:
+        time, boundary = float(seconds), int(number) - 1
+    except ValueError:
+        time, boundary = math.nan, -1
+    if not (equals and colon and math.isfinite(time) and boundary >= 0):
+        raise InputError(f"{OPTION} {text}", "is not DEMONSTRATION:BOUNDARY=SECONDS", "write for example 2:1=3.45")
+    known = {str(i + 1): i for i in range(len(names))}
+    known |= {alias: i for i, n in enumerate(names) if n for alias in (n, PurePath(n).name)}
+    if name not in known:
+        raise UnknownName("demonstration", name, known)
+    return Move(known[name], boundary, time)
+
+
+def moves_of(settings: Mapping[str, Any]) -> tuple[list[Move], dict[str, Any]]:
+    """Moves out of the settings' `boundaries` ([[demonstration, boundary, seconds], ...]), and the other settings."""
+    values = dict(settings)
+    return [Move(int(d), int(b), float(t)) for d, b, t in values.pop("boundaries", [])], values
+
+
+def moved(rows: Sequence[Document], moves: Sequence[Move], names: Sequence[str]) -> list[Document]:
+    """Rows of `demonstrations` with boundaries moved.
+
+    Raises:
+        InputError: a boundary that is not there, or a place outside its neighbours.
+    """
+    result = [{**row, "boundaries": list(row["boundaries"])} for row in rows]
+    for move in moves:
+        where = names[move.demonstration] or f"demonstration {move.demonstration + 1}"
+        cuts = result[move.demonstration]["boundaries"]
+        if move.boundary >= len(cuts):
+            there = ", ".join(f"{t:.2f} s" for t in cuts) or "none"
+            raise InputError(where, f"has no boundary {move.boundary + 1} (there are: {there})", f"mend {OPTION}")
+        cuts[move.boundary] = move.time
+    for move in moves:
+        _check_order(result[move.demonstration]["boundaries"], move, names)
+    return result
+
+
+def _check_order(cuts: Sequence[float], move: Move, names: Sequence[str]) -> None:
+    if any(b <= a for a, b in pairwise(cuts)):
+        raise InputError(
+            names[move.demonstration] or f"demonstration {move.demonstration + 1}",
+            f"boundary {move.boundary + 1} at {move.time:g} s would leave its place between its neighbours",
+            f"boundaries are at {', '.join(f'{t:.2f} s' for t in cuts)}; mend {OPTION}",
+        )

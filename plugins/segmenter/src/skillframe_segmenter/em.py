@@ -1,0 +1,202 @@
+r"""Expectation maximisation over several demonstrations of unequal length, and how many phases there are.
+
+Windows are correlated, so the emission is tempered, in the E-step and in the criterion alike:
+
+    eta = 0.3 clip(100 / mean windows per demonstration, 0.1, 1)          a demonstration counts as ~30 samples
+    BIC = -2 L_eta + p ln(eta N),       p = K (2 m + m (m - 1) / 8) + K (K - 1)
+
+Without it a criterion finds phases in the noise of a long recording. Each number of phases starts twice, from equal
+shares of time and from groups of change points; the start that ends at the better likelihood is kept. Transitions stay
+at their prior until the motion has converged and are then fitted to the wrench in three rounds. The papers fit such a
+model by EM and give no constants; all of these are ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.frames import Float
+from skillframe_segmenter import chain, changepoints, emission, transitions
+from skillframe_segmenter.emission import DIMENSIONS, Observed, Phases
+from skillframe_segmenter.features import Features
+from skillframe_segmenter.settings import Settings
+
+MOST_ROUNDS, CLOSE, WRENCH_ROUNDS = 60, 1e-4, 3
+LEAK = 0.05
+NEVER = -1e3  # log density of a phase that a person has ruled out for a window
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Model:
+    """K phases in a chain.
+
+    Attributes:
+        phases: how each moves.
+        initial: (K,) probabilities at the start.
+        weights: (K, K, R) of the transitions.
+        temper: eta.
+    """
+
+    phases: Phases
+    initial: Float
+    weights: Float
+    temper: float
+
+    @property
+    def count(self) -> int:
+        """K."""
+        return len(self.initial)
+
+
+class Data(NamedTuple):
+    """All demonstrations, end to end; W windows in all.
+
+    Attributes:
+        seen: motions and contacts.
+        regressors: (W, R) what drives the transitions.
+        inside: (B, T) which windows of the longest demonstration's length each has.
+        temper: eta.
+        ruled: (W, K) added to log densities: `NEVER` where a person has said that a window is of another phase; None
+            if nobody has said anything.
+    """
+
+    seen: Observed
+    regressors: Float
+    inside: NDArray[np.bool_]
+    temper: float
+    ruled: Float | None = None
+
+    @property
+    def lengths(self) -> list[int]:
+        """Windows of each demonstration."""
+        return [int(n) for n in self.inside.sum(axis=1)]
+
+    def split(self, values: Float) -> list[Float]:
+        """Rows (W, ...) by demonstration."""
+        return np.split(values, np.cumsum(self.lengths)[:-1])
+
+
+class Fit(NamedTuple):
+    """A fitted model, the posterior (W, K) of its phases, its tempered log-likelihood and criterion."""
+
+    model: Model
+    posterior: Float
+    log_likelihood: float
+    criterion: float
+
+
+def gather(demonstrations: Sequence[Features], regressors: Sequence[Float], settings: Settings) -> Data:
+    """Demonstrations as one body of data."""
+    lengths = np.array([len(d.motion) for d in demonstrations])
+    seen = emission.observe(
+        np.concatenate([d.motion for d in demonstrations]), np.concatenate([d.contact for d in demonstrations])
+    )
+    temper = settings.temper * float(np.clip(settings.temper_windows / lengths.mean(), 0.1, 1.0))
+    inside = np.arange(lengths.max()) < lengths[:, None]
+    return Data(seen, np.concatenate(regressors), inside, temper)
+
+
+def best(data: Data, signals: Sequence[Float], phases: int, settings: Settings) -> Fit:
+    """The better of the two starts for a number of phases, motion only; `signals` are what change points see."""
+    starts = [_by_time(data, phases)]
+    found = changepoints.grouped(signals, phases)
+    if found is not None and phases > 1:
+        starts.append(np.concatenate(found))
+    return max((converge(data, _leaky(x, phases), settings) for x in starts), key=lambda fit: fit.log_likelihood)
+
+
+def _leaky(labels: NDArray[np.intp], phases: int) -> Float:
+    """Responsibilities (W, K) of hard labels, with a little for the others."""
+    posterior = np.full((len(labels), phases), LEAK / phases)
+    posterior[np.arange(len(labels)), labels] += 1.0 - LEAK
+    return posterior
+
+
+def _by_time(data: Data, phases: int) -> NDArray[np.intp]:
+    return np.concatenate([(np.arange(n) * phases) // n for n in data.lengths])
+
+
+def converge(data: Data, posterior: Float, settings: Settings) -> Fit:
+    """EM with constant transitions from responsibilities (W, K)."""
+    count, phases = posterior.shape
+    weights = transitions.prior_weights(phases, data.regressors.shape[1], settings.stay_s)
+    constant = transitions.probabilities(weights, np.eye(data.regressors.shape[1])[-1])
+    steps = _steps(data, np.broadcast_to(constant, (count, phases, phases)))
+    log_likelihood, before = -np.inf, -np.inf
+    for _ in range(MOST_ROUNDS):
+        model = _maximise(data, posterior, weights)
+        smoothed, _ = _expect(data, model, steps)
+        posterior = smoothed.posterior[data.inside]
+        before, log_likelihood = log_likelihood, float(smoothed.log_likelihood.sum())
+        if abs(log_likelihood - before) < CLOSE * abs(log_likelihood):
+            break
+    return _fit(data, model, posterior, log_likelihood)
+
+
+def with_transitions(data: Data, fit: Fit, settings: Settings) -> Fit:
+    """The fit after rounds in which the transitions are fitted as well."""
+    model, prior = fit.model, transitions.prior_weights(fit.model.count, data.regressors.shape[1], settings.stay_s)
+    posterior, log_likelihood = fit.posterior, fit.log_likelihood
+    if model.count == 1:
+        return fit
+    entered = data.inside[:, 1:]
+    inner = np.concatenate([np.arange(len(d)) > 0 for d in data.split(data.regressors)])
+    steps = _steps(data, transitions.probabilities(model.weights, data.regressors))
+    smoothed, densities = _expect(data, model, steps)
+    for _ in range(WRENCH_ROUNDS):
+        joint = chain.pairs(smoothed, densities, steps)[entered]
+        weights = transitions.improve(model.weights, prior, data.regressors[inner], joint)
+        model = _maximise(data, posterior, weights)
+        steps = _steps(data, transitions.probabilities(weights, data.regressors))
+        smoothed, densities = _expect(data, model, steps)
+        posterior, log_likelihood = smoothed.posterior[data.inside], float(smoothed.log_likelihood.sum())
+    return _fit(data, model, posterior, log_likelihood)
+
+
+def log_densities(data: Data, model: Model) -> Float:
+    """(W, K) tempered log densities, with what a person has ruled out."""
+    result = model.temper * emission.log_likelihood(data.seen, model.phases)
+    return result if data.ruled is None else result + data.ruled
+
+
+def _maximise(data: Data, posterior: Float, weights: Float) -> Model:
+    k = posterior.shape[1]
+    firsts = posterior[np.concatenate([[0], np.cumsum(data.lengths)[:-1]])]
+    initial = 0.5 / k + 0.5 * firsts.mean(axis=0)
+    return Model(phases=emission.fit(data.seen, posterior), initial=initial, weights=weights, temper=data.temper)
+
+
+def _expect(data: Data, model: Model, steps: Float) -> tuple[chain.Smoothed, Float]:
+    densities = np.zeros((*data.inside.shape, model.count))
+    densities[data.inside] = log_densities(data, model)
+    return chain.smooth(model.initial, densities, steps), densities
+
+
+def _steps(data: Data, probabilities: Float) -> Float:
+    """(B, T - 1, K, K) transitions into windows, from one row per window; the identity into windows that are not."""
+    k = probabilities.shape[-1]
+    result = np.broadcast_to(np.eye(k), (*data.inside.shape, k, k)).copy()
+    result[data.inside] = probabilities
+    return result[:, 1:]
+
+
+def _fit(data: Data, model: Model, posterior: Float, log_likelihood: float) -> Fit:
+    k, m = model.count, DIMENSIONS
+    parameters = k * (2 * m + 0.25 * m * (m - 1) / 2) + k * (k - 1)
+    samples = max(data.temper * len(data.regressors), 2.0)
+    return Fit(model, posterior, log_likelihood, float(parameters * np.log(samples) - 2.0 * log_likelihood))
+
+
+def paths(data: Data, model: Model) -> list[NDArray[np.intp]]:
+    """The most likely path of every demonstration."""
+    densities = data.split(log_densities(data, model))
+    steps = data.split(transitions.probabilities(model.weights, data.regressors))
+    return [
+        chain.most_likely_path(model.initial, density, step[1:])
+        for density, step in zip(densities, steps, strict=True)
+    ]

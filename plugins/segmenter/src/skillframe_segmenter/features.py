@@ -1,0 +1,106 @@
+r"""What a phase model sees: directions of motion and of contact, each softly normalised to length below one.
+
+    soft(x, x0) = x / sqrt(|x|^2 + x0^2)
+    u = [soft(v, v_r / 4), soft(w, w_r / 4)]      a = [soft(F, F_0), soft(T, T_0)]      phi = [a, |a_F|, |a_T|, 1]
+
+An LMC is a direction, not a speed, and a contact is a direction of force, not its size; standing still and free air are
+near zero instead of random unit vectors. Plain increments and standardised wrenches decide for or against a model more
+than its form does (our finding; the scales are ours):
+
+    v_r = max(P80 |v|, 1 mm/s),    w_r = max(P80 |w|, P80 |v| / 0.2 m, 1 deg/s)             per demonstration
+    F_0 = max(0.2 P90 |F|, 1.5 s_F),    T_0 = max(0.2 P90 |T|, 1.5 s_T, F_0 10 mm)          over all of them
+
+with P80 and P90 percentiles and s the noise from second differences, 1.4826 median|x_2 - 2 x_1 + x_0| / sqrt 6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from skillframe.frames import Float, norm
+from skillframe_segmenter.windows import Windows
+
+SLOWEST = (1e-3, np.deg2rad(1.0))  # m/s, rad/s
+LEVER_M, ARM_M = 0.2, 0.01
+
+
+class Scales(NamedTuple):
+    """Where soft normalisation bends: speed, turning speed, force and torque [m/s, rad/s, N, Nm]."""
+
+    speed: float
+    turning: float
+    force: float
+    torque: float
+
+
+class Features(NamedTuple):
+    """One demonstration as the model sees it, W windows.
+
+    Attributes:
+        motion: (W, 6) u.
+        contact: (W, 6) a.
+    """
+
+    motion: Float
+    contact: Float
+
+    @property
+    def regressors(self) -> Float:
+        """(W, 9) phi."""
+        return regressors(self.contact)
+
+
+def soft(x: Float, scale: float) -> Float:
+    """x (..., 3) softly normalised; shorter than one."""
+    result: Float = x / np.sqrt((x * x).sum(-1, keepdims=True) + scale * scale)
+    return result
+
+
+def soft_pair(x: Float, first: float, second: float) -> Float:
+    """Both halves of x (..., 6) softly normalised."""
+    return np.concatenate([soft(x[..., :3], first), soft(x[..., 3:], second)], axis=-1)
+
+
+def regressors(contact: Float) -> Float:
+    """phi (..., 9) of contacts a (..., 6)."""
+    one = np.ones((*contact.shape[:-1], 1))
+    return np.concatenate([contact, norm(contact[..., :3])[..., None], norm(contact[..., 3:])[..., None], one], axis=-1)
+
+
+def scales(demonstrations: Sequence[Windows]) -> list[Scales]:
+    """The scales of each demonstration; force and torque are those of all."""
+    wrench = [w.wrench for w in demonstrations]
+    force = max(0.2 * _percentile(wrench, slice(0, 3), 90), 1.5 * _noise(wrench, slice(0, 3)), 1e-9)
+    torque = max(0.2 * _percentile(wrench, slice(3, 6), 90), 1.5 * _noise(wrench, slice(3, 6)), force * ARM_M)
+    typical = _percentile([w.motion for w in demonstrations], slice(0, 3), 80)
+    result = []
+    for w in demonstrations:
+        speed = max(_percentile([w.motion], slice(0, 3), 80), SLOWEST[0])
+        turning = max(_percentile([w.motion], slice(3, 6), 80), typical / LEVER_M, SLOWEST[1])
+        result.append(Scales(0.25 * speed, 0.25 * turning, force, torque))
+    return result
+
+
+def features(demonstration: Windows, scale: Scales) -> Features:
+    """u and a of a demonstration."""
+    return Features(
+        soft_pair(demonstration.motion, scale.speed, scale.turning),
+        soft_pair(demonstration.wrench, scale.force, scale.torque),
+    )
+
+
+def typical_scales(each: Sequence[Scales]) -> Scales:
+    """The scales for a demonstration, or a run, that was not among these: the medians."""
+    return Scales(*(float(np.median(values)) for values in zip(*each, strict=True)))
+
+
+def _percentile(parts: Sequence[Float], columns: slice, q: float) -> float:
+    return float(np.percentile(np.concatenate([norm(p[:, columns]) for p in parts]), q))
+
+
+def _noise(parts: Sequence[Float], columns: slice) -> float:
+    second = np.concatenate([p[2:, columns] - 2.0 * p[1:-1, columns] + p[:-2, columns] for p in parts])
+    return float(norm(1.4826 * np.median(np.abs(second), axis=0) / np.sqrt(6.0)))

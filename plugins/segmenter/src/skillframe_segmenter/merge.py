@@ -1,0 +1,101 @@
+r"""Which phases are one linear motion with compliance: those that one desired direction explains.
+
+The paper's valley is the test: sliding down either side is one LMC, and so is the approach, although velocities and
+wrenches are opposite. 600 directions D on the sphere, and "none", are put to every window, translation and rotation
+apart; with M the projector of `emission`, a window that moves (|u| > 1/2) accepts D if
+
+    |M D| > 1/4   and   angle(M D, u) < 25 degrees,
+
+a window at rest accepts D if |M D| < 1/2, and accepts "none". The votes of a group of phases are the largest share of
+windows that one D finds, in the worst phase and demonstration (of four windows or more); the smaller of translation
+and rotation counts. The best pair is joined as long as its votes are at least max(0.6, min(0.75, base - 0.05)), base
+being the worse of the two alone. All constants are ours; the angle is the delicate one: 20 degrees leaves one motion
+in parts when the person's aim wavers, 30 joins lowering with sliding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.frames import Float, norm
+from skillframe_segmenter.emission import Observed
+
+DIRECTIONS, FEWEST, MOST = 600, 4, 150
+MOVING, ALONG, STILL = 0.5, 0.25, 0.5
+BEST_BAR, SLACK = 0.75, 0.05
+
+
+@lru_cache(maxsize=2)
+def sphere(count: int) -> Float:
+    """(count, 3) unit vectors, evenly spread: Fibonacci's lattice."""
+    i = np.arange(count) + 0.5
+    z = 1.0 - 2.0 * i / count
+    angle = np.pi * (1.0 + np.sqrt(5.0)) * i
+    radius = np.sqrt(1.0 - z * z)
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z])
+
+
+def _accepted(motion: Float, free: Float, angle: float) -> Float:
+    """(D + 1,) share of windows that accept each direction, "none" last; motion (W, 3), free (W, 3, 3)."""
+    count = len(motion)
+    allowed = (free.reshape(3 * count, 3).astype(np.float32) @ sphere(DIRECTIONS).T.astype(np.float32)).reshape(
+        count, 3, DIRECTIONS
+    )
+    size = np.sqrt(np.einsum("wid,wid->wd", allowed, allowed))
+    speed = norm(motion)[:, None].astype(np.float32)
+    along = np.einsum("wid,wi->wd", allowed, motion.astype(np.float32))
+    moving = speed > MOVING
+    accepts = np.where(moving, (size > ALONG) & (along > np.cos(angle) * size * speed), size < STILL)
+    return np.append(accepts.mean(axis=0), float((~moving).mean()))
+
+
+def _shares(seen: Observed, labels: Sequence[NDArray[np.intp]], phases: int, angle: float) -> list[Float]:
+    """For each phase (cells, 2, D + 1): shares in each demonstration where it has windows enough."""
+    first = np.concatenate([[0], np.cumsum([len(x) for x in labels])])
+    result = []
+    for k in range(phases):
+        cells = []
+        for each, offset in zip(labels, first[:-1], strict=True):
+            mine = np.flatnonzero(each == k)
+            if len(mine) < FEWEST:
+                continue
+            mine = offset + mine[np.linspace(0, len(mine) - 1, min(len(mine), MOST)).astype(int)]
+            u = seen.motion[mine]
+            cells.append(
+                [_accepted(u[:, 3 * p : 3 * p + 3], seen.free[mine, p], angle) for p in range(2)]
+            )
+        result.append(np.array(cells).reshape(-1, 2, DIRECTIONS + 1))
+    return result
+
+
+def _votes(group: Sequence[int], shares: Sequence[Float]) -> float:
+    cells = np.concatenate([shares[k] for k in group])
+    return float(cells.min(axis=0).max(axis=-1).min()) if len(cells) else 0.0
+
+
+def groups_of_one_motion(
+    seen: Observed, labels: Sequence[NDArray[np.intp]], phases: int, angle: float, least: float
+) -> list[int]:
+    """The group of each phase; phases of one group are one motion.
+
+    Args:
+        seen: all windows.
+        labels: phase of each window, by demonstration.
+        phases: how many there are.
+        angle: of acceptance [rad].
+        least: least votes of a group.
+    """
+    shares = _shares(seen, labels, phases, angle)
+    groups = [[k] for k in range(phases)]
+    while len(groups) > 1:
+        alone = [_votes(g, shares) for g in groups]
+        pairs = [(i, j) for i in range(len(groups)) for j in range(i)]
+        score, (i, j) = max((_votes(groups[i] + groups[j], shares), (i, j)) for i, j in pairs)
+        if score < max(least, min(BEST_BAR, min(alone[i], alone[j]) - SLACK)):
+            break
+        groups[j] += groups.pop(i)
+    return [next(g for g, members in enumerate(groups) if k in members) for k in range(phases)]

@@ -1,0 +1,151 @@
+"""The phase model as it stands in a policy file: what is needed to follow the phases online, checked when read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.config import coerce
+from skillframe.errors import InputError
+from skillframe.frames import Float
+from skillframe.records import Document
+from skillframe_segmenter.emission import DIMENSIONS, Phases
+from skillframe_segmenter.features import Scales
+from skillframe_segmenter.gate import Gate
+from skillframe_segmenter.settings import WINDOW_S
+
+VERSION = 1
+WHERE = "phase_model"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pose0:
+    """What poses are compared with where they drive the transitions: mean position and attitude, and their spread."""
+
+    position: Float
+    rotation: Float
+    spread: Float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PhaseModel:
+    """K micro-phases that make up P phases.
+
+    Attributes:
+        at: (3,) point of the tool frame whose motion and wrench are looked at.
+        axes: "base" or "phase_start".
+        scales: of soft normalisation, for demonstrations and runs that were not learned from.
+        temper: eta.
+        phase_of: (K,) phase of each micro-phase.
+        phases: how each micro-phase moves.
+        initial: (K,); weights: (K, K, R) of the transitions.
+        gate: for execution.
+        successors: (P, P + 1) how often each phase was followed by each, the last column is the end.
+        switch_posterior, switch_windows: online, a phase takes over when it is this probable for so many windows.
+        origin: what poses are compared with; None where the wrench drives the transitions.
+    """
+
+    at: Float
+    axes: str
+    scales: Scales
+    temper: float
+    phase_of: NDArray[np.intp]
+    phases: Phases
+    initial: Float
+    weights: Float
+    gate: Gate
+    successors: Float
+    switch_posterior: float
+    switch_windows: int
+    origin: Pose0 | None = None
+
+    @property
+    def count(self) -> int:
+        """P."""
+        return len(self.successors)
+
+    @property
+    def membership(self) -> Float:
+        """(K, P) ones where a micro-phase belongs to a phase."""
+        return np.eye(self.count)[self.phase_of]
+
+
+def to_document(model: PhaseModel, kind: str) -> Document:
+    """The model as plain JSON values."""
+    document: Document = {
+        "type": kind, "version": VERSION, "window_s": WINDOW_S, "at": model.at.tolist(), "axes": model.axes,
+        "scales": model.scales._asdict(), "temper": model.temper, "phase_of": model.phase_of.tolist(),
+        "direction": model.phases.direction.tolist(), "covariance": model.phases.covariance.tolist(),
+        "initial": model.initial.tolist(), "transition_weights": model.weights.tolist(),
+        "gate": {name: value.tolist() for name, value in model.gate._asdict().items()},
+        "successors": model.successors.tolist(), "switch_posterior": model.switch_posterior,
+        "switch_windows": model.switch_windows,
+    }  # fmt: skip
+    if model.origin is not None:
+        document["origin"] = {
+            name: getattr(model.origin, name).tolist() for name in ("position", "rotation", "spread")
+        }
+    return document
+
+
+def from_document(document: Document) -> PhaseModel:
+    """The model of a document.
+
+    Raises:
+        InputError: a key that is missing or holds the wrong thing, or parts whose sizes do not agree.
+    """
+    if document.get("version") != VERSION or document.get("window_s") != WINDOW_S:
+        raise InputError(f"{WHERE}.version", "is not one that this plug-in can follow online", "segment again")
+    phase_of = np.array(_get(document, "phase_of", list[int]), dtype=np.intp)
+    gate: dict[str, Any] = _get(document, "gate", dict[str, Any])
+    k, r = len(phase_of), 7 if "origin" in document else 9
+    successors = np.array(_get(document, "successors", list[list[float]]), dtype=float)
+    p = len(successors)
+    _demand(k > 0 and set(phase_of.tolist()) == set(range(p)), "phase_of", f"should name the phases 0 to {p - 1}")
+    _demand(successors.shape == (p, p + 1), "successors", f"should be {p} rows of {p + 1}")
+    scales: dict[str, float] = _get(document, "scales", dict[str, float])
+    _demand(set(scales) == set(Scales._fields) and min(scales.values()) > 0.0, "scales", "should hold four lengths > 0")
+    return PhaseModel(
+        at=_array(document, "at", (3,)), axes=_get(document, "axes", str), scales=Scales(**scales),
+        temper=_get(document, "temper", float), phase_of=phase_of,
+        phases=Phases(
+            _array(document, "direction", (k, DIMENSIONS)), _array(document, "covariance", (k, DIMENSIONS, DIMENSIONS))
+        ),
+        initial=_array(document, "initial", (k,)), weights=_array(document, "transition_weights", (k, k, r)),
+        gate=Gate(_array(gate, "weights", (k, r)), _array(gate, "share", (k,)), _array(gate, "transition", (k, k))),
+        successors=successors, switch_posterior=_get(document, "switch_posterior", float),
+        switch_windows=_get(document, "switch_windows", int), origin=_origin(document),
+    )  # fmt: skip
+
+
+def _origin(document: Document) -> Pose0 | None:
+    if "origin" not in document:
+        return None
+    values: dict[str, Any] = _get(document, "origin", dict[str, Any])
+    return Pose0(
+        position=_array(values, "position", (3,)), rotation=_array(values, "rotation", (3, 3)),
+        spread=_array(values, "spread", (2,)),
+    )  # fmt: skip
+
+
+def _get(document: Document, key: str, hint: Any) -> Any:
+    if key not in document:
+        raise InputError(WHERE, f"lacks the key {key!r}", "segment the demonstrations again")
+    return coerce(document[key], hint, f"{WHERE}.{key}")
+
+
+def _array(document: Document, key: str, shape: tuple[int, ...]) -> Float:
+    try:
+        values = np.array(document.get(key), dtype=float)
+    except (TypeError, ValueError):
+        values = np.empty(0)
+    _demand(values.shape == shape, key, f"should be numbers of shape {shape}")
+    return values
+
+
+def _demand(fine: bool, key: str, problem: str) -> None:
+    if not fine:
+        raise InputError(f"{WHERE}.{key}", problem, "segment the demonstrations again")

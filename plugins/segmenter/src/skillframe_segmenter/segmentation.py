@@ -1,0 +1,227 @@
+"""From demonstrations to phases: windows, features, EM, the number of phases, and which of them are one motion.
+
+The flow of `wrench_hmm` (and, with poses instead of wrenches driving the transitions, of `pose_hmm`):
+
+    windows -> features -> EM for K = 1, 2, ... -> best criterion -> transitions -> most likely path -> merge -> gate
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.config import build
+from skillframe.demonstration.record import Demonstration
+from skillframe.errors import InputError
+from skillframe.frames import Float, norm, rotation_vector
+from skillframe.records import Document
+from skillframe_segmenter import em, gate, merge, model, runs
+from skillframe_segmenter.boundaries import Move, moved, moves_of
+from skillframe_segmenter.features import Features, Scales, features, scales, typical_scales
+from skillframe_segmenter.model import PhaseModel, Pose0
+from skillframe_segmenter.settings import Settings
+from skillframe_segmenter.windows import Windows, cut_all
+
+SHORT, SHORT_MERGED = 3, 5  # windows; shorter runs go to a neighbour, before and after phases are joined
+FEWEST_PER_PHASE = 4
+Labels = NDArray[np.intp]
+
+
+class Prepared(NamedTuple):
+    """Demonstrations as the model sees them.
+
+    Attributes:
+        cut: in windows; point: (3,) that was looked at; scale: of each; seen: features.
+        drive: (W, R) regressors of the transitions, by demonstration; origin: of poses, if they drive.
+    """
+
+    cut: list[Windows]
+    point: Float
+    scale: list[Scales]
+    seen: list[Features]
+    drive: list[Float]
+    origin: Pose0 | None
+
+
+class Segmented(NamedTuple):
+    """A fitted segmentation.
+
+    Attributes:
+        fit: of the micro-phases; phase_of: (K,) phase of each.
+        paths: micro-phase of every window; labels: phase of every window; both by demonstration.
+        criterion: by number of micro-phases tried.
+    """
+
+    fit: em.Fit
+    phase_of: Labels
+    paths: list[Labels]
+    labels: list[Labels]
+    criterion: dict[int, float]
+
+
+def segment(
+    demonstrations: Sequence[Demonstration], phases: int | None, settings: Mapping[str, Any], kind: str
+) -> Document:
+    """`phase_model` and `demonstrations` of a policy file.
+
+    Args:
+        demonstrations: one or more.
+        phases: how many; None finds the number.
+        settings: by name; `boundaries` moves some, see `boundaries`.
+        kind: "wrench_hmm" or "pose_hmm".
+
+    Raises:
+        InputError: demonstrations that cannot be cut, settings that make no sense, or too many phases.
+    """
+    moves, values = moves_of(settings)
+    chosen = build(Settings, values, "--set")
+    prepared = prepare(demonstrations, chosen, kind)
+    data = em.gather(prepared.seen, prepared.drive, chosen)
+    _check_count(demonstrations, prepared.cut, phases)
+    found = fit(data, prepared, phases, chosen)
+    names = [d.source for d in demonstrations]
+    rows = rows_of(prepared.cut, found.labels, names)
+    if moves:
+        rows = moved(rows, moves, names)
+        found = _refit(data, prepared, found, rows, moves, chosen)
+        rows = [r if i in {m.demonstration for m in moves} else old for i, (r, old) in enumerate(
+            zip(rows, rows_of(prepared.cut, found.labels, names), strict=True))]
+    document = model.to_document(online_model(prepared, found, chosen), kind)
+    document["criterion"] = {str(k): value for k, value in found.criterion.items()}
+    return {"phase_model": document, "demonstrations": rows}
+
+
+def prepare(demonstrations: Sequence[Demonstration], settings: Settings, kind: str) -> Prepared:
+    """Windows, features and what drives the transitions."""
+    cut, point = cut_all(demonstrations, settings.at, settings.axes)
+    scale = scales(cut)
+    seen = [features(w, s) for w, s in zip(cut, scale, strict=True)]
+    if kind == "pose_hmm":
+        origin = _origin(cut)
+        return Prepared(cut, point, scale, seen, [pose_regressors(w.position, w.rotation, origin) for w in cut], origin)
+    return Prepared(cut, point, scale, seen, [f.regressors for f in seen], None)
+
+
+def _origin(cut: Sequence[Windows]) -> Pose0:
+    position = np.concatenate([w.position for w in cut])
+    rotation = np.concatenate([w.rotation for w in cut])
+    left, _, right = np.linalg.svd(rotation.mean(axis=0))
+    mean = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    spread = [np.sqrt(position.var(axis=0).sum()), np.sqrt((rotation_vector(rotation @ mean.T) ** 2).sum(-1).mean())]
+    return Pose0(position=position.mean(axis=0), rotation=mean, spread=np.maximum(spread, [1e-3, 1e-2]))
+
+
+def pose_regressors(position: Float, rotation: Float, origin: Pose0) -> Float:
+    """phi (..., 7) of poses: displacement and turn from the mean pose over their spread, and 1."""
+    moved_by = (position - origin.position) / origin.spread[0]
+    turned_by = rotation_vector(rotation @ origin.rotation.T) / origin.spread[1]
+    return np.concatenate([moved_by, turned_by, np.ones((*position.shape[:-1], 1))], axis=-1)
+
+
+def _check_count(demonstrations: Sequence[Demonstration], cut: Sequence[Windows], phases: int | None) -> None:
+    if phases is None:
+        return
+    shortest = min(range(len(cut)), key=lambda i: cut[i].size)
+    most = cut[shortest].size // FEWEST_PER_PHASE
+    if not 1 <= phases <= most:
+        raise InputError(
+            demonstrations[shortest].source or f"demonstration {shortest + 1}",
+            f"is {demonstrations[shortest].duration:.2f} s long, which allows 1 to {most} phases, not {phases}",
+            "ask for fewer phases, or leave --phases away",
+        )
+
+
+def fit(data: em.Data, prepared: Prepared, phases: int | None, settings: Settings) -> Segmented:
+    """Phases of prepared demonstrations, numbered in the order in which they appear."""
+    signals = [np.hstack([f.motion, 0.5 * f.contact]) for f in prepared.seen]
+    most = min(settings.phases_max, min(w.size for w in prepared.cut) // FEWEST_PER_PHASE)
+    tried = {k: em.best(data, signals, k, settings) for k in (range(1, most + 1) if phases is None else [phases])}
+    chosen = em.with_transitions(data, min(tried.values(), key=lambda f: f.criterion), settings)
+    paths = em.paths(data, chosen.model)
+    tidy = [runs.without_short(path, SHORT) for path in paths]
+    groups = np.arange(chosen.model.count)
+    if phases is None:
+        groups = np.array(merge.groups_of_one_motion(
+            data.seen, tidy, chosen.model.count, settings.merge_angle_rad, settings.merge_votes
+        ))  # fmt: skip
+    shortest = SHORT_MERGED if phases is None else SHORT
+    labels = [runs.without_short(groups[path], shortest) for path in tidy]
+    return _numbered(Segmented(chosen, groups, paths, labels, {k: f.criterion for k, f in tried.items()}))
+
+
+def _numbered(found: Segmented) -> Segmented:
+    """Phases by first appearance; micro-phases whose phase holds no window join the phase of their nearest motion."""
+    number = runs.in_order(found.labels)
+    direction = found.fit.model.phases.direction
+    kept = np.array([k for k, g in enumerate(found.phase_of) if int(g) in number])
+    nearest = [k if int(g) in number else kept[int(norm(direction[kept] - direction[k]).argmin())]
+               for k, g in enumerate(found.phase_of)]  # fmt: skip
+    phase_of = np.array([number[int(found.phase_of[k])] for k in nearest], dtype=np.intp)
+    labels = [np.array([number[int(x)] for x in each], dtype=np.intp) for each in found.labels]
+    return found._replace(phase_of=phase_of, labels=labels)
+
+
+def _refit(
+    data: em.Data, prepared: Prepared, found: Segmented, rows: Sequence[Document], moves: Sequence[Move],
+    settings: Settings,
+) -> Segmented:  # fmt: skip
+    """EM again, with the phases of demonstrations whose boundaries a person has moved held as said."""
+    said = {m.demonstration for m in moves}
+    k = len(found.phase_of)
+    ruled = [
+        np.where(found.phase_of == _labels_of(rows[i], w)[:, None], 0.0, em.NEVER) if i in said else np.zeros((w.size, k))
+        for i, w in enumerate(prepared.cut)
+    ]
+    held = data._replace(ruled=np.concatenate(ruled))
+    start = em.converge(held, found.fit.posterior, settings)
+    again = em.with_transitions(held, start, settings)
+    paths = em.paths(held, again.model)
+    labels = [
+        _labels_of(rows[i], w) if i in said else runs.without_short(found.phase_of[path], SHORT_MERGED)
+        for i, (w, path) in enumerate(zip(prepared.cut, paths, strict=True))
+    ]
+    return _numbered(found._replace(fit=again, paths=paths, labels=labels))
+
+
+def _labels_of(row: Document, cut: Windows) -> Labels:
+    """Phase of every window from boundaries in time; a window belongs to where its middle is."""
+    middle = np.array(cut.edges(range(cut.size))) + 0.5 * (cut.edges([1])[0] - cut.start)
+    return np.array(row["labels"], dtype=np.intp)[np.searchsorted(row["boundaries"], middle)]
+
+
+def rows_of(cut: Sequence[Windows], labels: Sequence[Labels], names: Sequence[str]) -> list[Document]:
+    """`demonstrations` of a policy file."""
+    result = []
+    for w, each, name in zip(cut, labels, names, strict=True):
+        starts = runs.starts_of_runs(each)
+        result.append({
+            "file": name, "boundaries": w.edges([int(i) for i in starts[1:]]),
+            "labels": [int(x) for x in each[starts]],
+        })  # fmt: skip
+    return result
+
+
+def online_model(prepared: Prepared, found: Segmented, settings: Settings) -> PhaseModel:
+    """What is needed to follow the phases online."""
+    chosen = found.fit.model
+    return PhaseModel(
+        at=prepared.point, axes=settings.axes, scales=typical_scales(prepared.scale), temper=chosen.temper,
+        phase_of=found.phase_of, phases=chosen.phases, initial=chosen.initial, weights=chosen.weights,
+        gate=gate.fit(prepared.drive, found.fit.posterior, found.paths),
+        successors=successors(found.labels, int(found.phase_of.max()) + 1),
+        switch_posterior=settings.switch_posterior, switch_windows=settings.switch_windows, origin=prepared.origin,
+    )  # fmt: skip
+
+
+def successors(labels: Sequence[Labels], phases: int) -> Float:
+    """(P, P + 1) how often each phase was followed by each; the last column counts ends."""
+    counts = np.zeros((phases, phases + 1))
+    for each in labels:
+        order = [int(x) for x in each[runs.starts_of_runs(each)]]
+        for one, two in pairwise([*order, phases]):
+            counts[one, two] += 1.0
+    return counts
