@@ -32,8 +32,8 @@ BLOCK = 500
 class Hand:
     """How the hand holds: translation stiffness [N/m], damping [Ns/m], relaxation time [s]; rotation alike.
 
-    `speed` [m/s] is how fast it pushes on, `turn_rate` [rad/s] how fast an active hand turns the part, `torque_max` [Nm]
-    how hard.
+    `speed` [m/s] is how fast it pushes on, `turn_rate` [rad/s] how fast an active hand turns the part, and
+    `torque_max` [Nm] how hard.
     """
 
     stiffness: float

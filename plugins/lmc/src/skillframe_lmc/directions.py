@@ -9,12 +9,12 @@ The direction exists if alpha* <= 25 degrees. It is chosen where it lies deepest
 
     M(D) = min over demonstrations of mean_k(depth)    among    {A(D) <= 1.25 alpha*},
 
-where M is lessened by kappa min(|D . w|, 0.15) if the demonstrations moved in one plane with normal w (two or more mean
-motions that span a plane and no more): a push out of the plane never moved anything, so what the votes say about it is
-the person's wavering, while the cap lets clear votes overrule the plane. The search goes first among cells of 1.6 degrees,
-then takes the mean over a disc of 3 degrees around the best, weighted by exp(M / 0.02 rad), which makes the result
-independent of where the cells lie. The papers intersect rectangles in a plane of two
-angles and do not print the constants; votes on the sphere have no poles, and every constant here is ours.
+where M is lessened by kappa min(|D . w|, 0.15) if the demonstrations moved in one plane with normal w (two or more
+mean motions that span a plane and no more): a push out of the plane never moved anything, so what the votes say about
+it is the person's wavering, while the cap lets clear votes overrule the plane. The search goes first among cells of
+1.6 degrees, then takes the mean over a disc of 3 degrees around the best, weighted by exp(M / 0.02 rad), which makes
+the result independent of where the cells lie. The papers intersect rectangles in a plane of two angles and do not print
+the constants; votes on the sphere have no poles, and every constant here is ours.
 """
 
 from __future__ import annotations
