@@ -96,7 +96,7 @@ class Plant:
         self.batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
         self._mocap_pos[:, 0] = self._fixture.position
         self._mocap_quat[:, 0] = quaternion_from_matrix(self._fixture.rotation)[:, [3, 0, 1, 2]]
-        self._qpos[:] = self._layout.to_mujoco(self.robot.model, configuration)
+        self._qpos[:] = self.engine_order(configuration)
         self._qvel[:] = 0.0
         self._applied[:] = 0.0
         self.batch.forward()
@@ -115,6 +115,10 @@ class Plant:
     def configuration(self) -> Float:
         """(N, nq) in Pinocchio's order."""
         return self._layout.to_pinocchio(self.robot.model, self._qpos)
+
+    def engine_order(self, configuration: Float) -> Float:
+        """Configurations (T, nq) of Pinocchio in MuJoCo's order."""
+        return self._layout.to_mujoco(self.robot.model, configuration)
 
     def step(self, torque: Float, ids: NDArray[np.int64]) -> None:
         """Advance some trials by one time step under generalised forces (N, nv) in MuJoCo's order."""
