@@ -10,7 +10,7 @@ its kinematics and dynamics come from a second, nominal batch.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -294,4 +294,5 @@ class _Loop:
             "status": Status(int(self.status[i])).name, "duration_s": float(self.duration[i]),
             "peak_force_n": float(self.peak[i]), "final_error_m": float(self.errors[i, 0]),
             "final_error_rad": float(self.errors[i, 1]), "analytic": scene.analytic,
+            "limits": asdict(_joint_limits(self.setup.robot)),
         }  # fmt: skip

@@ -43,7 +43,9 @@ def split_settings(world: str, settings: Mapping[str, Any]) -> tuple[dict[str, A
                 raise InputError(f"--set {key}", f"expected a finite number, got {value!r}", "give it in SI units")
             draws[key] = float(value)
         else:
-            raise UnknownName("setting", key, {*fields, *QUANTITIES})
+            known = {*fields, *QUANTITIES}
+            group = f"{key.partition('.')[0]}."
+            raise UnknownName("setting", key, [k for k in known if k.startswith(group)] or known)
     return params, draws
 
 

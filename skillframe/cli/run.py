@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
+if TYPE_CHECKING:
+    from skillframe.trace import Trace
 
 
 @click.command(name="run")
@@ -16,7 +19,7 @@ import click
 @click.option("--coc", help='Centre of compliance: "x,y,z" in the tool frame, or a frame (tip, wrist) [as learned].')
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="world.*, start.*, fixture.*, grasp.* ...")
 @click.option("--out", type=click.Path(path_type=Path), help="Trace file (.npz).")
-@click.option("--replay", type=click.Path(path_type=Path), help="3-D replay of the run (.html).")
+@click.option("--replay", type=click.Path(path_type=Path), help="Page with a 3-D replay and plots of the run (.html).")
 @click.option("--seed", default=0, show_default=True, help="Seed of the sensor noise.")
 @click.option("--duration", default=20.0, show_default=True, help="Longest run in simulated seconds.")
 @click.option("--rate", default=100.0, show_default=True, help="Rate of the trace [Hz].")
@@ -51,9 +54,8 @@ def command(
     assert result.traces is not None
     trace = result.traces[0]
     trace.meta.update({"skill": name, "seed": seed, "draws": draws})
-    for path in (out,):
-        if path is not None:
-            trace.save(path)
+    if out is not None:
+        trace.save(out)
     if replay is not None:
         _write_replay(trace, replay)
     _tell(trace.meta, out, replay, as_json)
@@ -62,10 +64,15 @@ def command(
     return 0 if result.success[0] else 1
 
 
-def _write_replay(trace: Any, path: Path) -> None:
-    from skillframe.report.replay import write_replay
+def _write_replay(trace: Trace, path: Path) -> None:
+    from tempfile import TemporaryDirectory
 
-    write_replay(trace, path)
+    from skillframe.report.page import write_report
+
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / f"{path.stem}.npz"
+        trace.save(file)
+        write_report([file], path)
 
 
 def _tell(meta: dict[str, Any], out: Path | None, replay: Path | None, as_json: bool) -> None:
