@@ -65,15 +65,15 @@ static double deflection_rate(const Model *m, double z, double v) { return v - f
 
 static double friction(const Model *m, double z, double v) { return m->own.stiffness * z + m->value[VISCOUS_FRICTION] * v; }
 
-/* Force and its rate at one instant: what the quadrature of impulse and work needs. */
+/* Force without the seals' deflection, and its rate, at one instant: what the quadrature of impulse and work needs. */
 typedef struct { double smooth, rate, stop; } Push;
 
-static Push push(const Model *m, const double p[3], const Chambers *c, double z, const Motion *w)
+static Push push(const Model *m, const double p[3], const Chambers *c, const Motion *w)
 {
     const Own *o = &m->own;
-    Push f = {o->area_a * p[A] - o->area_b * p[B] - friction(m, z, w->velocity),
-              o->area_a * c->rate[A] - o->area_b * c->rate[B]
-                  - o->stiffness * deflection_rate(m, z, w->velocity) - m->value[VISCOUS_FRICTION] * w->acceleration,
+    double viscous = m->value[VISCOUS_FRICTION];
+    Push f = {o->area_a * p[A] - o->area_b * p[B] - viscous * w->velocity,
+              o->area_a * c->rate[A] - o->area_b * c->rate[B] - viscous * w->acceleration,
               end_stop(m, w->position, w->velocity)};
     return f;
 }
@@ -253,7 +253,7 @@ Outcome model_step(Model *m, double step, Report *r)
     Motion here = motion_at(m, s0, 0.0), there;
     Chambers c, d;
     chambers(m, &here, p, &c);
-    Push f = push(m, p, &c, z, &here), g;
+    Push f = push(m, p, &c, &here), g;
     while (t < step) {
         double end = next_break(t, usual, step, breaks), h = end - t;
         there = motion_at(m, s0, end);
@@ -266,9 +266,11 @@ Outcome model_step(Model *m, double step, Report *r)
             return DISCARD;
         }
         usual = fmin(largest, usual * clip(0.8 * cbrt(v[TOLERANCE] / fmax(error, 1e-30)), 1.0, 3.0));
-        z = deflection_after(z, h * (here.velocity + 0.5 * a * h), limit_at(m, 0.5 * (here.velocity + there.velocity)));
+        double mean = 0.5 * (here.velocity + there.velocity);
+        Slide seals = slide(z, mean, h, limit_at(m, mean));
+        z = seals.z, impulse -= m->own.stiffness * seals.integral, work -= m->own.stiffness * seals.work;
         chambers(m, &there, q, &d);
-        g = push(m, q, &d, z, &there);
+        g = push(m, q, &d, &there);
         accumulate(&f, &here, &g, &there, h, &impulse, &work);
         here = there, c = d, f = g, t = end;
         p[A] = q[A], p[B] = q[B], p[S] = q[S];

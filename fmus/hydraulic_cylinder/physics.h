@@ -67,11 +67,17 @@ static inline double sliding_deflection(double v, double length, double coulomb,
     return length * (1.0 + (breakaway / coulomb - 1.0) * exp(-s * s));
 }
 
-/* Deflection after sliding by `travel` (signed, no reversal inside) towards `limit` (positive): exact for Coulomb. */
-static inline double deflection_after(double z, double travel, double limit)
+typedef struct { double z, integral, work; } Slide;   /* deflection, its integral over time, and over the path */
+
+/* Sliding for h without reversal at mean speed v towards the deflection `limit` (positive). Exact for a constant limit,
+ * but for the integral over time, which takes the speed as constant (README, "Integration"). */
+static inline Slide slide(double z, double v, double h, double limit)
 {
-    double goal = travel < 0.0 ? -limit : limit;
-    return z - (goal - z) * expm1(-fabs(travel) / limit);
+    double goal = v < 0.0 ? -limit : limit, way = fabs(v) * h / limit, fade = expm1(-way);
+    double mean = way > 1e-6 ? -fade / way : 1.0 - 0.5 * way;
+    double after = z - (goal - z) * fade;
+    Slide s = {after, h * (goal + (z - goal) * mean), goal * (v * h - (after - z))};
+    return s;
 }
 
 static inline double clip(double x, double low, double high) { return x < low ? low : x > high ? high : x; }

@@ -3,13 +3,51 @@
 from __future__ import annotations
 
 import ctypes
+import itertools
 from collections import deque
 from collections.abc import Mapping
+from contextlib import suppress
+from functools import lru_cache
 from typing import Any
+from weakref import WeakValueDictionary
 
 from skillframe.actuation.extract import unpack
 from skillframe.actuation.inspection import FLOATS, FmuFacts, read_description
 from skillframe.errors import InputError, SkillframeError
+
+
+_KEYS = itertools.count(1)
+_LISTENERS: WeakValueDictionary[int, Instance] = WeakValueDictionary()
+
+
+def _hear2(key: int | None, name: bytes, status: int, category: bytes, text: bytes | None) -> None:
+    """FMI 2 messages of every instance: fmpy's formatting proxy knows one logger only, so that a key tells them apart."""
+    instance = _LISTENERS.get(key or 0)
+    if instance is not None:
+        instance._hear(text)
+
+
+@lru_cache(maxsize=1)
+def _logger2() -> Any:
+    from fmpy import fmi2
+
+    return fmi2.fmi2CallbackLoggerTYPE(_hear2)
+
+
+def _callbacks2(key: int) -> Any:
+    """Callbacks of an FMI 2 instance; messages that come with printf arguments are formatted by fmpy's proxy."""
+    from fmpy import calloc, fmi2, free
+
+    calls = fmi2.fmi2CallbackFunctions()
+    calls.logger = _logger2()
+    calls.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
+    calls.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
+    calls.componentEnvironment = key
+    with suppress(ImportError, OSError):  # without it, messages come unformatted
+        from fmpy.logging import addLoggerProxy
+
+        addLoggerProxy(ctypes.byref(calls))
+    return calls
 
 
 class InstanceFailed(SkillframeError):
@@ -59,19 +97,9 @@ class Instance:
         if self.version == 3:
             self._fmu.instantiate(logMessage=lambda env, status, category, text: self._hear(text))
             return
-        from fmpy import calloc, fmi2, free
-
-        calls = fmi2.fmi2CallbackFunctions()
-        calls.logger = fmi2.fmi2CallbackLoggerTYPE(lambda env, name, status, category, text: self._hear(text))
-        calls.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
-        calls.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
-        try:
-            from fmpy.logging import addLoggerProxy
-
-            addLoggerProxy(ctypes.byref(calls))
-        except (ImportError, OSError):  # without it, messages come unformatted
-            pass
-        self._fmu.instantiate(callbacks=calls)
+        key = next(_KEYS)
+        _LISTENERS[key] = self
+        self._fmu.instantiate(callbacks=_callbacks2(key))
 
     def _hear(self, text: bytes | None) -> None:
         self.messages.append((text or b"").decode("utf-8", "replace").strip())

@@ -1,7 +1,7 @@
 r"""The hydraulic cylinder in numpy: stand-in where there is no compiler, and a second opinion on the C source.
 
 Same interface and equations as the FMU (`equations`). Pressures and spool go by the classical Runge-Kutta rule with
-internal steps \(h \lambda \le 1\), \(\lambda\) an upper bound of the oil's fastest rate (Gershgorin, from the edges'
+internal steps \(h \lambda \le 1/2\), \(\lambda\) an upper bound of the oil's fastest rate (Gershgorin, from the edges'
 slope at the least pressure drop seen); the seals' state by its exact solution (Dahl); impulse and work by the
 corrected trapezoidal rule.
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from skillframe.actuation.wiring import columns
 from skillframe.errors import InputError, UnknownName
 
 MOST_SUBSTEPS = 400
+NEAR = 20e5  # Pa before a port valve opens, its rate already counts
 
 
 class ReferenceBank:
@@ -137,21 +138,21 @@ class ReferenceBank:
         return y
 
     def _substeps(self, y: Float, motion: eq.Motion, step: float) -> int:
-        """How many internal steps keep every cylinder's h lambda below one."""
+        """How many internal steps keep every cylinder's h lambda below one half."""
         p = self._p
         drops = [np.abs(y[4] - y[2]), np.abs(y[4] - y[3]), np.abs(y[2] - p.return_pressure)]
         drops.append(np.abs(y[3] - p.return_pressure))
         least = np.minimum.reduce(drops) + p.laminar_pressure
         opening = np.maximum(np.abs(eq.opening(y[0], p.deadband)), np.abs(eq.opening(motion.demand, p.deadband)))
         slope = p.edge * opening / np.sqrt(least) + p.leakage
-        slope = slope + np.where((y[2:4] < p.return_pressure).any(0), p.check_conductance, 0.0)
-        slope = slope + np.where((y[2:4] > p.relief_pressure).any(0), p.relief_conductance, 0.0)
+        slope = slope + np.where((y[2:4] < p.return_pressure + NEAR).any(0), p.check_conductance, 0.0)
+        slope = slope + np.where((y[2:4] > p.relief_pressure - NEAR).any(0), p.relief_conductance, 0.0)
         smallest = np.minimum(
             p.dead_volume_a + p.area_a * motion.position, p.dead_volume_b + p.area_b * (p.stroke - motion.position)
         )
         rate = p.bulk_modulus / smallest * slope + np.where(p.pump_flow > 0, _supply_rate(p), 0.0)
         worst = float(np.max(np.where((self.active > 0) & np.isfinite(rate), rate, 0.0)))
-        return int(min(max(np.ceil(step * max(worst, 500.0)), 1), MOST_SUBSTEPS))
+        return int(min(max(np.ceil(step * 2.0 * max(worst, 500.0)), 1), MOST_SUBSTEPS))
 
     def _integrate(self, motion: Any, a: Float, step: float, count: int) -> Float:
         p, y, h = self._p, self._state.copy(), step / count
@@ -164,9 +165,10 @@ class ReferenceBank:
             k2 = eq.rates(p, y + 0.5 * h * k1, middle)
             k3 = eq.rates(p, y + 0.5 * h * k2, middle)
             k4 = eq.rates(p, y + h * k3, there)
-            z = _slide(p, y[5], here.velocity, a, h)
+            seals = _slide(p, y[5], here.velocity, a, h)
             y = y + h / 6.0 * (k1 + 2 * k2 + 2 * k3 + k4)
-            y[5] = z
+            y[5] = seals.z
+            totals -= p.stiffness * np.stack([seals.integral, seals.work])
             k1 = eq.rates(p, y, there)
             after = self._push(y, k1, there, a)
             totals += 0.5 * h * (push[0] + after[0]) + h * h / 12.0 * (push[1] - after[1])
@@ -175,10 +177,10 @@ class ReferenceBank:
         return y
 
     def _push(self, y: Float, rates: Float, motion: eq.Motion, a: Float) -> tuple[Float, Float]:
-        """(force, force x velocity) and their rates, for the quadrature."""
+        """(force, force x velocity) without the seals' deflection, and their rates, for the quadrature."""
         p, v = self._p, motion.velocity
-        force = eq.piston_force(p, y, motion.position, v)
-        rate = p.area_a * rates[2] - p.area_b * rates[3] - p.stiffness * rates[5] - p.viscous_friction * a
+        force = eq.piston_force(p, y, motion.position, v) + p.stiffness * y[5]
+        rate = p.area_a * rates[2] - p.area_b * rates[3] - p.viscous_friction * a
         return np.stack([force, force * v]), np.stack([rate, rate * v + force * a])
 
     def _write(self, position: Float, velocity: Float) -> None:
@@ -225,14 +227,28 @@ def _supply_rate(p: SimpleNamespace) -> Float:
     return result
 
 
-def _slide(p: SimpleNamespace, z: Float, v: Float, a: Float, h: float) -> Float:
-    """Deflection after h, exactly for Coulomb friction, in two parts where the piston reverses."""
+class _Slide(NamedTuple):
+    """Deflection of the seals after a step, its integral over time, and over the path."""
+
+    z: Float
+    integral: Float
+    work: Float
+
+
+def _slide(p: SimpleNamespace, z: Float, v: Float, a: Float, h: float) -> _Slide:
+    """The seals over h, exactly for Coulomb friction, in two parts where the piston reverses."""
     with np.errstate(divide="ignore", invalid="ignore"):
         turn = np.where(v * (v + a * h) < 0, -v / a, h)
+    integral, work = np.zeros_like(z), np.zeros_like(z)
     for start, length in ((np.zeros_like(turn), turn), (turn, h - turn)):
-        begin = v + a * start
-        travel = length * (begin + 0.5 * a * length)
-        limit = eq.sliding_deflection(p, begin + 0.5 * a * length)
-        goal = np.where(travel < 0, -limit, limit)
-        z = z - (goal - z) * np.expm1(-np.abs(travel) / limit)
-    return z
+        mean = v + a * (start + 0.5 * length)
+        limit = eq.sliding_deflection(p, mean)
+        goal, way = np.where(mean < 0, -limit, limit), np.abs(mean) * length / limit
+        fade = np.expm1(-way)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.where(way > 1e-6, -fade / way, 1.0 - 0.5 * way)
+        after = z - (goal - z) * fade
+        integral = integral + length * (goal + (z - goal) * share)
+        work = work + goal * (mean * length - (after - z))
+        z = after
+    return _Slide(z, integral, work)

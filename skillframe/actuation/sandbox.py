@@ -38,9 +38,8 @@ class SandboxBank:
         self.u = np.zeros((self.count, len(self.inputs)))
         self.y = np.full((self.count, len(self.outputs)), np.nan)
         self.active, self.status = np.ones(self.count, np.uint8), np.zeros(self.count, np.int64)
-        self.notes: tuple[str, ...] = (
-            f"{', '.join(dict.fromkeys(f.path.name for f in facts))}: in child processes, not allowed here",
-        )
+        files = ", ".join(dict.fromkeys(fact.path.name for fact in facts))
+        self.notes: tuple[str, ...] = (f"{files}: not allowed in this process, so in child processes",)
         self.limits = limits or SandboxLimits()
         self._specs, self._facts = list(specs), list(facts)
         self._time = 0.0
@@ -62,17 +61,17 @@ class SandboxBank:
     def _ready(self, index: int) -> Child:
         """The child of an instance; a new one where there is none or the old one has grown fat."""
         child = self._children[index]
-        if child is not None and child.resident_bytes() > self.limits.memory_bytes // 2:
+        if child is not None and child.resident_bytes() <= self.limits.memory_bytes // 2:
+            return child
+        if child is not None:
             child.close()
-            child = None
-        if child is None:
-            spec, facts = self._kind(index)
-            child = Child(facts.path, self._name(index), self.limits)
-            self._children[index] = child
-            given = {"spec": asdict(spec), "path": str(facts.path), "name": self._name(index)}
-            given |= {"inputs": self.inputs, "outputs": self.outputs}
-            child.send(b"l", json.dumps(given).encode())
-        return child
+        spec, facts = self._kind(index)
+        new = Child(facts.path, self._name(index), self.limits)
+        given = {"spec": asdict(spec), "path": str(facts.path), "name": self._name(index)}
+        given |= {"inputs": self.inputs, "outputs": self.outputs}
+        new.send(b"l", json.dumps(given).encode())
+        self._children[index] = new
+        return new
 
     def start(self, time: float = 0.0, parameters: Sequence[Mapping[str, Any]] | None = None) -> None:
         """Reset every instance, load those that were lost, and initialise at `u`; see `Actuators`."""
@@ -80,13 +79,13 @@ class SandboxBank:
         self.status[:] = OK
         self._problems.clear()
         self._time = time
-        fresh = [child is None for child in self._children]
+        fresh = []
         for i in range(self.count):
             extra = dict(parameters[i]) if parameters else {}
-            child = self._ready(i)
-            fresh[i] = fresh[i] or self._children[i] is not child
+            before, now = self._children[i], self._ready(i)
+            fresh.append(now is not before)
             given = {"time": time, "parameters": {**self._kind(i)[0].parameters, **extra}, "u": self.u[i].tolist()}
-            child.send(b"s", json.dumps(given).encode())
+            now.send(b"s", json.dumps(given).encode())
         for i, child in enumerate(self._children):
             if child is None:
                 continue
