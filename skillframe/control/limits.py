@@ -2,7 +2,7 @@
 
 - force: norm of the filtered contact force above `force_n` (and torque above `torque_n_m`);
 - torque rate: the commanded joint torques are held to `torque_rate_nm_s`; a command that asks for more for
-  `RATE_PERSISTENCE` ticks running is stopped (one tick of saturation is what the limiter is for);
+  `RATE_PERSISTENCE` ticks running is stopped (a short saturation, as at an impact, is what the limiter is for);
 - workspace: the tool point outside its box;
 - energy: work the controller has done on the tool at the centre of compliance since the start, above `energy_j`;
 - divergence: a state, wrench or command that is not finite, a tool faster than `SPEED_CEILING` [m/s], or a law that asks
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from skillframe.frames import Float, norm
 from skillframe.robot.spec import Limits
 
-RATE_PERSISTENCE = 5
+RATE_PERSISTENCE = 20  # an impact keeps the limiter busy for 5 to 10 ms; twice that is a law gone wrong
 SPEED_CEILING, WRENCH_CEILING = 20.0, 1e6
 
 

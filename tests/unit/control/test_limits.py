@@ -108,7 +108,7 @@ def test_rows_are_limited_independently():
     """A row beside one that saturates keeps its torque to the last bit."""
     quiet, rng = guard(1, torque_rate_nm_s=1000.0), np.random.default_rng(0)
     both = guard(2, torque_rate_nm_s=1000.0)
-    for _ in range(20):
+    for _ in range(2 * RATE_PERSISTENCE):
         calm, wild = 1e-3 * rng.normal(size=(1, 7)), 1e3 * rng.normal(size=(1, 7))
         np.testing.assert_array_equal(both.rate_limited(np.concatenate([calm, wild]))[:1], quiet.rate_limited(calm))
     wrench = np.zeros((2, 6))
