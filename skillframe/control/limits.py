@@ -5,8 +5,8 @@
   `RATE_PERSISTENCE` ticks running is stopped (a short saturation, as at an impact, is what the limiter is for);
 - workspace: the tool point outside its box;
 - energy: work the controller has done on the tool at the centre of compliance since the start, above `energy_j`;
-- divergence: a state, wrench or command that is not finite, a tool faster than `SPEED_CEILING` [m/s], or a law that asks
-  for more than `WRENCH_CEILING` [N, Nm].
+- divergence: a state, wrench or command that is not finite, a tool faster than `SPEED_CEILING` [m/s], or a law that
+  asks for more than `WRENCH_CEILING` [N, Nm].
 """
 
 from __future__ import annotations
