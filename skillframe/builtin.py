@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from skillframe.hookspecs import hookimpl
 from skillframe.records import ReaderType, WorldType
+
+if TYPE_CHECKING:
+    from skillframe.frames import Float, Pose
 
 
 @hookimpl
@@ -21,4 +25,11 @@ def skillframe_readers() -> Iterable[ReaderType]:
     """The demonstration formats that ship with the core."""
     from skillframe.demonstration.formats import reader_types
 
-    return reader_types()
+    return reader_types(_tool_poses)
+
+
+def _tool_poses(robot: str, arm: str | None, names: Sequence[str], positions: Float) -> Pose:
+    """Forward kinematics, whose library is loaded when joint states are read."""
+    from skillframe.robot.recorded import tool_poses
+
+    return tool_poses(robot, arm, names, positions)

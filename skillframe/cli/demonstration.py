@@ -82,6 +82,9 @@ _OPTIONS = [
         "--wrench-includes-tool-weight/--wrench-without-tool-weight", default=None,
         help="Whether the tool's weight is still in it.",
     ),
+    click.option("--pose-topic", help="Topic of a ROS bag with the tool's pose, or with --robot its joint states."),
+    click.option("--wrench-topic", help="Topic of a ROS bag with the wrench (WrenchStamped)."),
+    click.option("--robot", help="The robot whose joint states a ROS bag holds (name or path of its robot.toml)."),
 ]  # fmt: skip
 
 
@@ -127,6 +130,8 @@ def convert(source: Path, out: Path, as_json: bool, **options: Any) -> int:
           --wrench worldforce.dat --wrench-columns t,fx,fy,fz,tx,ty,tz --from 0 --to 7.07 --out approach.npz
       skillframe demonstration convert log.csv --columns t=stamp,px=x,py=y,pz=z,qx=qx,qy=qy,qz=qz,qw=qw,\\
           fx=fx,fy=fy,fz=fz,tx=mx,ty=my,tz=mz --units mm,ns --wrench-frame tool --out demo.npz
+      skillframe demonstration convert demo.mcap --pose-topic /tool_pose --wrench-topic /ft --out demo.npz
+      skillframe demonstration convert demo.bag --robot panda --wrench-topic /ft --wrench-frame tool --out demo.npz
     """
     from skillframe.demonstration.audit import audit
     from skillframe.demonstration.files import read_demonstration, write_demonstration

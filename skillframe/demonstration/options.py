@@ -47,6 +47,9 @@ class ReadOptions:
         wrench_point: where it was taken: "tool", "x,y,z" in the tool frame, or a frame's name.
         wrench_sign: whose wrench it is; "teacher" is turned round, which holds while inertia is small.
         wrench_includes_tool_weight: whether the tool's weight is still in it.
+        pose_topic: topic of a ROS bag with the tool's pose or, with `robot`, its joint states.
+        wrench_topic: topic of a ROS bag with the wrench.
+        robot: the robot whose joint states a ROS bag holds.
     """
 
     columns: str | None = None
@@ -68,6 +71,9 @@ class ReadOptions:
     wrench_point: str | None = None
     wrench_sign: Literal["environment", "teacher"] | None = None
     wrench_includes_tool_weight: bool | None = None
+    pose_topic: str | None = None
+    wrench_topic: str | None = None
+    robot: str | None = None
 
     def __post_init__(self) -> None:
         for name in ("rate", "wrench_rate"):

@@ -1,0 +1,275 @@
+"""ROS recordings: ROS 1 `.bag`, ROS 2 `.db3` and `.mcap`, read through `rosbags`, which needs no ROS.
+
+The pose is a topic of `PoseStamped`, `PoseWithCovarianceStamped`, `TransformStamped` or `Odometry`, or of `JointState`
+with the robot whose forward kinematics it is; the wrench is a topic of `WrenchStamped`. Every topic keeps its own
+clock, and both are joined on time as two files are. The clock is that of the headers, because a bag's receive times are
+late by up to seconds and jitter; it starts at 0 with the pose's first stamp, which the metadata keeps, because seconds
+since 1970 leave a double no more than 0.24 us.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.demonstration.assemble import assemble
+from skillframe.demonstration.columns import POSITION, QUATERNION, WRENCH, Columns
+from skillframe.demonstration.metafile import read_meta
+from skillframe.demonstration.options import ReadOptions, read_options
+from skillframe.demonstration.record import Demonstration
+from skillframe.errors import InputError, MissingDependency, UnknownName
+from skillframe.frames import Float, Pose, quaternion_from_matrix
+
+ToolPoses = Callable[[str, "str | None", Sequence[str], Float], Pose]
+"""(robot, arm, joint names, positions (T, joints)) -> poses of the tool; raises `InputError` or `UnknownName`."""
+
+MAGIC = {".bag": b"#ROSBAG V2.0\n", ".db3": b"SQLite format 3\0", ".mcap": b"\x89MCAP0\r\n"}
+POSES: Mapping[str, Callable[[Any], tuple[Any, Any]]] = {
+    "geometry_msgs/msg/PoseStamped": lambda m: (m.pose.position, m.pose.orientation),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: (m.pose.pose.position, m.pose.pose.orientation),
+    "geometry_msgs/msg/TransformStamped": lambda m: (m.transform.translation, m.transform.rotation),
+    "nav_msgs/msg/Odometry": lambda m: (m.pose.pose.position, m.pose.pose.orientation),
+}
+JOINTS, WRENCHES = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
+STAMP_START = "header_stamp_start_ns"
+"""Metadata key of the header stamp at time 0 [ns]."""
+
+
+class Recorded(NamedTuple):
+    """One topic's messages in the order of their header stamps [ns]."""
+
+    topic: str
+    kind: str
+    stamps: NDArray[np.int64]
+    messages: list[Any]
+
+
+def read_bag(path: Path, options: Mapping[str, Any], tool_poses: ToolPoses) -> Demonstration:
+    """A demonstration from a ROS bag.
+
+    Args:
+        path: the file; `NAME.meta.toml` beside it is read too.
+        options: fields of `ReadOptions`; `pose_topic` and `wrench_topic` where the bag leaves a choice.
+        tool_poses: forward kinematics, for joint states.
+
+    Raises:
+        InputError: anything of the contract's list of bad input, or a topic that has to be chosen.
+        UnknownName: no such topic; the bag's topics are listed with their types.
+        MissingDependency: `rosbags` is not installed.
+    """
+    chosen, notes = read_options(options), list[str]()
+    _refuse_text_options(path, chosen)
+    _refuse_other_files(path)
+    meta = read_meta(path)
+    with _opened(path) as bag:
+        topics = _topics(path, bag)
+        wanted = [_pose_topic(path, topics, chosen), _wrench_topic(path, topics, chosen, meta)]
+        recorded = [_recorded(path, bag, name, topics[name], notes) for name in wanted if name is not None]
+    zero = int(recorded[0].stamps[0])
+    pose = _pose(path, recorded[0], zero, chosen, tool_poses)
+    if len(recorded) == 1:
+        none = {name: np.zeros(len(recorded[0].messages)) for name in WRENCH}
+        return assemble(pose.with_values({**pose, **none}), {**meta, STAMP_START: zero}, _plain(chosen), notes)
+    wrench = _wrench(path, recorded[1], zero, chosen)
+    notes += _frame_note(recorded, chosen, meta)
+    joined = replace(_plain(chosen), wrench=path)  # a second source, so that cuts keep a margin until they are joined
+    return assemble(pose, {**meta, STAMP_START: zero}, joined, notes, wrench)
+
+
+def _plain(options: ReadOptions) -> ReadOptions:
+    """The settings without those that only a bag has."""
+    return replace(options, pose_topic=None, wrench_topic=None, robot=None, arm=None)
+
+
+def _refuse_text_options(path: Path, options: ReadOptions) -> None:
+    for name in ("columns", "wrench_columns", "wrench", "euler", "units", "wrench_units"):
+        if getattr(options, name) is not None:
+            raise InputError(
+                path, f"is a ROS bag, which has topics and SI units; --{name.replace('_', '-')} is for text files",
+                "choose topics with --pose-topic and --wrench-topic",
+            )  # fmt: skip
+
+
+def _refuse_other_files(path: Path) -> None:
+    """Refuse what is not a bag by its first bytes, before any library is asked."""
+    magic = MAGIC[path.suffix.lower()]
+    try:
+        with path.open("rb") as file:
+            head = file.read(len(magic))
+    except FileNotFoundError:
+        raise InputError(path, "no such file", "check the path") from None
+    except OSError as error:
+        raise InputError(path, f"cannot be read ({error.strerror})", "check the path") from None
+    if not head:
+        raise InputError(path, "is empty", "record it again")
+    if head != magic:
+        raise InputError(path, f"is no {path.suffix} recording", "check what wrote it; ROS 1 bags must be version 2.0")
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError:
+        raise MissingDependency("rosbags", f"reading {path}", "pip install 'skillframe[ros]'") from None
+    with _foreign(path):
+        bag = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))  # older .db3 carry no types
+        bag.open()
+    try:
+        yield bag
+    finally:
+        bag.close()
+
+
+@contextmanager
+def _foreign(path: Path) -> Iterator[None]:
+    """Whatever the library raises on a damaged file, as one sentence."""
+    try:
+        yield
+    except Exception as error:  # foreign code on foreign bytes: struct.error, apsw errors, TypeError ...
+        first = str(error).strip().splitlines()
+        said = f"{type(error).__name__}: {first[0]}" if first else type(error).__name__
+        raise InputError(
+            path,
+            f"cannot be read as a ROS bag ({said})",
+            "it may be cut off or damaged: reindex it, or record it again",
+        ) from None
+
+
+def _topics(path: Path, bag: Any) -> dict[str, str]:
+    """Message type by topic."""
+    with _foreign(path):
+        topics = {name: str(info.msgtype) for name, info in bag.topics.items()}
+        empty = bag.message_count == 0
+    if empty:
+        raise InputError(path, "holds no messages", "record it again, and check that the topics are published")
+    return topics
+
+
+def _pose_topic(path: Path, topics: Mapping[str, str], options: ReadOptions) -> str:
+    kinds = [JOINTS] if options.robot is not None else list(POSES)
+    name = _chosen(
+        path, topics, options.pose_topic, [*POSES, JOINTS] if options.robot is None else kinds, "pose", kinds
+    )
+    if topics[name] == JOINTS and options.robot is None:
+        raise InputError(f"{path}: {name}", "holds joint states", "name the robot they are of with --robot")
+    return name
+
+
+def _wrench_topic(path: Path, topics: Mapping[str, str], options: ReadOptions, meta: Mapping[str, Any]) -> str | None:
+    """The wrench's topic; None where the metadata says that nothing was touched and there is none."""
+    if options.wrench_topic is None and meta.get("contact") is False and WRENCHES not in topics.values():
+        return None
+    return _chosen(path, topics, options.wrench_topic, [WRENCHES], "wrench", [WRENCHES])
+
+
+def _chosen(
+    path: Path, topics: Mapping[str, str], name: str | None, allowed: Sequence[str], what: str, default: Sequence[str]
+) -> str:
+    """The topic asked for, or the only one of the default types."""
+    listing = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(topics.items()))
+    if name is not None:
+        if name not in topics:
+            raise UnknownName("topic", name, topics, f"{path} holds {listing}")
+        if topics[name] not in allowed:
+            readable = ", ".join(kind.rpartition("/")[2] for kind in allowed)
+            raise InputError(f"{path}: {name}", f"is a {topics[name]}, no {what}", f"choose a topic of {readable}")
+        return name
+    found = sorted(topic for topic, kind in topics.items() if kind in default)
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise InputError(path, f"holds several {what} topics: {', '.join(found)}", f"choose one with --{what}-topic")
+    readable = ", ".join(kind.rpartition("/")[2] for kind in default)
+    raise InputError(path, f"has no {what} topic ({readable}); it holds {listing}", _remedy(what, topics))
+
+
+def _remedy(what: str, topics: Mapping[str, str]) -> str:
+    if what == "pose":
+        return "name the robot with --robot" if JOINTS in topics.values() else "record the tool's pose or joint states"
+    return "record the wrench too, or state contact = false in NAME.meta.toml beside it"
+
+
+def _recorded(path: Path, bag: Any, topic: str, kind: str, notes: list[str]) -> Recorded:
+    with _foreign(path):
+        connections = [c for c in bag.connections if c.topic == topic]
+        messages = [bag.deserialize(raw, c.msgtype) for c, _, raw in bag.messages(connections)]
+    if not messages:
+        raise InputError(f"{path}: {topic}", "holds no messages", "choose another topic, or record it again")
+    stamps = np.array([m.header.stamp.sec * 1_000_000_000 + m.header.stamp.nanosec for m in messages], dtype=np.int64)
+    if np.all(np.diff(stamps) >= 0):
+        return Recorded(topic, kind, stamps, messages)
+    order = np.argsort(stamps, kind="stable")
+    notes.append(f"{int((np.diff(stamps) < 0).sum())} messages of {topic} came late and were sorted by header stamp")
+    return Recorded(topic, kind, stamps[order], [messages[i] for i in order])
+
+
+def _clock(path: Path, recorded: Recorded, zero: int, rate: float | None, option: str) -> dict[str, Float]:
+    """The header clock from `zero` on; none where the stamps were never filled in and a rate is given."""
+    if np.any(recorded.stamps != 0):
+        return {"t": (recorded.stamps - zero).astype(np.float64) * 1e-9}
+    if rate is None:
+        raise InputError(
+            f"{path}: {recorded.topic}", "every header stamp is zero", f"give the sample rate with {option}"
+        )
+    return {}
+
+
+def _pose(path: Path, recorded: Recorded, zero: int, options: ReadOptions, tool_poses: ToolPoses) -> Columns:
+    columns = _clock(path, recorded, zero, options.rate, "--rate")
+    if recorded.kind == JOINTS:
+        assert options.robot is not None
+        names, positions = _joint_positions(path, recorded)
+        pose = tool_poses(options.robot, options.arm, names, positions)
+        values = np.concatenate([pose.position, quaternion_from_matrix(pose.rotation)], axis=1)
+    else:
+        pick = POSES[recorded.kind]
+        parts = [pick(message) for message in recorded.messages]
+        values = np.array([(p.x, p.y, p.z, q.x, q.y, q.z, q.w) for p, q in parts], dtype=float)
+    columns.update(zip((*POSITION, *QUATERNION), values.T.copy(), strict=True))
+    return Columns(columns, f"{path}: {recorded.topic}")
+
+
+def _joint_positions(path: Path, recorded: Recorded) -> tuple[list[str], Float]:
+    """Joint names of the first message, and positions (T, joints) in that order."""
+    names = [str(name) for name in recorded.messages[0].name]
+    rows = []
+    for i, message in enumerate(recorded.messages):
+        found = dict(zip(map(str, message.name), map(float, message.position), strict=False))
+        missing = [name for name in names if name not in found]
+        if missing or not names:
+            what = f"message {i + 1} has no position of {', '.join(missing)}" if missing else "names no joint"
+            raise InputError(f"{path}: {recorded.topic}", what, "choose a topic on which one node publishes all joints")
+        rows.append([found[name] for name in names])
+    positions = np.array(rows)
+    bad = np.flatnonzero(~np.isfinite(positions).all(axis=1))
+    if bad.size:
+        raise InputError(f"{path}: {recorded.topic}", f"message {bad[0] + 1} holds no finite position", "cut it out")
+    return names, positions
+
+
+def _wrench(path: Path, recorded: Recorded, zero: int, options: ReadOptions) -> Columns:
+    columns = _clock(path, recorded, zero, options.wrench_rate or options.rate, "--wrench-rate")
+    parts = [message.wrench for message in recorded.messages]
+    values = np.array([(w.force.x, w.force.y, w.force.z, w.torque.x, w.torque.y, w.torque.z) for w in parts])
+    columns.update(zip(WRENCH, values.T.copy(), strict=True))
+    return Columns(columns, f"{path}: {recorded.topic}")
+
+
+def _frame_note(recorded: Sequence[Recorded], options: ReadOptions, meta: Mapping[str, Any]) -> list[str]:
+    """What the headers say about axes, which only a person can relate to base and tool."""
+    pose, wrench = (str(r.messages[0].header.frame_id) for r in recorded)
+    declared = options.wrench_frame is not None or "frame" in dict(meta.get("wrench", {}))
+    if declared or not wrench or wrench == pose:
+        return []
+    return [
+        f"the wrench's header says frame {wrench!r}, the pose's {pose!r}: state its axes with --wrench-frame base or "
+        "tool (taken as base), and its point with --wrench-point"
+    ]
