@@ -15,7 +15,6 @@ from skillframe.actuation.extract import unpack
 from skillframe.actuation.inspection import FLOATS, FmuFacts, read_description
 from skillframe.errors import InputError, SkillframeError
 
-
 _KEYS = itertools.count(1)
 _LISTENERS: WeakValueDictionary[int, Instance] = WeakValueDictionary()
 

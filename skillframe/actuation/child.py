@@ -50,25 +50,27 @@ class Child:
         finally:
             theirs.close()
         self._pipe = Connection(ours.detach())
+        self._asked = monotonic()
 
     def send(self, letter: bytes, payload: bytes = b"") -> None:
         """Send a request; a child that has gone is found out by `receive`."""
+        self._asked = monotonic()
         with suppress(OSError):
             self._pipe.send_bytes(letter + payload)
 
     def receive(self, limit_s: float, what: str) -> bytes:
-        """The child's answer.
+        """The child's answer, within a time from when it was last asked or answered.
 
         Raises:
             ChildLost: it crashed or did not answer in time.
             InstanceFailed: it answered with a problem.
         """
-        deadline = monotonic() + limit_s
         try:
-            if not self._pipe.poll(max(0.0, deadline - monotonic())):
+            if not self._pipe.poll(max(0.0, self._asked + limit_s - monotonic())):
                 self.kill()
                 raise ChildLost(f"{self._who()} did not answer within {limit_s:g} s while {what}; it was stopped")
             answer = self._pipe.recv_bytes()
+            self._asked = monotonic()
         except (EOFError, OSError):
             raise ChildLost(f"{self._who()} {self._death()} while {what}") from None
         if answer[:1] == b"!":

@@ -54,7 +54,7 @@ MISCHIEF = {
     "crash": 'if (m->time > 0.0045) { volatile int *p = NULL; *p = 1; }',
     "hang": "if (m->time > 0.0045) for (;;) sleep(1);",
     "nan": "if (m->time > 0.0045) { m->own.lag = 0.0 / 0.0; return model_outputs(m, r); }",
-    "leak": "memset(malloc(200000000), 1, 200000000);",
+    "leak": "static char *volatile kept; kept = malloc(200000000); memset(kept, 1, 200000000);",
     "refuse": 'if (m->time > 0.0045) { snprintf(r->text, sizeof r->text, "the seal is worn"); return DISCARD; }',
     "leave": "if (m->time > 0.0045) exit(7);",
 }  # fmt: skip

@@ -5,8 +5,8 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from fmu_fakes import make
 from fmpy.validation import validate_fmu
+from fmu_fakes import make
 
 from skillframe.actuation.build import build_fmu, common_folder
 from skillframe.actuation.describe import variables_header
@@ -49,12 +49,7 @@ def test_an_fmu_holds_its_sources_its_readme_and_both_kinds(cylinder):
 def test_every_variable_of_the_contract_is_there(cylinder):
     inputs = ["command", "position", "velocity", "acceleration"]
     outputs = ["force", "force_mean", "work", "pressure_a", "pressure_b", "flow_a", "flow_b", "spool"]
-    parameters = (
-        "bore rod stroke dead_volume_a dead_volume_b bulk_modulus air_fraction rated_flow rated_pressure_drop"
-        " rated_drop_is_per_edge spool_frequency spool_damping spool_slew deadband hysteresis laminar_pressure leakage"
-        " coulomb_friction viscous_friction static_friction presliding_length supply_pressure return_pressure"
-        " endstop_stiffness endstop_damping"
-    ).split()
+    parameters = ["bore", "rod", "stroke", "dead_volume_a", "dead_volume_b", "bulk_modulus", "air_fraction", "rated_flow", "rated_pressure_drop", "rated_drop_is_per_edge", "spool_frequency", "spool_damping", "spool_slew", "deadband", "hysteresis", "laminar_pressure", "leakage", "coulomb_friction", "viscous_friction", "static_friction", "presliding_length", "supply_pressure", "return_pressure", "endstop_stiffness", "endstop_damping"]
     assert cylinder.names("input")[:4] == inputs
     assert cylinder.names("output")[:8] == outputs
     assert set(parameters) <= set(cylinder.names("parameter"))
