@@ -217,19 +217,21 @@ class Layout:
             body = int(model.body_parentid[body])
         joints = [j for j in range(model.njnt) if int(model.jnt_bodyid[j]) in ancestors]
         hinge, slide = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
-        self.hinges = np.array([j for j in joints if model.jnt_type[j] == hinge], dtype=int)
-        self.slides = np.array([j for j in joints if model.jnt_type[j] == slide], dtype=int)
-        self.hinge_dofs, self.slide_dofs = model.jnt_dofadr[self.hinges], model.jnt_dofadr[self.slides]
+        hinges = np.array([j for j in joints if model.jnt_type[j] == hinge], dtype=int)
+        slides = np.array([j for j in joints if model.jnt_type[j] == slide], dtype=int)
+        self.turns, self.shifts = len(hinges) > 0, len(slides) > 0
+        self.hinges, self.hinge_dofs = _span(hinges), _span(model.jnt_dofadr[hinges])
+        self.slides, self.slide_dofs = _span(slides), _span(model.jnt_dofadr[slides])
 
     def jacobian(self, anchor: Float, axis: Float, xmat: Float, point: Float) -> Float:
         """(N, 6, nv): for a hinge [a x (p - anchor); a], for a slide [a; 0], for a free base [1, -[r]x R; 0, R]."""
         jacobian = np.zeros((len(point), 6, self.model.nv))
-        if len(self.hinges):
+        if self.turns:
             a = axis[:, self.hinges]
             lever = point[:, None] - anchor[:, self.hinges]
             jacobian[:, :3, self.hinge_dofs] = np.swapaxes(cross(a, lever), 1, 2)
             jacobian[:, 3:, self.hinge_dofs] = np.swapaxes(a, 1, 2)
-        if len(self.slides):
+        if self.shifts:
             jacobian[:, :3, self.slide_dofs] = np.swapaxes(axis[:, self.slides], 1, 2)
         if self.free:
             body = int(self.model.jnt_bodyid[0])
@@ -276,6 +278,12 @@ class Layout:
             else:
                 configuration[:, start] = qpos[:, address]
         return configuration
+
+
+def _span(indices: NDArray[np.int64]) -> slice | NDArray[np.int64]:
+    """Indices as a slice where they follow each other: a view, where an array of indices would copy."""
+    first, count = (int(indices[0]) if len(indices) else 0), len(indices)
+    return slice(first, first + count) if np.array_equal(indices, np.arange(first, first + count)) else indices
 
 
 def _sparse_indices(model: mujoco.MjModel) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from skillframe.frames import Float, Pose, cross, move_wrench, rotate, rotate_spatial, rotation_matrix
+from skillframe.frames import Float, Pose, cross, move_wrench, rotate, rotate_spatial, skew
 from skillframe.world.plant import Plant
 
 BLOCK = 100
@@ -61,7 +61,7 @@ class Sensors:
             for i, rng in enumerate(self._rngs):
                 self._noise[i] = rng.standard_normal((BLOCK, 12))
             self._noise *= self._scale[:, None]
-            self._turn = rotation_matrix(self._noise[..., 9:])
+            self._turn = _small_rotation(self._noise[..., 9:])
             self._next = 0
         now = self._next
         self._next += 1
@@ -83,6 +83,12 @@ class Sensors:
     def set_tare(self, mean: Float, rotation: Float) -> None:
         """Take the mean wrench (N, 6) of a still moment, base axes, as the bias from now on."""
         self._bias = self._bias - rotate_spatial(np.swapaxes(rotation, -1, -2), mean)
+
+
+def _small_rotation(vector: Float) -> Float:
+    """1 + K + K^2 / 2 of rotation vectors (..., 3): exact to 1e-10 for the milliradians of sensor noise."""
+    k = skew(vector)
+    return np.eye(3) + k + 0.5 * (k @ k)
 
 
 def at_point(wrench: Float, rotation: Float, offset: Float) -> Float:
