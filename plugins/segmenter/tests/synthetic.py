@@ -129,9 +129,7 @@ def valley(seed: int, side: float, *, noise: float = 8.0, slope: float = 45.0, f
     normals = [np.array([s * np.sin(a), 0.0, np.cos(a)]) for s in (side, -side)]
     hand.move_free(-Z, rng.uniform(0.008, 0.02))
     hand.mark()
-    down = np.array([-side * np.cos(a), 0.0, -np.sin(a)])
-    hand.slide(-Z, normals[:1], -side * np.array([1.0, 0.0, 0.0]), rng.uniform(0.03, 0.045))
-    del down
+    hand.slide(-Z, normals[:1], side * np.array([1.0, 0.0, 0.0]), rng.uniform(0.03, 0.045))
     hand.mark()
     hand.slide(np.array([0.0, 0.8, -0.6]), normals, np.array([0.0, 1.0, 0.0]), rng.uniform(0.05, 0.08))
     return hand.finish()

@@ -4,11 +4,12 @@ The paper's valley is the test: sliding down either side is one LMC, and so is t
 wrenches are opposite. 600 directions D on the sphere, and "none", are put to every window, translation and rotation
 apart; with M the projector of `emission`, a window that moves (|u| > 1/2) accepts D if
 
-    |M D| > 1/4   and   angle(M D, u) < 25 degrees,
+    along > 1/3   and   (beside < 0.3   or   angle(M D, u) < 25 degrees),
 
-a window at rest accepts D if |M D| < 1/2, and accepts "none". The votes of a group of phases are the largest share of
+with `along` and `beside` the parts of M D along the motion and across it (on a shallow slope a small error of the aim is
+a large one of the motion, so either measure will do); a window at rest accepts D if |M D| < 1/2, and accepts "none". The votes of a group of phases are the largest share of
 windows that one D finds, in the worst phase and demonstration (of four windows or more); the smaller of translation
-and rotation counts. The best pair is joined as long as its votes are at least max(0.6, min(0.75, base - 0.05)), base
+and rotation counts. The best pair is joined as long as its votes are at least max(0.6, min(0.7, base - 0.05)), base
 being the worse of the two alone. All constants are ours; the angle is the delicate one: 20 degrees leaves one motion
 in parts when the person's aim wavers, 30 joins lowering with sliding.
 """
@@ -21,12 +22,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.frames import Float, norm
+from skillframe.frames import Float, norm, unit
 from skillframe_segmenter.emission import Observed
 
 DIRECTIONS, FEWEST, MOST = 600, 4, 150
-MOVING, ALONG, STILL = 0.5, 0.25, 0.5
-BEST_BAR, SLACK = 0.75, 0.05
+MOVING, ALONG, BESIDE, STILL = 0.5, 0.33, 0.3, 0.5
+BEST_BAR, SLACK = 0.7, 0.05
 
 
 @lru_cache(maxsize=2)
@@ -45,11 +46,11 @@ def _accepted(motion: Float, free: Float, angle: float) -> Float:
     allowed = (free.reshape(3 * count, 3).astype(np.float32) @ sphere(DIRECTIONS).T.astype(np.float32)).reshape(
         count, 3, DIRECTIONS
     )
-    size = np.sqrt(np.einsum("wid,wid->wd", allowed, allowed))
-    speed = norm(motion)[:, None].astype(np.float32)
-    along = np.einsum("wid,wi->wd", allowed, motion.astype(np.float32))
-    moving = speed > MOVING
-    accepts = np.where(moving, (size > ALONG) & (along > np.cos(angle) * size * speed), size < STILL)
+    size = np.einsum("wid,wid->wd", allowed, allowed)
+    along = np.einsum("wid,wi->wd", allowed, unit(motion).astype(np.float32))
+    moving = norm(motion)[:, None] > MOVING
+    beside = size - along * along < np.maximum(BESIDE, np.tan(angle) * along) ** 2
+    accepts = np.where(moving, (along > ALONG) & beside, size < STILL**2)
     return np.append(accepts.mean(axis=0), float((~moving).mean()))
 
 
