@@ -20,7 +20,7 @@ _LISTENERS: WeakValueDictionary[int, Instance] = WeakValueDictionary()
 
 
 def _hear2(key: int | None, name: bytes, status: int, category: bytes, text: bytes | None) -> None:
-    """FMI 2 messages of every instance: fmpy's formatting proxy knows one logger only, so that a key tells them apart."""
+    """FMI 2 messages of every instance: fmpy's formatting proxy knows one logger only, so a key tells them apart."""
     instance = _LISTENERS.get(key or 0)
     if instance is not None:
         instance._hear(text)

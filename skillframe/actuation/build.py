@@ -15,7 +15,7 @@ from pathlib import Path
 
 from skillframe.actuation.describe import build_description, model_description, variables_header
 from skillframe.actuation.table import Table, read_table
-from skillframe.actuation.toolchain import FLAGS, compile_library, find_compiler
+from skillframe.actuation.toolchain import FLAGS, CompilerFailed, compile_library, find_compiler
 from skillframe.paths import cache_dir, data_dirs
 
 VERSIONS = (2, 3)
@@ -52,6 +52,24 @@ def cached_path(folder: Path, version: int) -> Path:
     table = read_table(folder)
     key = _digest(_token(folder, table, common_folder()), " ".join(find_compiler() or ["none"]), *FLAGS, _LAYOUT)
     return cache_dir("fmus") / key[:24] / f"fmi{version}" / f"{table.name}.fmu"
+
+
+def build_stepper(source: Path) -> Path | None:
+    """The shared library of stepper.c, from the cache if it is there; None where it cannot be built."""
+    compiler = find_compiler()
+    if compiler is None:
+        return None
+    library = cache_dir("stepper") / _digest(source.read_bytes(), " ".join([*compiler, *FLAGS]))[:24] / "stepper.so"
+    if not library.is_file():
+        library.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=library.parent) as work:
+            shutil.copyfile(source, Path(work) / "stepper.c")
+            try:
+                compile_library(["stepper.c"], "stepper.so", Path(work))
+            except CompilerFailed:
+                return None
+            os.replace(Path(work) / "stepper.so", library)
+    return library
 
 
 def common_folder() -> Path:

@@ -77,9 +77,17 @@ class Child:
             raise InstanceFailed(answer[1:].decode("utf-8", "replace"))
         return answer[1:]
 
+    def tell(self, letter: bytes, value: Any) -> None:
+        """A request with a JSON payload."""
+        self.send(letter, json.dumps(value).encode())
+
     def ask(self, letter: bytes, value: Any, limit_s: float, what: str) -> Any:
         """A request and its answer, both JSON; raises as `receive`."""
-        self.send(letter, json.dumps(value).encode())
+        self.tell(letter, value)
+        return self.heard(limit_s, what)
+
+    def heard(self, limit_s: float, what: str) -> Any:
+        """An answer in JSON; raises as `receive`."""
         answer = self.receive(limit_s, what)
         return json.loads(answer) if answer else None
 

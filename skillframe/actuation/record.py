@@ -1,4 +1,4 @@
-"""Write a simulation of one FMU to CSV, row by row as it comes, so that a failure leaves what was reached."""
+"""One FMU from a table of inputs to a table of outputs, written as it comes: a failure leaves what was reached."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from skillframe.actuation.allow import is_allowed
-from skillframe.actuation.bindings import InstanceFailed
+from skillframe.actuation.bindings import InstanceFailed, convert
 from skillframe.actuation.child import ChildLost
-from skillframe.actuation.inspection import inspect_fmu
+from skillframe.actuation.inspection import FmuFacts, FmuVariable, inspect_fmu
 from skillframe.actuation.library import find_fmu
-from skillframe.actuation.simulate import Request, check_request, output_columns, read_inputs, simulate
+from skillframe.actuation.simulate import Request, check_request, output_columns, simulate
+from skillframe.errors import InputError
 
 
 class Recorded(NamedTuple):
@@ -51,3 +52,44 @@ def simulate_to_csv(
             problem = str(error)
     os.replace(part, out)
     return Recorded(columns, count, problem)
+
+
+def read_inputs(path: Path, facts: FmuFacts) -> tuple[list[str], list[list[float]]]:
+    """An input table: CSV with a column `time` and one per input.
+
+    Raises:
+        InputError: no time, no rows, something that is no number, or time that does not grow.
+        UnknownName: a column that is no input.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            lines = list(csv.reader(file))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(path, f"cannot be read: {error}", "give a CSV file") from None
+    if not lines or "time" not in (names := [n.strip() for n in lines[0]]):
+        raise InputError(path, "has no column time", "give a CSV with a header: time, then inputs by name")
+    if len(lines) < 2:
+        raise InputError(path, "has a header and no rows", "add rows")
+    at = names.index("time")
+    others = [n for n in names if n != "time"]
+    for name in others:
+        facts.variable(name, "input")
+    rows = []
+    for number, line in enumerate(lines[1:], start=2):
+        try:
+            values = [float(x) for x in line]
+        except ValueError:
+            raise InputError(f"{path}: line {number}", "holds something that is no number", "correct it") from None
+        if len(values) != len(names) or any(x - x != 0.0 for x in values):
+            raise InputError(f"{path}: line {number}", f"needs {len(names)} finite numbers", "correct it")
+        rows.append([values[at], *(v for i, v in enumerate(values) if i != at)])
+        if len(rows) > 1 and rows[-1][0] <= rows[-2][0]:
+            raise InputError(f"{path}: line {number}", "time does not grow", "sort and remove repeated rows")
+    for column, name in enumerate(others, start=1):
+        _convertible(path, facts.variables[name], [row[column] for row in rows])
+    return others, rows
+
+
+def _convertible(path: Path, variable: FmuVariable, values: list[float]) -> None:
+    if variable.type not in ("Real", "Float64", "Float32") and any(convert(variable.type, v) != v for v in values):
+        raise InputError(f"{path}: {variable.name}", f"is of type {variable.type}", "give whole numbers, or 0 and 1")

@@ -5,7 +5,6 @@ A crash, a hang or a leak then ends one trial with a sentence. All children of a
 
 from __future__ import annotations
 
-import json
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -69,7 +68,7 @@ class SandboxBank:
         new = Child(facts.path, self._name(index), self.limits)
         given = {"spec": asdict(spec), "path": str(facts.path), "name": self._name(index)}
         given |= {"inputs": self.inputs, "outputs": self.outputs}
-        new.send(b"l", json.dumps(given).encode())
+        new.tell(b"l", given)
         self._children[index] = new
         return new
 
@@ -85,7 +84,7 @@ class SandboxBank:
             before, now = self._children[i], self._ready(i)
             fresh.append(now is not before)
             given = {"time": time, "parameters": {**self._kind(i)[0].parameters, **extra}, "u": self.u[i].tolist()}
-            now.send(b"s", json.dumps(given).encode())
+            now.tell(b"s", given)
         for i, child in enumerate(self._children):
             if child is None:
                 continue

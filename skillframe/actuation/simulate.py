@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from skillframe.actuation.bindings import Instance, InstanceFailed, convert
+from skillframe.actuation.bindings import Instance, InstanceFailed
 from skillframe.actuation.inspection import FmuFacts, FmuVariable, inspect_fmu
 from skillframe.errors import InputError
 
@@ -71,14 +71,12 @@ def simulate(request: Request, sandboxed: bool, limit_s: float = 30.0) -> Iterat
     if not sandboxed:
         yield from run(request)
         return
-    import json
-
     from skillframe.actuation.child import Child, SandboxLimits
 
     child = Child(facts.path, facts.name, SandboxLimits())
     try:
-        child.send(b"m", json.dumps({**asdict(request), "path": str(request.path)}).encode())
-        while block := json.loads(child.receive(limit_s, "simulating")):
+        child.tell(b"m", {**asdict(request), "path": str(request.path)})
+        while block := child.heard(limit_s, "simulating"):
             yield block
     finally:
         child.close()
@@ -150,46 +148,3 @@ def _check_finite(instance: Instance, facts: FmuFacts, row: list[Any]) -> None:
     for name, value in zip(output_columns(facts), row[1:], strict=True):
         if isinstance(value, float) and value - value != 0.0:
             raise InstanceFailed(instance.sentence(f"output {name} is {value} at {row[0]:.6g} s"))
-
-
-def read_inputs(path: Path, facts: FmuFacts) -> tuple[list[str], list[list[float]]]:
-    """An input table: CSV with a column `time` and one per input.
-
-    Raises:
-        InputError: no time, no rows, something that is no number, or time that does not grow.
-        UnknownName: a column that is no input.
-    """
-    import csv
-
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            lines = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(path, f"cannot be read: {error}", "give a CSV file") from None
-    if not lines or "time" not in (names := [n.strip() for n in lines[0]]):
-        raise InputError(path, "has no column time", "give a CSV with a header: time, then inputs by name")
-    if len(lines) < 2:
-        raise InputError(path, "has a header and no rows", "add rows")
-    at = names.index("time")
-    others = [n for n in names if n != "time"]
-    for name in others:
-        facts.variable(name, "input")
-    rows = []
-    for number, line in enumerate(lines[1:], start=2):
-        try:
-            values = [float(x) for x in line]
-        except ValueError:
-            raise InputError(f"{path}: line {number}", "holds something that is no number", "correct it") from None
-        if len(values) != len(names) or any(x - x != 0.0 for x in values):
-            raise InputError(f"{path}: line {number}", f"needs {len(names)} finite numbers", "correct it")
-        rows.append([values[at], *(v for i, v in enumerate(values) if i != at)])
-        if len(rows) > 1 and rows[-1][0] <= rows[-2][0]:
-            raise InputError(f"{path}: line {number}", "time does not grow", "sort and remove repeated rows")
-    for column, name in enumerate(others, start=1):
-        _convertible(path, facts.variables[name], [row[column] for row in rows])
-    return others, rows
-
-
-def _convertible(path: Path, variable: FmuVariable, values: list[float]) -> None:
-    if variable.type not in ("Real", "Float64", "Float32") and any(convert(variable.type, v) != v for v in values):
-        raise InputError(f"{path}: {variable.name}", f"is of type {variable.type}", "give whole numbers, or 0 and 1")

@@ -7,9 +7,6 @@ prepared once, because fmpy's list interface spends more time on packing lists t
 from __future__ import annotations
 
 import ctypes
-import hashlib
-import os
-import tempfile
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -20,8 +17,7 @@ from numpy.typing import NDArray
 
 from skillframe.actuation.actuator import DISCARD, ENDED, NOT_FINITE
 from skillframe.actuation.bindings import Instance
-from skillframe.actuation.toolchain import FLAGS, CompilerFailed, compile_library, find_compiler
-from skillframe.paths import cache_dir
+from skillframe.actuation.build import build_stepper
 
 Float = NDArray[np.float64]
 LARGEST = 64  # variables per slot, as in stepper.c
@@ -51,22 +47,8 @@ class Slot(ctypes.Structure):
 @lru_cache(maxsize=1)
 def stepper_library() -> ctypes.CDLL | None:
     """The built stepper, or None where there is no compiler."""
-    source = Path(__file__).with_name("stepper.c")
-    compiler = find_compiler()
-    if compiler is None:
-        return None
-    key = hashlib.sha256(source.read_bytes() + " ".join([*compiler, *FLAGS]).encode()).hexdigest()[:24]
-    library = cache_dir("stepper") / key / "stepper.so"
-    if not library.is_file():
-        library.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=library.parent) as work:
-            (Path(work) / "stepper.c").write_bytes(source.read_bytes())
-            try:
-                compile_library(["stepper.c"], "stepper.so", Path(work))
-            except CompilerFailed:
-                return None
-            os.replace(Path(work) / "stepper.so", library)
-    return ctypes.CDLL(str(library))
+    path = build_stepper(Path(__file__).with_name("stepper.c"))
+    return ctypes.CDLL(str(path)) if path else None
 
 
 class SlotTable:
