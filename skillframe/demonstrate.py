@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from skillframe.blind_teacher import BlindSettings
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import SkillframeError
 from skillframe.executor import Result, Setup, simulate
@@ -71,7 +72,9 @@ def record(
         assert result.traces is not None
         for slot, good, failure, trace in zip(slots, result.success, result.failure, result.traces, strict=True):
             if good:
-                done[slot] = demonstration_from(trace, scene, settings, seed=seed, slot=slot, attempt=attempt)
+                done[slot] = demonstration_from(
+                    trace, scene, settings, sensors or SensorSettings(), seed=seed, slot=slot, attempt=attempt
+                )
             else:
                 rejected.append(f"demonstration {slot}, attempt {attempt}: {failure}")
         if progress is not None:
@@ -105,11 +108,12 @@ def _attempt(
     return simulate(teacher, setup, columns, rngs, duration_s=duration_s, trace_hz=rate_hz)
 
 
-def demonstration_from(trace: Trace, scene: Scene, settings: TeacherSettings, **provenance: int) -> Demonstration:
+def demonstration_from(
+    trace: Trace, scene: Scene, settings: TeacherSettings | BlindSettings, sensors: SensorSettings, **provenance: int
+) -> Demonstration:
     """A demonstration at the tool point out of a trace taken at the handle; the wrench is as sensed, not filtered."""
     pose = Pose(trace.position, matrix_from_quaternion(trace.quaternion))
     handle: Float = np.array(trace.meta["center_of_compliance"])
-    sensors = SensorSettings()
     meta = {
         "task": scene.name, "teacher": settings.kind, "rate": float(1.0 / np.median(np.diff(trace.time))),
         "frames": {name: list(point) for name, point in scene.tool.frames.items()}, "hand": scene.tool.hand,

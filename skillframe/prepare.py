@@ -7,6 +7,7 @@ scene; the quantities of the executor (`start.tilt_y`, `fixture.offset_x`, `worl
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Mapping
 from typing import Any
 
@@ -22,6 +23,7 @@ from skillframe.robot.model import RobotModel, load_model
 from skillframe.robot.spec import load_robot
 from skillframe.skill import Skill
 from skillframe.world.catalogue import make_scene
+from skillframe.world.placement import start_poses
 from skillframe.world.scene import Scene
 
 
@@ -83,8 +85,28 @@ def prepare(robot: RobotModel, scene: Scene, document: Document, coc: str | None
 
     Raises:
         UnknownName: the skill's type or the centre of compliance is unknown.
+        InputError: the skill says where it goes, and that is outside the robot's workspace.
     """
     center = center_of_compliance(document, scene, coc)
     placed = {**document, "frame": {**document["frame"], "center_of_compliance": center.tolist()}}
-    skill = registry().skill(document["type"]).build(placed)
+    kind = registry().skill(document["type"])
+    skill = kind.build(placed)
+    if kind.area is not None:
+        _check_area(robot, scene, document, kind.area(document))
     return skill, Setup(robot=robot, scene=scene, center_of_compliance=center)
+
+
+def _check_area(robot: RobotModel, scene: Scene, document: Document, area: Float) -> None:
+    """Refuse a box (2, 3), relative to the start, that leaves the robot's workspace from the nominal start."""
+    if robot.spec.limits.workspace_m is None:
+        return
+    start = start_poses(robot, scene, {}, 1)
+    turn = start.rotation[0] if document["frame"]["axes"] == "phase_start" else np.eye(3)
+    corners = np.array(list(itertools.product(*area.T))) @ turn.T + start.position[0]
+    low, high = np.array(robot.spec.limits.workspace_m)
+    if np.any(corners.min(axis=0) < low) or np.any(corners.max(axis=0) > high):
+        reach = " to ".join(str(np.round(c, 3).tolist()) for c in (corners.min(axis=0), corners.max(axis=0)))
+        raise InputError(
+            f"skill type {document['type']}", f"its search area, {reach} m, leaves the workspace of {robot.spec.name}",
+            "start elsewhere, search less far, or widen limits.workspace_m in robot.toml",
+        )  # fmt: skip

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from skillframe.demonstration.record import Demonstration
+    from skillframe.frames import Float
     from skillframe.skill import Skill
     from skillframe.world.scene import Scene
 
@@ -56,6 +57,8 @@ class SkillType:
         learn: a skill document's body (`frame`, `phases`, ...) from demonstrations; None if it is not learned.
         describe: the document in words, a line each.
         explain: pictures for the report, drawn from the document alone; None if there are none.
+        area: (2, 3) corners of the box that a run may reach, relative to its start and in the axes of the document's
+            `frame` [m]; a box that leaves the robot's workspace is refused before the run. None: not known.
         example: a small valid document to try the type with, for a type that is not learned, or that the example
             demonstrations of `skillframe.testing` do not suit.
     """
@@ -68,6 +71,7 @@ class SkillType:
     learn: Callable[[Sequence[Demonstration], LearnOptions], Document] | None = None
     describe: Callable[[Document], list[str]] | None = None
     explain: Callable[[Document], list[Illustration]] | None = None
+    area: Callable[[Document], Float] | None = None
     example: Callable[[], Document] | None = None
 
 

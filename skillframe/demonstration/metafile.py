@@ -10,7 +10,7 @@ from typing import Any
 from skillframe.config import read_toml
 from skillframe.errors import InputError, UnknownName
 
-TEACHERS = ("kinesthetic", "teleoperation")
+TEACHERS = ("kinesthetic", "teleoperation", "blind")
 
 
 def meta_path(path: Path) -> Path:

@@ -8,7 +8,7 @@ from typing import Any
 from skillframe.config import build
 from skillframe.records import WorldType
 from skillframe.world.scene import Scene
-from skillframe.world.worlds import edge, free, funnel, hose_coupler, peg_in_hole, valley
+from skillframe.world.worlds import edge, free, funnel, hose_coupler, peg_in_hole, socket, valley
 
 
 def world_types() -> Iterable[WorldType]:
@@ -24,6 +24,10 @@ def world_types() -> Iterable[WorldType]:
     yield WorldType(
         name="hose_coupler", summary="two coupler faces to align", params=hose_coupler.HoseParams,
         build=hose_coupler.build,
+    )  # fmt: skip
+    yield WorldType(
+        name="socket", summary="a plug with two pins and a key, and its socket", params=socket.SocketParams,
+        build=socket.build,
     )  # fmt: skip
 
 

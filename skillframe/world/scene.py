@@ -62,6 +62,21 @@ class Tool:
     hand: str = "wrist"
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Holder:
+    """How the second arm of a two-armed robot holds the scene's fixture; one-armed robots find it standing still.
+
+    Attributes:
+        tool: what that arm holds, fixture included, in its tool frame; it is drawn and touched as the fixture is, so
+            it needs no geoms of its own.
+        position: (3,) of the fixture frame in that arm's tool frame [m]; quaternion: its attitude.
+    """
+
+    tool: Tool
+    position: Vector
+    quaternion: tuple[float, float, float, float] = IDENTITY
+
+
 class State(NamedTuple):
     """Where the tool is, seen from the fixture, for goal predicates; N trials.
 
@@ -85,6 +100,8 @@ class Task:
         hand: "aligning" (soft and active in rotation), "sliding", "hold" or "lever".
         starts: nominal starts of the demonstrations, cycled through: dicts of `start.*` quantities.
         done: predicate of a finished demonstration; the goal if None.
+        believed: what a blindfolded person knows instead of all this: standard deviations of where the goal is,
+            relative to the start, along and across the surface [m] and about its normal [rad].
     """
 
     direction: Vector | None
@@ -93,6 +110,7 @@ class Task:
     hand: str = "sliding"
     starts: tuple[dict[str, float], ...] = ({},)
     done: Callable[[State], NDArray[np.bool_]] | None = None
+    believed: Vector = (0.004, 0.004, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,6 +126,7 @@ class Scene:
             no declared start penetrates the fixture.
         goal: predicate per trial.
         goal_error: distance to the goal: (N,) [m] and (N,) [rad].
+        holder: lets a second arm hold the fixture; None: it always stands still.
         analytic: figures of closed-form theory for the report (e.g. {"largest_tilt": ...}).
         params: the parameters it was built from, plain values.
     """
@@ -122,5 +141,6 @@ class Scene:
     goal_error: Callable[[State], tuple[Float, Float]]
     task: Task
     start_lift: Callable[[Float, Float], Float] = field(default=lambda offset, tilt: np.zeros(len(offset)))
+    holder: Holder | None = None
     analytic: dict[str, float] = field(default_factory=dict)
     params: dict[str, Any] = field(default_factory=dict)

@@ -22,8 +22,8 @@ FLOORS = [
     {"control", "actuation"},
     {"cosim", "world"},
     {"executor", "recorder", "trace", "prepare"},
-    {"teacher", "metrics", "campaign"},
-    {"report", "demonstrate"},
+    {"teacher", "blind_teacher", "metrics", "campaign"},
+    {"report", "demonstrate", "demonstrate_blind"},
     {"conformance", "testing", "quickstart"},
     {"cli"},
 ]
@@ -33,9 +33,10 @@ ASKED_WHEN_CALLED = {  # uphill, and only inside the function that needs it
     ("registry", "builtin"),  # loads it as it loads any plug-in
     ("demonstration", "registry"),  # which format reads this file?
 }
-LOOP = {"skill", "sequence", "teacher", "control", "world", "actuation", "cosim", "executor"}
-SET_UP = {  # finds, builds and unpacks FMUs before a run; what steps them is loop
-    f"skillframe/actuation/{name}.py" for name in ("allow", "build", "extract", "library", "toolchain")
+LOOP = {"skill", "sequence", "teacher", "blind_teacher", "control", "world", "actuation", "cosim", "executor"}
+SET_UP = {  # finds, builds and unpacks FMUs before a run, simulates one alone, holds a foreign one in its own process
+    f"skillframe/actuation/{name}.py"
+    for name in ("allow", "build", "child", "extract", "foreign", "library", "record", "toolchain", "worker")
 }
 HEAVY = {"scipy", "casadi", "fmpy", "filterpy", "mujoco", "matplotlib", "pinocchio"}
 

@@ -1,0 +1,59 @@
+"""A search in words."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from skillframe.records import Document
+from skillframe_search.phase import Phase, read_phase
+
+WAYS = {
+    "tour": "a tour of samples of it",
+    "ergodic": "an ergodic trajectory that spends its time as it says",
+    "spiral": "an Archimedean spiral around the start, pitch {pitch:.2g} mm",
+    "random_walk": "a random walk around the start, steps of {step:.2g} mm",
+}
+NAMES = {
+    "across_1": "along the surface", "across_2": "across it", "tilt_1": "tilt", "tilt_2": "tilt the other way",
+    "turn": "turn about the push",
+}  # fmt: skip
+
+
+def describe(document: Document) -> list[str]:
+    """The search of a document, a line each."""
+    phase = read_phase(document)
+    x, y, z = phase.push.direction
+    return [
+        f"press along {x:+.3f}, {y:+.3f}, {z:+.3f} with {phase.push.force:.1f} N",
+        *_where(phase),
+        _way(phase),
+        _forces(phase),
+        f"done when {1e3 * phase.stop.drop_m:.3g} mm deeper than the surface and the answer to the push was lost; "
+        f"failed after {phase.stop.time_s:g} s of search",
+    ]
+
+
+def _where(phase: Phase) -> list[str]:
+    found = phase.exploration
+    if found is None:
+        return []
+    deviation = np.sqrt(np.diag(np.array(found.covariance)))
+    lines = []
+    for name, mean, spread in zip(found.coordinates, found.mean, deviation, strict=True):
+        metric = name.startswith("across")
+        factor, unit = (1e3, "mm") if metric else (np.rad2deg(1.0), "degrees")
+        lines.append(f"look {NAMES[name]}: {factor * mean:+.2f} {unit} from the start, +-{factor * spread:.2f} {unit}")
+    return lines
+
+
+def _way(phase: Phase) -> str:
+    path = phase.path
+    way = WAYS[path.kind].format(pitch=1e3 * path.pitch, step=1e3 * path.step)
+    bounds = f"at most {1e3 * path.speed:.3g} mm/s and {path.acceleration:.3g} m/s^2"
+    return f"follow {way}, {bounds}, stiffness {phase.stiffness.translation:g} N/m across the push and none along it"
+
+
+def _forces(phase: Phase) -> str:
+    if phase.forces is None:
+        return "press and exert nothing more"
+    return f"exert the forces that were felt at the same velocity ({len(phase.forces.weights)} components)"

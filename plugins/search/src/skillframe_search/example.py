@@ -1,0 +1,55 @@
+"""A small valid document of each kind, to try the types with."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from skillframe.demonstration.record import Demonstration
+from skillframe.frames import Float
+from skillframe.records import Document, LearnOptions
+
+RATE, SECONDS = 100.0, 20.0
+PUSH, FRICTION = 10.0, 0.2
+
+
+def example(kind: str) -> Document:
+    """A document of a kind, learned from a made-up search of a plane."""
+    from skillframe.registry import registry
+    from skillframe.skillsource import learned
+
+    settings = {"speed": 0.015, "time": 4.0}
+    return learned(registry().skill(kind), [searching()], LearnOptions(settings=settings))
+
+
+def searching(
+    seed: int = 3, deviation: tuple[float, float] = (0.004, 0.004), friction: float = FRICTION
+) -> Demonstration:
+    """Twenty seconds of an Ornstein-Uhlenbeck search of a plane with Coulomb friction, without noise of sensors.
+
+    It is there to exercise the learner; what it is judged by are searches of the simulated world.
+    """
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, SECONDS, 1.0 / RATE)
+    position = np.zeros((len(time), 3))
+    position[:, :2] = _wander(rng, len(time)) * deviation
+    velocity: Float = np.asarray(np.gradient(position, 1.0 / RATE, axis=0))
+    speed = np.sqrt((velocity**2).sum(axis=1, keepdims=True))
+    force = np.array([0.0, 0.0, PUSH]) - friction * PUSH * velocity / np.sqrt(speed**2 + 1e-8)
+    wrench = np.concatenate([force, np.zeros_like(force)], axis=1)
+    return Demonstration(
+        time=time, position=position + np.array([0.4, 0.0, 0.2]),
+        quaternion=np.tile((1.0, 0.0, 0.0, 0.0), (len(time), 1)),
+        wrench=wrench, meta={"task": "search", "rate": RATE, "contact": True, "frames": {"tip": [0.0, 0.0, 0.2]}},
+    )  # fmt: skip
+
+
+def _wander(rng: np.random.Generator, count: int) -> Float:
+    """(count, 2) a smooth wandering of unit variance: two Ornstein-Uhlenbeck filters of 0.5 s, one after the other."""
+    values, state, inner = np.empty((count, 2)), np.zeros(2), np.zeros(2)
+    decay = 1.0 / (0.5 * RATE)
+    for k in range(count):
+        inner = inner - inner * decay + np.sqrt(2.0 * decay) * rng.standard_normal(2)
+        state = state + (inner - state) * decay
+        values[k] = state
+    deviation: Float = values / np.maximum(values.std(axis=0), 1e-9)
+    return deviation

@@ -1,0 +1,152 @@
+"""The one phase of a search document as checked records; what is wrong is named by its key."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from skillframe.config import build
+from skillframe.errors import InputError
+from skillframe.records import Document
+from skillframe_search.exploration import COORDINATES, Exploration
+from skillframe_search.forces import ForceModel
+
+Kind = Literal["tour", "ergodic", "spiral", "random_walk"]
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Push:
+    """Which way to press [unit vector] and how hard [N]."""
+
+    direction: Vector
+    force: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Path:
+    """Where to go: the kind of trajectory, its limits and the figures of the baselines.
+
+    Attributes:
+        kind: "tour" (samples), "ergodic", "spiral" or "random_walk".
+        speed: limit [m/s]; acceleration: limit [m/s^2].
+        pitch: of the spiral [m]; layers: its turns about the normal [rad], one spiral each.
+        step, reach: of the random walk [m].
+    """
+
+    kind: Kind
+    speed: float
+    acceleration: float
+    pitch: float
+    layers: tuple[float, ...]
+    step: float
+    reach: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stiffness:
+    """Across the push [N/m], and of rotation [Nm/rad]; along the push there is none while searching."""
+
+    translation: float
+    rotation: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stop:
+    """When the search begins and ends; all ours.
+
+    Attributes:
+        touch_n: the surface is touched when the push is answered by this much,
+        approach_speed: approached at this speed [m/s]; approach_m: over at most this way.
+        drop_m: it has fallen in when it is this much deeper than the surface, and
+        lost_share: the answer to the push had fallen below this share of it on the way there.
+        time_s: of searching, after the touch.
+        force_limit_n: a contact force above it fails the trial.
+    """
+
+    touch_n: float = 3.0
+    approach_speed: float = 0.005
+    approach_m: float = 0.015
+    drop_m: float = 0.003
+    lost_share: float = 0.5
+    time_s: float = 20.0
+    force_limit_n: float = 70.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Phase:
+    """A search.
+
+    Attributes:
+        push: how to press.
+        exploration: where to look; None for the baselines, which look around the start.
+        forces: what is felt; None presses and no more.
+        path, stiffness, stop: how to go there, how stiffly, until when.
+        searched: names of the coordinates that the path moves.
+        evidence: what it was learned from.
+    """
+
+    name: str = "search"
+    push: Push
+    searched: tuple[str, ...]
+    exploration: Exploration | None
+    forces: ForceModel | None
+    path: Path
+    stiffness: Stiffness
+    stop: Stop
+    evidence: dict[str, Any]
+
+
+def read_phase(document: Document) -> Phase:
+    """The phase of a search document.
+
+    Raises:
+        InputError: not exactly one phase, or a key that is missing, unknown or holds the wrong thing.
+    """
+    phases = document["phases"]
+    if len(phases) != 1:
+        raise InputError("phases", f"a search has one phase, this has {len(phases)}", "learn the skill again")
+    phase = build(Phase, phases[0], "phases[0]")
+    _check_numbers(phase)
+    _check_exploration(phase)
+    return phase
+
+
+def _check_numbers(phase: Phase) -> None:
+    if abs(float(np.linalg.norm(phase.push.direction)) - 1.0) > 0.01:
+        raise InputError("phases[0].push.direction", "should be a unit vector", "divide it by its length")
+    positive = {
+        "push.force": phase.push.force, "path.speed": phase.path.speed, "path.acceleration": phase.path.acceleration,
+        "path.pitch": phase.path.pitch, "path.step": phase.path.step,
+        "stiffness.translation": phase.stiffness.translation, "stiffness.rotation": phase.stiffness.rotation,
+        "path.layers": float(len(phase.path.layers)),
+        **{f"stop.{name}": getattr(phase.stop, name) for name in Stop.__dataclass_fields__},
+    }  # fmt: skip
+    for key, value in positive.items():
+        if not 0.0 < value < 1e6:
+            raise InputError(f"phases[0].{key}", f"should be positive, is {value:g}", "mend it, or learn again")
+    if phase.stop.time_s > 300.0:
+        raise InputError("phases[0].stop.time_s", "a search longer than 300 s is not planned", "give a shorter time")
+    if phase.path.reach < phase.path.step:
+        raise InputError("phases[0].path.reach", "is smaller than a step", "give a larger reach")
+
+
+def _check_exploration(phase: Phase) -> None:
+    names = list(phase.searched)
+    if not names or names != [name for name in COORDINATES if name in names]:
+        raise InputError("phases[0].searched", f"should name some of {', '.join(COORDINATES)}, in order", "mend it")
+    if phase.path.kind in ("spiral", "random_walk"):
+        if names[:2] != list(COORDINATES[:2]):
+            raise InputError("phases[0].searched", "a spiral or walk needs across_1 and across_2", "choose tour")
+        return
+    found = phase.exploration
+    if found is None:
+        raise InputError("phases[0].exploration", f"is missing for the kind {phase.path.kind}", "learn the skill again")
+    k = len(names)
+    shape = (found.coordinates, len(found.mean), np.shape(found.covariance))
+    if shape != (phase.searched, k, (k, k)) or np.linalg.eigvalsh(np.array(found.covariance)).min() <= 0.0:
+        raise InputError("phases[0].exploration", "is not a Gaussian over what is searched", "learn the skill again")
+    if phase.forces is not None and len(phase.forces.means[0]) != k + 6:
+        raise InputError("phases[0].forces", "does not fit what is searched", "learn the skill again")

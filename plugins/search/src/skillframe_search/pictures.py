@@ -1,0 +1,122 @@
+"""Pictures of a search, drawn from its file alone: where the person looked and where it will go (seed, Fig. 16)."""
+
+from __future__ import annotations
+
+import io
+from math import degrees
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse
+
+from skillframe.frames import Float, norm
+from skillframe.records import Document, Illustration
+from skillframe_search.contact import surface_axes
+from skillframe_search.exploration import COORDINATES, CUT
+from skillframe_search.phase import Phase, read_phase
+from skillframe_search.plan import Plan, exerted, keyed, plan
+
+INK, BLUE, RED, GREY = "#1d2025", "#2e6fba", "#d1495b", "#b9bec6"
+STYLE = {"font.family": "DejaVu Sans", "font.size": 10, "svg.fonttype": "none", "svg.hashsalt": "skillframe"}
+
+
+def explain(document: Document) -> list[Illustration]:
+    """The exploration distribution with a trajectory, and the forces of the model."""
+    phase = read_phase(document)
+    found = [_where(phase)]
+    return found if phase.forces is None else [*found, _forces(phase)]
+
+
+def _where(phase: Phase) -> Illustration:
+    trajectory = plan(keyed(phase), 0)
+    turning = "turn" in phase.searched
+    figure = Figure(figsize=(9.6 if turning else 5.6, 4.8))
+    panels = figure.subplots(1, 2, squeeze=False)[0] if turning else [figure.add_subplot()]
+    _panel(panels[0], phase, trajectory, 0, 1)
+    if turning:
+        _panel(panels[1], phase, trajectory, 0, len(phase.searched) - 1)
+    caption = (
+        f"Grey: where the blindfolded person had the tool, against where it started. Ellipses: one and {CUT:g} "
+        f"standard deviations of the Gaussian fitted to it. Blue: one search, {1e3 * trajectory.length:.0f} mm in "
+        f"{phase.stop.time_s:g} s."
+    )
+    if phase.exploration is None:
+        caption = f"Blue: one search around the start, {1e3 * trajectory.length:.0f} mm in {phase.stop.time_s:g} s."
+    return Illustration("Where it looks", caption, _svg(figure))
+
+
+def _panel(canvas: Axes, phase: Phase, trajectory: Plan, first: int, second: int) -> None:
+    """Two of the searched coordinates against each other, in mm and degrees."""
+    pair = [first, min(second, len(phase.searched) - 1)]
+    factor = np.array([degrees(1.0) if _turns(phase, i) else 1e3 for i in pair])
+    places = np.array(phase.evidence.get("places", [])).reshape(-1, len(phase.searched))
+    canvas.plot(*(places[:, pair] * factor).T, ".", color=GREY, ms=3)
+    canvas.plot(*(_coordinates(phase, trajectory)[:, pair] * factor).T, color=BLUE, lw=0.9)
+    if phase.exploration is not None and pair[0] != pair[1]:
+        covariance = np.array(phase.exploration.covariance)[np.ix_(pair, pair)] * np.outer(factor, factor)
+        mean = np.array(phase.exploration.mean)[pair] * factor
+        value, vector = np.linalg.eigh(covariance)
+        angle = float(np.degrees(np.arctan2(vector[1, 1], vector[0, 1])))
+        for size in (1.0, CUT):
+            wide, high = 2.0 * size * np.sqrt(value[::-1])
+            canvas.add_patch(Ellipse(tuple(mean), wide, high, angle=angle, fill=False, ec=INK, lw=1.2))
+    canvas.plot(0.0, 0.0, "+", color=RED, ms=12, mew=2)
+    labels = [f"{phase.searched[i]} [{'degrees' if _turns(phase, i) else 'mm'}]" for i in pair]
+    canvas.set(xlabel=labels[0], ylabel=labels[1])
+    if not any(_turns(phase, i) for i in pair):
+        canvas.set_aspect("equal")
+
+
+def _turns(phase: Phase, i: int) -> bool:
+    return COORDINATES.index(phase.searched[i]) >= 2
+
+
+def _coordinates(phase: Phase, trajectory: Plan) -> Float:
+    axes = surface_axes(np.array(phase.push.direction))
+    all_five = np.concatenate([trajectory.place[:, :3] @ axes[:2].T, trajectory.place[:, 3:] @ axes.T], axis=1)
+    return all_five[:, [COORDINATES.index(name) for name in phase.searched]]
+
+
+def _forces(phase: Phase) -> Illustration:
+    """Force along the motion over speed, for motion all ways along the surface."""
+    speed = np.linspace(0.0, 1.5 * phase.path.speed, 40)
+    figure = Figure(figsize=(5.6, 3.6))
+    canvas = figure.add_subplot()
+    axes = surface_axes(np.array(phase.push.direction))
+    across = [i for i in range(len(phase.searched)) if not _turns(phase, i)]
+    for angle in np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False) if len(across) > 1 else (0.0, np.pi):
+        way = np.array([np.cos(angle), np.sin(angle)])[: len(across)]
+        rate = np.zeros((len(speed), len(phase.searched)))
+        rate[:, across] = speed[:, None] * way
+        rows = axes[[COORDINATES.index(phase.searched[i]) for i in across]]
+        canvas.plot(1e3 * speed, exerted(phase, rate)[:, :3] @ (way @ rows), color=BLUE, alpha=0.7)
+    canvas.axhline(0.0, color=GREY, lw=0.8)
+    canvas.set(xlabel="speed along the surface [mm/s]", ylabel="force along the motion [N]")
+    ratio = float(np.mean(_ratio(phase)))
+    caption = (
+        f"What the search exerts along its motion beside the push of {phase.push.force:.1f} N, for eight directions: "
+        f"what was felt at that velocity, wherever that was. At full speed it is {ratio:.2f} of the push, which is the "
+        "friction that the model has learned."
+    )
+    return Illustration("What it exerts on the way", caption, _svg(figure))
+
+
+def _ratio(phase: Phase) -> Float:
+    """Lateral force over push at full speed, both ways along the first coordinate."""
+    rate = np.zeros((2, len(phase.searched)))
+    rate[:, 0] = [phase.path.speed, -phase.path.speed]
+    wrench = exerted(phase, rate)[:, :3]
+    push = np.array(phase.push.direction)
+    lateral: Float = norm(wrench - (wrench @ push)[:, None] * push) / phase.push.force
+    return lateral
+
+
+def _svg(figure: Figure) -> str:
+    text = io.StringIO()
+    with rc_context(STYLE):
+        figure.set_layout_engine("constrained")
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    drawing = text.getvalue()
+    return drawing[drawing.index("<svg") :]

@@ -1,0 +1,125 @@
+r"""All of a search as one trajectory: places and rates of the tool against its start, and the wrench on the way.
+
+    x_d(t) = x_0 + d(t),    R_d(t) = exp(r(t)) R_0,    F_ff(t) = - E[w | v(t)] F_push / E[w_n | v(t)]          eq. (1)
+
+Forces come from the model at the *desired* rate, so that nothing is fed back, and are scaled to the commanded push:
+what is learned is their ratio. Trajectories are numbered; a number and a document always give the same one, so that a
+batch, a trial alone and a retry agree, and a number is planned once. Planning takes a fraction of a second.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from skillframe.frames import Float, norm
+from skillframe.records import Document
+from skillframe_search.contact import surface_axes
+from skillframe_search.ergodic import ergodic
+from skillframe_search.exploration import COORDINATES, CUT, LEVER
+from skillframe_search.phase import Phase, read_phase
+from skillframe_search.simple import random_walk, spiral
+from skillframe_search.smoothing import SLACK, smoothed
+from skillframe_search.tour import tour
+
+NUMBERS = 256
+LEAST_SHARE = 0.3  # of the push: a model that expects less of it is not scaled up any further
+
+
+class Plan(NamedTuple):
+    """A trajectory on a grid of `STEP_S`, in the search frame.
+
+    Attributes:
+        place: (T, 6) displacement and rotation vector [m, rad].
+        rate: (T, 6) constant until the next [m/s, rad/s].
+        feedforward: (T, 6) wrench on the environment at the learning point [N, Nm].
+        length: of the way along the surface [m].
+    """
+
+    place: Float
+    rate: Float
+    feedforward: Float
+    length: float
+
+
+@lru_cache(maxsize=2 * NUMBERS)
+def plan(phase: _Hashed, number: int) -> Plan:
+    """The trajectory of a number, 0 ... 255."""
+    settings = phase.phase
+    scaled, scale = _places(settings, np.random.default_rng([21, number]))
+    motion = smoothed(scaled, settings.path.speed, settings.path.acceleration, settings.stop.time_s)
+    columns = [COORDINATES.index(name) for name in settings.searched]
+    axes = surface_axes(np.array(settings.push.direction))
+    full = np.zeros((5, 6))
+    full[:2, :3], full[2:, 3:] = axes[:2], axes
+    spread = full[columns] / scale[:, None]
+    length = float(norm(np.diff(motion.place[:, : sum(c < 2 for c in columns)], axis=0)).sum())
+    return Plan(motion.place @ spread, motion.rate @ spread, exerted(settings, motion.rate), length)
+
+
+def exerted(phase: Phase, rate: Float) -> Float:
+    """(T, 6) the wrench to exert on the environment at rates (T, k) [m/s through the lever]."""
+    push = np.array(phase.push.direction)
+    if phase.forces is None:
+        return np.tile(np.concatenate([phase.push.force * push, np.zeros(3)]), (len(rate), 1))
+    wrench = -phase.forces.wrench(rate)
+    along = wrench[:, :3] @ push
+    largest = float(np.median(along)) if len(along) else phase.push.force
+    scale = phase.push.force / np.maximum(along, LEAST_SHARE * max(largest, 1e-9))
+    result: Float = scale[:, None] * wrench
+    result[:, :3] += (phase.push.force - result[:, :3] @ push)[:, None] * push
+    return result
+
+
+def _places(phase: Phase, rng: np.random.Generator) -> tuple[Float, Float]:
+    """The polygon of places (n, k) [m], and metres per unit of each coordinate (k,)."""
+    path, k = phase.path, len(phase.searched)
+    length = path.speed / SLACK * phase.stop.time_s
+    scale = np.array([LEVER if COORDINATES.index(name) >= 2 else 1.0 for name in phase.searched])
+    if path.kind == "spiral":
+        return spiral(k, path.pitch, length, [turn * LEVER for turn in path.layers]), scale
+    if path.kind == "random_walk":
+        return random_walk(k, path.step, path.reach, length, rng), scale
+    assert phase.exploration is not None
+    if path.kind == "ergodic":
+        return ergodic(phase.exploration, path.speed / SLACK, phase.stop.time_s), scale
+    return tour(phase.exploration, length, rng), scale
+
+
+class _Hashed:
+    """A phase with its text as identity, so that plans can be kept."""
+
+    def __init__(self, phase: Phase) -> None:
+        self.phase, self._text = phase, repr(phase)
+
+    def __hash__(self) -> int:
+        return hash(self._text)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Hashed) and self._text == other._text
+
+
+def keyed(phase: Phase) -> _Hashed:
+    """The phase as `plan` takes it."""
+    return _Hashed(phase)
+
+
+def area(document: Document) -> Float:
+    """(2, 3) corners of the box that the search may reach, relative to where it starts, in the search frame [m]."""
+    phase = read_phase(document)
+    axes = surface_axes(np.array(phase.push.direction))
+    if phase.exploration is None:
+        radius = phase.path.reach
+        if phase.path.kind == "spiral":
+            radius = float(np.sqrt(phase.path.speed * phase.stop.time_s * phase.path.pitch / np.pi))
+        middle, deviation = np.zeros(3), radius * np.sqrt((axes[:2] ** 2).sum(axis=0))
+    else:
+        rows = [axes[c] for c in phase.exploration.columns if c < 2]
+        n = len(rows)
+        across = np.array(rows).reshape(n, 3)
+        middle = phase.exploration.center[:n] @ across
+        spread = across.T @ phase.exploration.spread[:n, :n] @ across
+        deviation = CUT * np.sqrt(np.maximum(np.diag(spread), 0.0))
+    return np.stack([middle - deviation, middle + deviation])

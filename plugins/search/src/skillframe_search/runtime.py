@@ -1,0 +1,185 @@
+r"""The search in the loop, for N trials at once: approach, press, follow the plan, stop when it falls in.
+
+    approach   x_d moves along the push at approach speed, leading by no more than the push     until it is answered
+    search     no stiffness along the push; the push grows to its force over 0.2 s; x_d follows the plan (eq. 1)
+    end        SUCCESS when it falls in (`watch`), FAILURE when time is up, nothing is touched, or at a force limit
+
+It starts from where the tool is, in contact or slightly above, in the attitude it has. What has ended holds still
+where it is. Every row is computed by itself, so a trial's commands do not depend on its neighbours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.frames import Float, Pose, move_wrench, rotate, rotate_spatial, rotation_matrix
+from skillframe.records import Document
+from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
+from skillframe_search.phase import Phase, read_phase
+from skillframe_search.plan import NUMBERS, keyed, plan
+from skillframe_search.smoothing import STEP_S
+from skillframe_search.watch import Watch
+
+GROWTH_S = 0.2  # the push grows for this long after the touch
+HOLD = 1000.0  # N/m along the push in the approach and at the end
+
+
+def build(document: Document) -> SearchSkill:
+    """The skill of a document.
+
+    Raises:
+        InputError: the document's phase is not as it should be.
+    """
+    frame = document["frame"]
+    shift = np.array(frame["center_of_compliance"], dtype=float) - np.array(frame["learned_at"], dtype=float)
+    return SearchSkill(read_phase(document), frame["axes"] == "phase_start", shift)
+
+
+class SearchSkill(Skill):
+    """A search by feel.
+
+    Args:
+        phase: what was learned.
+        in_start_attitude: the search frame has the tool's axes at the start, not those of base.
+        shift: (3,) from where it was learned to the centre of compliance, tool axes.
+    """
+
+    def __init__(self, phase: Phase, in_start_attitude: bool, shift: Float) -> None:
+        self._phase, self._stop, self._shift = phase, phase.stop, shift
+        self._in_start_attitude, self._key = in_start_attitude, keyed(phase)
+
+    def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
+        """Take the pose as the search frame, and choose a trajectory for each trial."""
+        n = len(rngs)
+        self._home = Pose(observation.pose.position.copy(), observation.pose.rotation.copy())
+        self._turn = self._home.rotation if self._in_start_attitude else np.broadcast_to(np.eye(3), (n, 3, 3))
+        self._push = rotate(self._turn, np.array(self._phase.push.direction))
+        plans = [plan(self._key, int(rng.integers(NUMBERS))) for rng in rngs]
+        self._place, self._rate, self._wrench = (np.stack([p[i] for p in plans]) for i in range(3))
+        self._length = [p.length for p in plans]
+        self._lever = rotate(self._home.rotation, np.broadcast_to(self._shift, (n, 3)))
+        self._began, self._touched = observation.time.copy(), np.full(n, np.inf)
+        self._lead = np.zeros(n)
+        self._status, self._reason = np.zeros(n, dtype=np.int64), no_reasons(n)
+        self._watch = Watch(self._phase.push, self._stop, self._push, observation)
+        self._end = Pose(self._home.position.copy(), self._home.rotation.copy())
+        self._stiffness = self._gain(HOLD, np.ones(n, dtype=bool))
+        self._row, self._first = np.arange(n), True
+
+    def _gain(self, along: float, rows: NDArray[np.bool_]) -> Float:
+        """(n, 6, 6) stiffness of some rows with a stiffness along the push."""
+        push, values = self._push[rows], self._phase.stiffness
+        result = np.zeros((len(push), 6, 6))
+        outer = push[:, :, None] * push[:, None, :]
+        result[:, :3, :3] = values.translation * np.eye(3) + (along - values.translation) * outer
+        result[:, 3:, 3:] = values.rotation * np.eye(3)
+        return result
+
+    def step(self, observation: Observation) -> Command:
+        """Approach, search or hold, row by row."""
+        dt = 0.0 if self._first else observation.dt
+        self._first = False
+        running = self._status == Status.RUNNING
+        fallen = self._watch.look(observation)
+        self._begin(observation, running)
+        searching = running & np.isfinite(self._touched)
+        self._judge(observation, searching, fallen & searching)
+        return self._command(observation, dt)
+
+    def _begin(self, observation: Observation, running: NDArray[np.bool_]) -> None:
+        """Those who touch the surface for the first time begin to search."""
+        new = running & np.isinf(self._touched) & self._watch.touched()
+        if new.any():
+            self._touched[new] = observation.time[new]
+            self._watch.settle(new)
+            self._stiffness = self._stiffness.copy()
+            self._stiffness[new] = self._gain(0.0, new)
+
+    def _command(self, observation: Observation, dt: float) -> Command:
+        status = self._status
+        searching = (status == Status.RUNNING) & np.isfinite(self._touched)
+        nearing = (status == Status.RUNNING) & ~searching
+        elapsed = np.where(searching, observation.time - np.where(searching, self._touched, 0.0), 0.0)
+        place, rate, wrench = self._on_plan(elapsed)
+        grown = np.where(searching, np.clip(elapsed / GROWTH_S, 0.0, 1.0), 0.0)[:, None]
+        self._advance(dt, nearing)
+        along = np.where(searching, self._watch.depth, self._lead)
+        position = self._home.position + place[:, :3] + along[:, None] * self._push
+        rotation = rotation_matrix(place[:, 3:]) @ self._home.rotation
+        twist = np.where(searching[:, None], rate, 0.0)
+        twist[:, :3] += np.where(nearing, self._stop.approach_speed, 0.0)[:, None] * self._push
+        ended = status != Status.RUNNING
+        if ended.any():
+            position = np.where(ended[:, None], self._end.position, position)
+            rotation = np.where(ended[:, None, None], self._end.rotation, rotation)
+        gain = Impedance(self._stiffness)
+        return Command(Pose(position, rotation), twist, gain, grown * wrench, status.copy(), self._reason.copy())
+
+    def _advance(self, dt: float, nearing: NDArray[np.bool_]) -> None:
+        """Approach: the desired depth goes on, but never asks for more than the push."""
+        most = self._watch.depth + self._phase.push.force / HOLD
+        onwards = np.minimum(self._lead + self._stop.approach_speed * dt, most)
+        self._lead = np.where(nearing, onwards, self._lead)
+
+    def _on_plan(self, elapsed: Float) -> tuple[Float, Float, Float]:
+        """Place, rate and wrench (N, 6) at seconds since the touch, in base axes, the wrench at the centre."""
+        last = self._place.shape[1] - 1
+        index = np.minimum((elapsed / STEP_S).astype(int), last)
+        rate = self._rate[self._row, index]
+        place = self._place[self._row, index] + (np.minimum(elapsed, last * STEP_S) - index * STEP_S)[:, None] * rate
+        wrench = self._wrench[self._row, index]
+        if self._in_start_attitude:
+            place, rate, wrench = (rotate_spatial(self._turn, values) for values in (place, rate, wrench))
+        # the learning point follows the place; the centre of compliance turns about it
+        return _at_center(place, self._lever), rate + _swept(rate, self._lever), move_wrench(wrench, self._lever)
+
+    def _judge(self, observation: Observation, searching: NDArray[np.bool_], fallen: NDArray[np.bool_]) -> None:
+        """End the trials that have fallen in or met a limit; the first reason stays."""
+        stop, force = self._stop, observation.wrench[:, :3]
+        squared = force[:, 0] ** 2 + force[:, 1] ** 2 + force[:, 2] ** 2
+        over = squared > stop.force_limit_n**2
+        late = searching & (observation.time - self._touched >= stop.time_s)
+        lost = ~searching & ((self._watch.depth > stop.approach_m) | (self._waited(observation)))
+        ending = (self._status == Status.RUNNING) & (fallen | over | late | lost)
+        for i in np.flatnonzero(ending).tolist():
+            found, hard = bool(fallen[i]), bool(over[i])
+            seconds = float(observation.time[i] - (self._touched[i] if searching[i] else self._began[i]))
+            self._status[i], self._reason[i] = self._verdict(i, found, hard, bool(late[i]), seconds, float(squared[i]))
+            self._end.position[i], self._end.rotation[i] = observation.pose.position[i], observation.pose.rotation[i]
+            self._stiffness = self._stiffness.copy()
+            self._stiffness[i] = self._gain(HOLD, np.arange(len(ending)) == i)[0]
+
+    def _waited(self, observation: Observation) -> NDArray[np.bool_]:
+        longest = 2.0 * self._stop.approach_m / self._stop.approach_speed
+        result: NDArray[np.bool_] = observation.time - self._began > longest
+        return result
+
+    def _verdict(self, i: int, found: bool, hard: bool, late: bool, seconds: float, squared: float) -> tuple[int, str]:
+        if hard:
+            limit = self._stop.force_limit_n
+            return Status.FAILURE, f"contact force {np.sqrt(squared):.0f} N above the limit of {limit:.0f} N"
+        if found:
+            return Status.SUCCESS, f"fell in after {seconds:.2f} s of search"
+        if late:
+            way = 1e3 * self._length[i]
+            return Status.FAILURE, f"searched for {seconds:.1f} s along {way:.0f} mm and did not fall in"
+        went = 1e3 * float(self._watch.depth[i])
+        return Status.FAILURE, f"touched no surface within {went:.0f} mm of the start; start the search nearer to it"
+
+
+def _at_center(place: Float, lever: Float) -> Float:
+    """Displacement of the centre of compliance: that of the learning point, and its own turn about it."""
+    turned = rotate(rotation_matrix(place[:, 3:]), lever) - lever
+    return np.concatenate([place[:, :3] + turned, place[:, 3:]], axis=1)
+
+
+def _swept(rate: Float, lever: Float) -> Float:
+    """What the turning adds to the centre's velocity, to first order in the turn since the start."""
+    w, r = rate[:, 3:], lever
+    x = w[:, 1] * r[:, 2] - w[:, 2] * r[:, 1]
+    y = w[:, 2] * r[:, 0] - w[:, 0] * r[:, 2]
+    z = w[:, 0] * r[:, 1] - w[:, 1] * r[:, 0]
+    return np.concatenate([np.stack([x, y, z], axis=1), np.zeros_like(w)], axis=1)

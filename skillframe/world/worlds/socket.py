@@ -1,0 +1,139 @@
+"""`socket`: a plug with two round pins and a key, and its socket; the search that needs three dimensions (seed, Fig. 16).
+
+The published task is an electricity socket; its measures are not given. Ours are of the common European kind: pins of
+4.8 mm at 19 mm from each other, and beside them a key that keeps the plug from going in the wrong way round. The key
+is shorter than the pins and has more play than the pins leave it, so that the pins alone decide what is found. The
+fillet at the pins' tips, not the play, sets how hard the search is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.frames import Float, norm
+from skillframe.world.scene import Geom, Scene, State, Task
+from skillframe.world.shapes import FIXTURE_COLOUR, TOOL_COLOUR, filleted_peg, hole, shaft
+from skillframe.world.worlds.common import TOOL_DOWN, WRIST_TO_TIP, require, tilt_lift, tilt_of, tool
+
+HALF_PLATE = 0.045
+WALL = 0.003  # of the rings around the pins' holes
+KEY_HALF = (0.003, 0.0012)  # half sizes of the key, across and along the plate
+KEY_OFFSET = 0.007
+KEY_SHORTER = 0.004
+KEY_PLAY = 0.001
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SocketParams:
+    """Parameters of `socket`.
+
+    Attributes:
+        radius: of the pins [m].
+        clearance: radius of the holes minus that of the pins [m].
+        spacing: between the pins' axes [m].
+        length: of the pins [m].
+        depth: of the holes [m].
+        fillet: radius of the pins' rounded tips [m].
+        friction: Coulomb coefficient.
+        segments: of the pins' meshes around.
+        boxes: of each hole's ring.
+        done_depth: depth of the tip that counts as plugged in [m].
+    """
+
+    radius: float = 0.0024
+    clearance: float = 0.0005
+    spacing: float = 0.019
+    length: float = 0.019
+    depth: float = 0.018
+    fillet: float = 0.0008
+    friction: float = 0.2
+    segments: int = 16
+    boxes: int = 16
+    done_depth: float = 0.016
+
+
+def build(params: SocketParams) -> Scene:
+    """The socket's face is the plane z = 0, its holes lie on the x axis; the goal is the tip below `done_depth`."""
+    free = params.radius + params.clearance
+    require(
+        "socket",
+        {
+            "clearance > 0": params.clearance > 0.0,
+            "0 < fillet < radius": 0.0 < params.fillet < params.radius,
+            "fillet < length": params.fillet < params.length,
+            "0 < done_depth <= depth": 0.0 < params.done_depth <= params.depth,
+            "depth <= length": params.depth <= params.length,
+            "friction >= 0": params.friction >= 0.0,
+            "12 to 256 boxes and 8 to 256 segments": 12 <= params.boxes <= 256 and 8 <= params.segments <= 256,
+            "radius + clearance <= 3 mm": free <= 0.003,
+            "16 mm <= spacing <= 40 mm": 0.016 <= params.spacing <= 0.040,
+        },
+    )
+
+    def distance(state: State) -> Float:
+        return norm(state.tip.position - np.array([0.0, 0.0, -params.depth]))
+
+    def plugged(state: State) -> NDArray[np.bool_]:
+        deep: NDArray[np.bool_] = state.tip.position[..., 2] < -params.done_depth
+        return deep & (norm(state.tip.position[..., :2]) < params.radius)
+
+    return Scene(
+        name="socket",
+        fixture=_socket(params),
+        tool=tool((*_plug(params), shaft(0.012, 0.012, WRIST_TO_TIP - params.length))),
+        friction=params.friction,
+        start_tip=(0.0, 0.0, 0.001),
+        start_quaternion=TOOL_DOWN,
+        start_lift=tilt_lift(0.5 * params.spacing + params.radius),
+        goal=plugged,
+        goal_error=lambda state: (distance(state), tilt_of(state)),
+        task=Task(
+            direction=(0.0, 0.0, -1.0), aligned=TOOL_DOWN, hand="aligning",
+            starts=({"start.tilt_z": 0.0},), believed=(0.003, 0.003, float(np.deg2rad(5.0))),
+        ),
+    )  # fmt: skip
+
+
+def _plug(params: SocketParams) -> tuple[Geom, ...]:
+    """Pins and key in the tool frame; the tool's y axis is the fixture's -y."""
+    pin = filleted_peg(params.radius, params.length, params.fillet, params.segments, WRIST_TO_TIP)
+    pins = [replace(pin, position=(side * 0.5 * params.spacing, 0.0, 0.0)) for side in (-1.0, 1.0)]
+    half = 0.5 * (params.length - KEY_SHORTER)
+    key = Geom(
+        kind="box", size=(*KEY_HALF, half), position=(0.0, -KEY_OFFSET, WRIST_TO_TIP - KEY_SHORTER - half),
+        rgba=TOOL_COLOUR,
+    )  # fmt: skip
+    return (*pins, key)
+
+
+def _socket(params: SocketParams) -> tuple[Geom, ...]:
+    """A ring of boxes around each hole, boxes that leave out the rings' squares and the key's slot, and a bottom."""
+    free, x = params.radius + params.clearance, 0.5 * params.spacing
+    ring = hole(free, params.depth, params.boxes, WALL)[:-1]
+    rings = [
+        replace(geom, position=(geom.position[0] + side * x, *geom.position[1:]))
+        for side in (-1.0, 1.0)
+        for geom in ring
+    ]
+    square = (free + WALL) / np.sqrt(2.0)  # its corners lie inside the ring's outer polygon
+    across = KEY_HALF[0] + KEY_PLAY
+    near, far = KEY_OFFSET - KEY_HALF[1] - KEY_PLAY, KEY_OFFSET + KEY_HALF[1] + KEY_PLAY
+    h = HALF_PLATE
+    plates = [
+        (-h, h, -h, -square), (-h, -x - square, -square, square), (-x + square, x - square, -square, square),
+        (x + square, h, -square, square), (-h, h, square, near), (-h, -across, near, far), (across, h, near, far),
+        (-h, h, far, h),
+    ]  # fmt: skip
+    bottom = Geom(kind="box", size=(h, h, 0.005), position=(0.0, 0.0, -params.depth - 0.005), rgba=FIXTURE_COLOUR)
+    return (*rings, *(_plate(*plate, params.depth) for plate in plates), bottom)
+
+
+def _plate(left: float, right: float, low: float, high: float, depth: float) -> Geom:
+    """A box with its upper face at z = 0 over a rectangle of the plane."""
+    return Geom(
+        kind="box", size=(0.5 * (right - left), 0.5 * (high - low), 0.5 * depth), rgba=FIXTURE_COLOUR,
+        position=(0.5 * (left + right), 0.5 * (low + high), -0.5 * depth),
+    )  # fmt: skip
