@@ -82,6 +82,15 @@ class Loop:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Payload:
+    """What a machine carries: `mass` [kg] of load in the inertia of a link, and `rating`, the most it may be [kg]."""
+
+    link: str
+    mass: float
+    rating: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Actuation:
     """An actuator (an FMU) on a joint; `inputs` and `outputs` map our names to the FMU's."""
 
@@ -106,6 +115,7 @@ class RobotFile:
     limits: Limits = field(default_factory=Limits)
     workspace: Workspace = field(default_factory=Workspace)
     inertia: dict[str, LinkInertia] = field(default_factory=dict)
+    payload: Payload | None = None
     loop: tuple[Loop, ...] = ()
     actuation: tuple[Actuation, ...] = ()
 
@@ -120,6 +130,7 @@ class RobotSpec:
         base: "fixed", or "free" for a free-flying body.
         mimic: joints with a URDF mimic tag follow their leader; False makes every joint independent.
         home: joint positions by joint name [rad or m]; joints not named stand at the neutral position.
+        payload: what is carried, where it can be changed.
         inertia: overlay by link name; loop, actuation: parsed and kept, not simulated yet.
     """
 
@@ -135,6 +146,7 @@ class RobotSpec:
     limits: Limits = field(default_factory=Limits)
     workspace: Workspace = field(default_factory=Workspace)
     inertia: dict[str, LinkInertia] = field(default_factory=dict)
+    payload: Payload | None = None
     loop: tuple[Loop, ...] = ()
     actuation: tuple[Actuation, ...] = ()
 
@@ -222,6 +234,9 @@ def _check_values(declared: RobotFile, where: str) -> None:
     names = [arm.name for arm in declared.arm]
     if len(set(names)) < len(names):
         raise InputError(f"{where}: arm", f"two arms have one name ({', '.join(names)})", "rename one")
+    if (load := declared.payload) is not None and not 0.0 <= load.mass <= load.rating < math.inf:
+        text = f"mass {load.mass:g} kg is not within 0 and the rating of {load.rating:g} kg"
+        raise InputError(f"{where}: payload", text, "correct it")
     for link, inertia in declared.inertia.items():
         if not all(abs(x) <= LARGEST for x in (inertia.mass, *inertia.com, *inertia.inertia)):
             raise InputError(f"{where}: inertia.{link}", "holds a number beyond any physical size", "correct it")

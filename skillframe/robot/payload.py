@@ -1,0 +1,71 @@
+r"""A robot's payload as a parameter.
+
+robot.toml's `[payload]` names the link that carries it and how much of the link's mass it is. Where only the sum of
+link and load is published, with its centre of mass and inertia, another load m scales the link's whole spatial inertia,
+
+    I(m) = I_published (m_link - m_declared + m) / m_link,
+
+which keeps centre of mass and radii of gyration (our choice: nothing else can be said) and returns the published
+figures for the declared load.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+from skillframe.errors import InputError, UnknownName
+from skillframe.robot.numbers import INERTIA
+from skillframe.robot.spec import LinkInertia, RobotSpec
+from skillframe.robot.urdf import read_urdf
+
+
+def with_payload(spec: RobotSpec, mass: float) -> RobotSpec:
+    """The robot carrying another payload.
+
+    Args:
+        spec: has a `payload`.
+        mass: of the payload [kg].
+
+    Raises:
+        InputError: the robot declares no payload; the mass is negative or above the rating.
+        UnknownName: the declared link is not in the URDF.
+    """
+    where = f"{spec.folder / 'robot.toml'}: payload"
+    if spec.payload is None:
+        raise InputError(where, "the robot declares no payload", "add [payload] with link, mass and rating")
+    if not 0.0 <= mass <= spec.payload.rating:
+        text = f"{mass:g} kg is not within 0 and the rating of {spec.payload.rating:g} kg"
+        raise InputError(where, text, "carry less")
+    link, published = spec.payload.link, _published(spec)
+    left = published.mass - spec.payload.mass
+    if left < 0.0:
+        text = f"link {link!r} weighs {published.mass:g} kg, less than the payload of {spec.payload.mass:g} kg in it"
+        raise InputError(where, text, "correct the payload's mass")
+    scale = (left + mass) / published.mass
+    xx, yy, zz, xy, xz, yz = (scale * x for x in published.inertia)
+    loaded = dataclasses.replace(published, mass=scale * published.mass, inertia=(xx, yy, zz, xy, xz, yz))
+    return dataclasses.replace(
+        spec, inertia=spec.inertia | {link: loaded}, payload=dataclasses.replace(spec.payload, mass=mass)
+    )
+
+
+def _published(spec: RobotSpec) -> LinkInertia:
+    """Inertia of the link that carries the load, from robot.toml's overlay or else the URDF."""
+    assert spec.payload is not None
+    name = spec.payload.link
+    if name in spec.inertia:
+        return spec.inertia[name]
+    links = read_urdf(spec.urdf).links
+    if name not in links:
+        raise UnknownName("link", name, links, f"named in {spec.name}'s [payload]")
+    inertial = links[name].find("inertial")
+    origin = inertial.find("origin") if inertial is not None else None
+    mass, inertia = (inertial.find(tag) if inertial is not None else None for tag in ("mass", "inertia"))
+    turned = origin is not None and any(float(x) for x in origin.get("rpy", "0").split())
+    if mass is None or inertia is None or turned:
+        text = f"the inertia of link {name!r} is missing, or given in turned axes"
+        raise InputError(spec.urdf, text, "write it in the link's axes")
+    com = tuple(float(x) for x in (origin.get("xyz", "0 0 0") if origin is not None else "0 0 0").split())
+    values = {key: float(inertia.get(key, 0.0)) for key in INERTIA}
+    in_order = tuple(values[key] for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
+    return LinkInertia(mass=float(mass.get("value", 0.0)), com=com, inertia=in_order)  # type: ignore[arg-type]
