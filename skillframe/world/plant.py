@@ -177,7 +177,8 @@ class Plant:
 
     def body_poses(self) -> tuple[Float, Float]:
         """Positions (N, B, 3) and quaternions x, y, z, w (N, B, 4) of the drawn bodies: all but the world."""
-        return self._xpos[:, 1:], self._xquat[:, 1:][..., [1, 2, 3, 0]]
+        quaternion = self._xquat[:, 1:]
+        return self._xpos[:, 1:], np.concatenate([quaternion[..., 1:], quaternion[..., :1]], axis=-1)
 
 
 def grasp_pose(draws: Draws, count: int) -> Pose | None:
