@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+
 from skillframe.demonstrate import record
 from skillframe.demonstration.record import Demonstration
 from skillframe.frames import Float
@@ -12,6 +13,7 @@ from skillframe.prepare import load_robot_model, load_world
 from skillframe.records import Document, LearnOptions
 from skillframe.registry import registry
 from skillframe.teacher import TeacherSettings
+from skillframe.world.sensors import SensorSettings
 
 SEED = 20261121
 PAIRS = 20
@@ -20,12 +22,12 @@ DOWN = np.array([0.0, 0.0, -1.0])
 
 def taught(
     world: str, params: dict[str, Any], noise_deg: float, *, pairs: int = PAIRS, each: int = 2, seed: int = SEED,
-    robot: str = "free_tool", **person: Any,
+    robot: str = "free_tool", sensors: SensorSettings | None = None, **person: Any,
 ) -> tuple[list[list[Demonstration]], int]:  # fmt: skip
     """Groups of `each` demonstrations by independent seeds, and how many attempts were rejected on the way."""
     settings = TeacherSettings(aim_noise=float(np.deg2rad(noise_deg)), **person)
     scene = load_world(world, params)
-    recording = record(load_robot_model(robot), scene, settings, count=pairs * each, seed=seed)
+    recording = record(load_robot_model(robot), scene, settings, count=pairs * each, seed=seed, sensors=sensors)
     demonstrations = recording.demonstrations
     return [demonstrations[each * i : each * (i + 1)] for i in range(pairs)], len(recording.rejected)
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.stats import binomtest
+
 from skillframe.executor import Result, simulate
 from skillframe.prepare import load_robot_model, load_world, prepare
 from skillframe.records import Document, LearnOptions
 from skillframe.registry import registry
 from skillframe.skillsource import learned
-
 from tests.figures.teaching import SEED, row, taught
 
 pytestmark = [pytest.mark.figures, pytest.mark.needs_plugins]
