@@ -1,7 +1,7 @@
 """Prints the project's speed and memory figures, each beside its bound; `make bench` runs it.
 
-Ratios are taken side by side in one run and from CPU time, so that they hold on a busy machine too. A bound that is missed
-is marked; the exit code is 0 all the same, because a benchmark is read, not gated.
+Ratios are taken side by side in one run and from CPU time, so that they hold on a busy machine too. A bound that is
+missed is marked; the exit code is 0 all the same, because a benchmark is read, not gated.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from tests.laws.pushing import Push, impedance  # noqa: E402
 from tests.laws.runs import setup  # noqa: E402
 
 DOWN = (0.0, 0.0, -1.0)
-HEAVY = ("scipy", "casadi", "fmpy", "filterpy", "mujoco", "matplotlib", "pinocchio")
+HEAVY = {"scipy", "casadi", "fmpy", "filterpy", "mujoco", "matplotlib", "pinocchio"}
 CASES = {
     "arm in the valley": ("panda", "valley", impedance("x"), 0.03, 2.0),
     "arm with the peg": ("panda", "peg_in_hole", impedance("x", "y"), 0.02, 3.0),
