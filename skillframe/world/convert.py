@@ -16,6 +16,7 @@ import pinocchio as pin
 from skillframe.errors import SkillframeError
 from skillframe.frames import quaternion_from_matrix
 from skillframe.robot.model import RobotModel
+from skillframe.world.loops import close_loops
 from skillframe.world.scene import Geom, Scene, Tool
 
 TIMESTEP = 0.001
@@ -42,6 +43,7 @@ def build_spec(robot: RobotModel, scene: Scene, timestep: float = TIMESTEP) -> m
     spec.modelname = f"{robot.spec.name} in {scene.name}"
     _set_options(spec, timestep)
     bodies = _add_robot(spec, robot.model)
+    close_loops(spec, robot.model, robot.spec.loop, bodies)
     _add_tool(spec, robot, scene, bodies)
     fixture = spec.worldbody.add_body(name=FIXTURE, mocap=True)
     for index, geom in enumerate(scene.fixture):
