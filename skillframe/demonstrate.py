@@ -17,7 +17,8 @@ from skillframe.errors import SkillframeError
 from skillframe.executor import Result, Setup, simulate
 from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, rotate
 from skillframe.robot.model import RobotModel
-from skillframe.teacher import Teacher, TeacherSettings
+from skillframe.staged_teacher import teacher_for
+from skillframe.teacher import TeacherSettings
 from skillframe.trace import Trace
 from skillframe.world.placement import fixture_poses
 from skillframe.world.scene import Scene
@@ -100,10 +101,11 @@ def _attempt(
             start[key] = start.get(key, 0.0) + value if key.startswith("start.") else value
     keys = sorted({key for start in starts for key in start})
     columns = {key: np.array([start.get(key, 0.0) for start in starts]) for key in keys}
-    teacher = Teacher(scene.task, fixture_poses(robot, columns, len(slots)), settings)
+    teacher = teacher_for(scene, fixture_poses(robot, columns, len(slots)), settings)
+    last = (scene.task, *scene.task.then)[-1]
     setup = Setup(
         robot=robot, scene=scene, center_of_compliance=np.array(scene.tool.frames[scene.tool.hand]),
-        sensors=sensors or SensorSettings(), filter_wrench=False, stop_when=scene.task.done or scene.goal,
+        sensors=sensors or SensorSettings(), filter_wrench=False, stop_when=last.done or scene.goal,
     )  # fmt: skip
     rngs = [np.random.default_rng([seed, slot, attempt]) for slot in slots]
     return simulate(teacher, setup, columns, rngs, duration_s=duration_s, trace_hz=rate_hz)

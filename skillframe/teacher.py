@@ -121,6 +121,17 @@ class Teacher(Skill):
         self._delay = _Delay(round(self._settings.delay_s / observation.dt))
         self._arrival = _Delay(round(self._settings.delay_s / observation.dt))
 
+    def take_over(self, other: Teacher, observation: Observation) -> None:
+        """Go on where another hand of the same person leaves off: as hard a push, the same aim, tremor and delays."""
+        self.start(observation, other._rngs)
+        self._noise, self._next, self._aim, self._tremor = other._noise, other._next, other._aim, other._tremor
+        self._delay, self._arrival = other._delay, other._arrival
+        lead = other._position - observation.pose.position
+        self._position = observation.pose.position + lead * (other._hand.stiffness / self._hand.stiffness)
+        turned = rotation_vector(other._rotation @ np.swapaxes(observation.pose.rotation, -1, -2))
+        scale = other._hand.turn_stiffness / self._hand.turn_stiffness
+        self._rotation = rotation_matrix(scale * turned) @ observation.pose.rotation
+
     def step(self, observation: Observation) -> Command:
         """Move the hand one tick on and hold the tool with it."""
         noise = self._draw()

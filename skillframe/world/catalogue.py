@@ -8,7 +8,7 @@ from typing import Any
 from skillframe.config import build
 from skillframe.records import WorldType
 from skillframe.world.scene import Scene
-from skillframe.world.worlds import edge, free, funnel, hose_coupler, peg_in_hole, socket, valley
+from skillframe.world.worlds import corner, edge, free, funnel, hose_coupler, peg_in_hole, socket, valley
 
 
 def world_types() -> Iterable[WorldType]:
@@ -28,6 +28,10 @@ def world_types() -> Iterable[WorldType]:
     yield WorldType(
         name="socket", summary="a plug with two pins and a key, and its socket", params=socket.SocketParams,
         build=socket.build,
+    )  # fmt: skip
+    yield WorldType(
+        name="corner", summary="a box to set down and push into a corner", params=corner.CornerParams,
+        build=corner.build,
     )  # fmt: skip
 
 

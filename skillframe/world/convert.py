@@ -14,16 +14,17 @@ import numpy as np
 import pinocchio as pin
 
 from skillframe.errors import SkillframeError
-from skillframe.frames import quaternion_from_matrix
+from skillframe.frames import matrix_from_quaternion, quaternion_from_matrix
 from skillframe.robot.model import RobotModel
 from skillframe.world.loops import close_loops
-from skillframe.world.scene import Geom, Scene, Tool
+from skillframe.world.scene import Geom, Holder, Scene, Tool
 
 TIMESTEP = 0.001
 SOLREF = (0.004, 1.0)  # 4 time steps, critically damped
 SOLIMP = (0.01, 0.95, 1e-4, 0.5, 1.0)  # impedance ramps up from almost nothing at touch: no chatter
 IMPRATIO = 20.0  # friction stiff enough that a jammed peg does not creep in
-FIXTURE, TOOL, SENSOR = "fixture", "tool", "sensor"
+FIXTURE, TOOL, SENSOR, SECOND = "fixture", "tool", "sensor", "second_sensor"
+STICTION_SOLREF, STICTION_SOLIMP = (0.004, 1.0), (0.99, 0.999, 1e-3, 0.5, 2.0)  # joint friction that hardly creeps
 _KINDS = {
     "box": mujoco.mjtGeom.mjGEOM_BOX, "sphere": mujoco.mjtGeom.mjGEOM_SPHERE, "plane": mujoco.mjtGeom.mjGEOM_PLANE,
     "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE, "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
@@ -38,17 +39,23 @@ def wxyz(quaternion: Any) -> list[float]:
 
 
 def build_spec(robot: RobotModel, scene: Scene, timestep: float = TIMESTEP) -> mujoco.MjSpec:
-    """The robot holding the scene's tool, with the scene's fixture as a body that can be moved per trial."""
+    """The robot holding the scene's tool, with the scene's fixture in its second hand or placed anew per trial."""
     spec = mujoco.MjSpec()
     spec.modelname = f"{robot.spec.name} in {scene.name}"
     _set_options(spec, timestep)
     bodies = _add_robot(spec, robot.model)
     close_loops(spec, robot.model, robot.spec.loop, bodies)
     _add_tool(spec, robot, scene, bodies)
-    fixture = spec.worldbody.add_body(name=FIXTURE, mocap=True)
+    fixture = _add_holder(spec, robot, scene.holder, bodies) if scene.holder and held(robot, scene) else None
+    fixture = fixture or spec.worldbody.add_body(name=FIXTURE, mocap=True)
     for index, geom in enumerate(scene.fixture):
         add_geom(spec, fixture, geom, f"{FIXTURE}_{index}", contype=1, conaffinity=2, friction=scene.friction)
     return spec
+
+
+def held(robot: RobotModel, scene: Scene) -> bool:
+    """Does the robot's second arm hold the fixture?"""
+    return scene.holder is not None and len(robot.tool_frames) > 1
 
 
 def _set_options(spec: mujoco.MjSpec, timestep: float) -> None:
@@ -113,17 +120,39 @@ def _add_joint(body: Any, model: pin.Model, index: int) -> None:
 
 
 def _add_tool(spec: mujoco.MjSpec, robot: RobotModel, scene: Scene, bodies: dict[int, Any]) -> None:
-    frame = robot.model.frames[robot.tool_frames[0]]
-    mount = bodies[frame.parentJoint].add_body(name=SENSOR)
-    mount.pos = frame.placement.translation
-    mount.quat = wxyz(quaternion_from_matrix(frame.placement.rotation))
-    mount.add_site(name=SENSOR)
+    mount = _mount(robot, 0, bodies, SENSOR)
     body = mount.add_body(name=TOOL)
     set_inertia(body, tool_inertia(scene.tool))
     for index, geom in enumerate(scene.tool.geoms):
         add_geom(spec, body, geom, f"{TOOL}_{index}", contype=2, conaffinity=1, friction=scene.friction)
+    _add_sensors(spec, SENSOR)
+
+
+def _add_holder(spec: mujoco.MjSpec, robot: RobotModel, holder: Holder, bodies: dict[int, Any]) -> Any:
+    """The fixture as a body in the second arm's grip; that arm's joint friction holds still, not creep."""
+    body = _mount(robot, 1, bodies, SECOND).add_body(name=FIXTURE)
+    body.pos, body.quat = holder.position, wxyz(holder.quaternion)
+    in_hand = pin.SE3(matrix_from_quaternion(holder.quaternion), np.array(holder.position))
+    set_inertia(body, in_hand.actInv(tool_inertia(holder.tool)))
+    _add_sensors(spec, SECOND)
+    for joint in spec.joints:
+        joint.solref_friction, joint.solimp_friction = STICTION_SOLREF, STICTION_SOLIMP
+    return body
+
+
+def _mount(robot: RobotModel, arm: int, bodies: dict[int, Any], name: str) -> Any:
+    """The body of an arm's tool frame, where its force-torque sensor sits."""
+    frame = robot.model.frames[robot.tool_frames[arm]]
+    mount = bodies[frame.parentJoint].add_body(name=name)
+    mount.pos = frame.placement.translation
+    mount.quat = wxyz(quaternion_from_matrix(frame.placement.rotation))
+    mount.add_site(name=name)
+    return mount
+
+
+def _add_sensors(spec: mujoco.MjSpec, site: str) -> None:
     for name, kind in (("force", mujoco.mjtSensor.mjSENS_FORCE), ("torque", mujoco.mjtSensor.mjSENS_TORQUE)):
-        spec.add_sensor(name=name, type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=SENSOR)
+        spec.add_sensor(name=f"{site}_{name}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=site)
 
 
 def tool_inertia(tool: Tool) -> pin.Inertia:

@@ -14,6 +14,7 @@ from skillframe.errors import UnknownName
 from skillframe.frames import Float, Pose, matrix_from_quaternion
 from skillframe.robot.kinematics import inverse_kinematics
 from skillframe.robot.model import RobotModel
+from skillframe.world.convert import held
 from skillframe.world.plant import displacement
 from skillframe.world.scene import Scene
 
@@ -38,8 +39,9 @@ def check_quantities(draws: Mapping[str, Float]) -> None:
 
 
 def nominal_fixture(robot: RobotModel) -> Pose:
-    """Where the fixture stands for this robot: position (3,), upright."""
-    return Pose(np.array(robot.spec.workspace.fixture, dtype=float), np.eye(3))
+    """Where the fixture stands for this robot: position (3,), upright unless robot.toml turns it."""
+    place = robot.spec.workspace
+    return Pose(np.array(place.fixture, dtype=float), matrix_from_quaternion(place.attitude))
 
 
 def fixture_poses(robot: RobotModel, draws: Mapping[str, Float], count: int) -> Pose:
@@ -66,7 +68,7 @@ def start_poses(robot: RobotModel, scene: Scene, draws: Mapping[str, Float], cou
 
 
 def start_configurations(robot: RobotModel, scene: Scene, draws: Mapping[str, Float], count: int) -> Float:
-    """Configurations (N, nq) that put the tool frame at its start poses.
+    """Configurations (N, nq) that put the tool frame at its start poses, and a fixture in hand at the fixture's.
 
     Raises:
         UnreachablePose: the robot cannot get there.
@@ -75,4 +77,10 @@ def start_configurations(robot: RobotModel, scene: Scene, draws: Mapping[str, Fl
     solutions = [
         inverse_kinematics(robot, 0, Pose(poses.position[i], poses.rotation[i]), robot.home) for i in range(count)
     ]
+    if scene.holder is not None and held(robot, scene):
+        grip = Pose(np.array(scene.holder.position), matrix_from_quaternion(scene.holder.quaternion)).inverse()
+        hand = fixture_poses(robot, draws, count).compose(grip)
+        solutions = [
+            inverse_kinematics(robot, 1, Pose(hand.position[i], hand.rotation[i]), q) for i, q in enumerate(solutions)
+        ]
     return np.stack(solutions)

@@ -7,6 +7,7 @@ needs are read, not recomputed. Results are bit-identical for any number of tria
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from skillframe.frames import Float, Pose, cross, move_wrench, norm, quaternion_from_matrix, rotate, rotation_matrix
 from skillframe.robot.model import RobotModel
-from skillframe.world.convert import FIXTURE, SENSOR, TIMESTEP, TOOL, build_spec
+from skillframe.world.convert import FIXTURE, SECOND, SENSOR, TIMESTEP, TOOL, build_spec, held
 from skillframe.world.scene import Scene, State
 
 Draws = Mapping[str, Float]
@@ -57,9 +58,18 @@ class Plant:
         self.model = build_spec(robot, scene, timestep).compile()
         self.batch = mujoco.batch.Batch(self.model, count, nthread=1, persistent=True)
         self._layout = Layout(self.model)
-        self._fixture = fixture
+        self._fixture, self._held, self.tool = fixture, held(robot, scene), scene.tool
         self._apply(draws)
         self._bind()
+
+    def arms(self) -> list[Plant]:
+        """This plant as each of its arms' sensor and tool point see it; they share one state."""
+        if not self._held:
+            return [self]
+        second = copy.copy(self)
+        assert self.scene.holder is not None
+        second._layout, second.tool = Layout(self.model, SECOND, FIXTURE), self.scene.holder.tool
+        return [self, second]
 
     def _bind(self) -> None:
         bind = self.batch.bind
@@ -74,7 +84,8 @@ class Plant:
             friction = self.batch.expand("geom_friction")
             friction[:, :, 0] = draws["world.friction"][:, None]
         if "robot.joint_friction" in draws:
-            self.batch.expand("dof_frictionloss")[:] = draws["robot.joint_friction"][:, None]
+            friction_loss = draws["robot.joint_friction"][:, None] * self._layout.friction_share(self.robot)
+            self.batch.expand("dof_frictionloss")[:] = friction_loss
         grasp = grasp_pose(draws, self.count)
         inertial = False
         if grasp is not None:
@@ -94,8 +105,9 @@ class Plant:
     def reset(self, configuration: Float) -> None:
         """Put the robot at rest at configurations (N, nq), in Pinocchio's order, and the fixture at its pose."""
         self.batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
-        self._mocap_pos[:, 0] = self._fixture.position
-        self._mocap_quat[:, 0] = quaternion_from_matrix(self._fixture.rotation)[:, [3, 0, 1, 2]]
+        if not self._held:
+            self._mocap_pos[:, 0] = self._fixture.position
+            self._mocap_quat[:, 0] = quaternion_from_matrix(self._fixture.rotation)[:, [3, 0, 1, 2]]
         self._qpos[:] = self.engine_order(configuration)
         self._qvel[:] = 0.0
         self._applied[:] = 0.0
@@ -146,7 +158,7 @@ class Plant:
 
         It holds contact, tool weight and the tool's inertial forces; the reading is that of the step just taken.
         """
-        reading: Float = -self._sensor
+        reading: Float = -self._sensor[:, self._layout.readings]
         return reading
 
     def contact_wrench(self, offset: Float) -> Float:
@@ -161,17 +173,30 @@ class Plant:
         """Size (N,) of the true contact force on the tool [N]."""
         return norm(self._external[:, self._layout.tool, 3:])
 
+    def fixture_pose(self) -> Pose:
+        """True pose of the fixture in base, standing or in the second arm's grip."""
+        if not self._held:
+            return self._fixture
+        i = self._layout.fixture
+        return Pose(self._xpos[:, i], self._xmat[:, i].reshape(-1, 3, 3))
+
+    @property
+    def dofs(self) -> NDArray[np.int64]:
+        """Indices of the generalised velocities that move this arm's tool."""
+        return self._layout.dofs
+
     def tip_state(self) -> State:
         """The tool's tip seen from the true fixture, for goals."""
         i = self._layout.tool
         held = Pose(self._xpos[:, i], self._xmat[:, i].reshape(-1, 3, 3))
         tip = np.array(self.scene.tool.frames["tip"])
         in_base = held.at(tip)
-        in_fixture = self._fixture.inverse().compose(in_base)
+        fixture = self.fixture_pose()
+        in_fixture = fixture.inverse().compose(in_base)
         pose = self.tool_pose()
         offset = rotate(np.swapaxes(pose.rotation, -1, -2), in_base.position - pose.position)
         wrench = self.contact_wrench(offset)
-        back = np.swapaxes(self._fixture.rotation, -1, -2)
+        back = np.swapaxes(fixture.rotation, -1, -2)
         turned = np.concatenate([rotate(back, wrench[:, :3]), rotate(back, wrench[:, 3:])], axis=-1)
         return State(in_fixture, turned)
 
@@ -199,13 +224,15 @@ def displacement(draws: Draws, prefix: str, count: int) -> Pose | None:
 
 
 class Layout:
-    """Where things lie in the compiled model: body ids, joint addresses, the order of coordinates."""
+    """Where an arm's things lie in the compiled model: body ids, joint addresses, the order of coordinates."""
 
-    def __init__(self, model: mujoco.MjModel) -> None:
+    def __init__(self, model: mujoco.MjModel, sensor: str = SENSOR, tool: str = TOOL) -> None:
         self.model = model
-        self.sensor, self.tool = (model.body(name).id for name in (SENSOR, TOOL))
+        self.sensor, self.tool, self.fixture = (model.body(name).id for name in (sensor, tool, FIXTURE))
         self.root = int(model.body_rootid[self.tool])
-        fixed = {0, model.body(FIXTURE).id, self.tool, self.sensor}
+        first = int(model.sensor(f"{sensor}_force").adr[0])
+        self.readings = slice(first, first + 6)
+        fixed = {0} | {b for b in range(model.nbody) if model.body(b).name in (FIXTURE, TOOL, SENSOR, SECOND)}
         self.links = np.array([b for b in range(model.nbody) if b not in fixed])
         self.free = bool(model.njnt and model.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE)
         self._set_chain(model)
@@ -223,6 +250,14 @@ class Layout:
         self.turns, self.shifts = len(hinges) > 0, len(slides) > 0
         self.hinges, self.hinge_dofs = _span(hinges), _span(model.jnt_dofadr[hinges])
         self.slides, self.slide_dofs = _span(slides), _span(model.jnt_dofadr[slides])
+        self.dofs = np.sort(model.jnt_dofadr[np.concatenate([hinges, slides])]).astype(np.int64)
+
+    def friction_share(self, robot: RobotModel) -> Float:
+        """(nv,) part of the drawn joint friction that each generalised velocity gets."""
+        share = np.ones(self.model.nv)
+        for name, part in robot.spec.friction_share.items():
+            share[self.model.joint(name).dofadr[0]] = part
+        return share
 
     def jacobian(self, anchor: Float, axis: Float, xmat: Float, point: Float) -> Float:
         """(N, 6, nv): for a hinge [a x (p - anchor); a], for a slide [a; 0], for a free base [1, -[r]x R; 0, R]."""

@@ -99,7 +99,9 @@ class Task:
         turn: rotation vector along which a levering teacher turns the tool, or None.
         hand: "aligning" (soft and active in rotation), "sliding", "hold" or "lever".
         starts: nominal starts of the demonstrations, cycled through: dicts of `start.*` quantities.
-        done: predicate of a finished demonstration; the goal if None.
+        done: predicate of a finished demonstration, or of a finished stage; the goal if None.
+        then: stages that follow, in order, once `done` has held for a person's reaction time; the last one's `done`
+            ends the demonstration, their starts are not looked at.
         believed: what a blindfolded person knows instead of all this: standard deviations of where the goal is,
             relative to the start, along and across the surface [m] and about its normal [rad].
     """
@@ -110,6 +112,7 @@ class Task:
     hand: str = "sliding"
     starts: tuple[dict[str, float], ...] = ({},)
     done: Callable[[State], NDArray[np.bool_]] | None = None
+    then: tuple[Task, ...] = ()
     believed: Vector = (0.004, 0.004, 0.0)
 
 

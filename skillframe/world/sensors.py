@@ -51,7 +51,7 @@ class Sensors:
         self._bias = _biases(settings, self._rngs, draws)  # what is left of it after taring, from then on
         self._noise, self._turn = np.zeros((count, BLOCK, 12)), np.zeros((count, BLOCK, 3, 3))
         self._next = BLOCK
-        tool = plant.scene.tool
+        tool = plant.tool
         self._weight = tool.mass * np.array(plant.model.opt.gravity)
         self._com = np.array(tool.center_of_mass)
 

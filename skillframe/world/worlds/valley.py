@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from skillframe.frames import Float
 from skillframe.world.scene import Geom, Scene, State, Task
-from skillframe.world.shapes import TOOL_COLOUR, shaft, slope
+from skillframe.world.shapes import FIXTURE_COLOUR, TOOL_COLOUR, shaft, slope
 from skillframe.world.worlds.common import TOOL_DOWN, WRIST_TO_TIP, require, tool
 
 
@@ -27,6 +27,8 @@ class ValleyParams:
         radius: of the ball at the tip [m].
         length: of each side along the slope [m].
         tolerance: horizontal distance from the bottom that counts as there [m].
+        along: distance along the valley, towards +y, to a wall that the ball is to be slid to [m]; 0: there is no wall,
+            and the bottom is the goal (seed, Fig. 17: two phases).
     """
 
     slope: float = 0.7853981633974483
@@ -34,6 +36,7 @@ class ValleyParams:
     radius: float = 0.005
     length: float = 0.12
     tolerance: float = 0.001
+    along: float = 0.0
 
 
 def build(params: ValleyParams) -> Scene:
@@ -44,6 +47,7 @@ def build(params: ValleyParams) -> Scene:
             "0 < slope < 1.4 rad": 0.0 < params.slope < 1.4,
             "friction >= 0": params.friction >= 0.0,
             "radius, length and tolerance > 0": min(params.radius, params.length, params.tolerance) > 0.0,
+            "0 <= along < 0.07 m": 0.0 <= params.along < 0.07,
         },
     )
     resting = params.radius / np.cos(params.slope)
@@ -58,22 +62,46 @@ def build(params: ValleyParams) -> Scene:
         reached: NDArray[np.bool_] = (distance(state) < params.tolerance) & resting_on_both
         return reached
 
+    def remaining(state: State) -> Float:
+        return np.maximum(params.along - state.tip.position[..., 1], 0.0)
+
+    def at_wall(state: State) -> NDArray[np.bool_]:
+        reached: NDArray[np.bool_] = at_bottom(state) & (remaining(state) < params.tolerance)
+        return reached
+
+    goal = at_wall if params.along else at_bottom
+    slide_along = Task(direction=(0.0, 0.8, -0.6), hand="sliding")
     return Scene(
         name="valley",
         fixture=(
             slope(params.slope, 0.0, params.length, 0.16),
             slope(params.slope, np.pi, params.length, 0.16),
+            *_wall(params),
         ),
         tool=tool((ball, shaft(0.004, 0.01, WRIST_TO_TIP - params.radius)), hand="grip"),
         friction=params.friction,
         start_tip=(0.0, 0.0, float(resting + 0.004)),
         start_quaternion=TOOL_DOWN,
         start_lift=lambda offset, tilt: np.abs(offset[..., 0]) * np.tan(params.slope),
-        goal=at_bottom,
-        goal_error=lambda state: (distance(state), np.zeros(len(state.tip.position))),
+        goal=goal,
+        goal_error=lambda state: (
+            distance(state) + (remaining(state) if params.along else 0.0), np.zeros(len(state.tip.position))
+        ),
         task=Task(
             direction=(0.0, 0.0, -1.0), hand="sliding",
             starts=({"start.offset_x": 0.04}, {"start.offset_x": -0.04}),
+            done=at_bottom if params.along else None, then=(slide_along,) if params.along else (),
         ),
         analytic={"largest_tilt_rad": float(params.slope - np.arctan(params.friction))},
     )  # fmt: skip
+
+
+def _wall(params: ValleyParams) -> tuple[Geom, ...]:
+    """What the ball comes to rest against after `along`."""
+    if not params.along:
+        return ()
+    thickness = 0.005
+    place = params.along + params.radius + thickness
+    return (
+        Geom(kind="box", size=(0.03, thickness, 0.03), position=(0.0, place, 0.03), rgba=FIXTURE_COLOUR),
+    )

@@ -1,0 +1,91 @@
+"""`corner`: a box set down on a table and pushed into the corner of two walls (seed, Fig. 2b); sizes are ours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.frames import Float, norm
+from skillframe.world.scene import Geom, Scene, State, Task
+from skillframe.world.shapes import FIXTURE_COLOUR, TOOL_COLOUR, shaft
+from skillframe.world.worlds.common import TOOL_DOWN, require, tool
+
+TIP, WALL = 0.12, 0.01
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CornerParams:
+    """Parameters of `corner`.
+
+    Attributes:
+        size: length of the box's edges [m].
+        friction: Coulomb coefficient.
+        away: nominal distance of the box from both walls [m].
+        above: nominal height of the box over the table [m].
+        tolerance: distance from each wall and the table that counts as there [m].
+    """
+
+    size: float = 0.05
+    friction: float = 0.2
+    away: float = 0.05
+    above: float = 0.03
+    tolerance: float = 0.0015
+
+
+def build(params: CornerParams) -> Scene:
+    """The walls stand where x and y of the box's lower middle would be zero; the table's top is z = 0."""
+    require(
+        "corner",
+        {
+            "0.01 < size < 0.1 m": 0.01 < params.size < 0.1,
+            "0 < away < 0.1 m and 0 < above < 0.1 m": 0.0 < params.away < 0.1 and 0.0 < params.above < 0.1,
+            "friction >= 0 and tolerance > 0": params.friction >= 0.0 and params.tolerance > 0.0,
+        },
+    )
+    half = 0.5 * params.size
+    box = Geom(kind="box", size=(half, half, half), position=(0.0, 0.0, TIP - half), rgba=TOOL_COLOUR)
+
+    def distance(state: State) -> Float:
+        return norm(state.tip.position)
+
+    def on_table(state: State) -> NDArray[np.bool_]:
+        down: NDArray[np.bool_] = state.tip.position[..., 2] < params.tolerance
+        return down
+
+    def in_corner(state: State) -> NDArray[np.bool_]:
+        there: NDArray[np.bool_] = np.all(np.abs(state.tip.position) < params.tolerance, axis=-1)
+        return there
+
+    push = Task(direction=(0.6, 0.6, -0.5291502622129182), hand="sliding")
+    return Scene(
+        name="corner",
+        fixture=_fixture(half),
+        tool=tool((box, shaft(0.008, 0.01, TIP - params.size)), tip=TIP, hand="grip"),
+        friction=params.friction,
+        start_tip=(-params.away, -params.away, params.above),
+        start_quaternion=TOOL_DOWN,
+        start_lift=lambda offset, tilt: params.size * np.abs(np.sin(norm(tilt))),
+        goal=in_corner,
+        goal_error=lambda state: (distance(state), np.zeros(len(state.tip.position))),
+        task=Task(
+            direction=(0.0, 0.0, -1.0), hand="sliding", done=on_table, then=(push,),
+            starts=({"start.offset_x": 0.025}, {"start.offset_y": 0.025}),
+        ),
+    )  # fmt: skip
+
+
+def _fixture(half: float) -> tuple[Geom, ...]:
+    """Table and two walls, each a box."""
+    reach, height = 0.12, 0.04
+    table = Geom(kind="box", size=(reach, reach, 0.02), position=(-0.05, -0.05, -0.02), rgba=FIXTURE_COLOUR)
+    walls = [
+        Geom(
+            kind="box", size=(WALL, reach, height), position=(half + WALL, -0.05, height - 0.02), rgba=FIXTURE_COLOUR
+        ),
+        Geom(
+            kind="box", size=(reach, WALL, height), position=(-0.05, half + WALL, height - 0.02), rgba=FIXTURE_COLOUR
+        ),
+    ]
+    return (table, *walls)
