@@ -1,0 +1,127 @@
+r"""Is the step small enough for the load? Two numbers per bond, measured on the actuators themselves.
+
+Holding an actuator's force over a step H makes the bond a sampled spring and damper: \(\omega_h H\) with
+\(\omega_h = \sqrt{k/m}\), and \(c H / m\), where k is the force per displacement over one step, c the force per
+velocity at once (direct feedthrough, such as friction), and m the mass the bond feels. Limits are our choice from
+measurements: with the acceleration given to the actuator, warn above 0.3 and refuse above 1.0; without it, a third.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from skillframe.actuation.actuator import Actuators
+from skillframe.cosim.plant import Float
+from skillframe.errors import SkillframeError
+
+WARN, REFUSE, PLAIN_SHARE = 0.3, 1.0, 1.0 / 3.0
+SPEED = 1e-3  # m/s, of the trial motion
+
+
+class StepTooLarge(SkillframeError):
+    """The step cannot be stable with this load; the sentence has the numbers and the step that would do."""
+
+
+class Coupling(NamedTuple):
+    """Numbers of every bond, (count,) each.
+
+    Attributes:
+        stiffness: force per displacement over a step [N/m]; feedthrough: force per velocity at once [N s/m].
+        frequency: \\(\\omega_h\\) [rad/s].
+        oscillation: \\(\\omega_h H\\); damping: \\(c H/m\\), both without a unit.
+        limit: what the larger of the two must stay below.
+    """
+
+    stiffness: Float
+    feedthrough: Float
+    frequency: Float
+    oscillation: Float
+    damping: Float
+    limit: Float
+
+    @property
+    def worst(self) -> Float:
+        """The larger number of each bond as a share of its limit."""
+        return np.maximum(self.oscillation, self.damping) / self.limit
+
+
+def coupling_numbers(bank: Actuators, mass: Float, step: float, time: float = 0.0) -> Coupling:
+    """Try the actuators out at their present inputs with a slow push and pull; they are back afterwards.
+
+    Args:
+        bank: started; position inputs at the pose to be judged.
+        mass: (count,) that each bond feels [kg].
+        step: macro step [s].
+        time: present time [s].
+
+    Raises:
+        SkillframeError: an actuator cannot be set back, or refuses the trial.
+    """
+    kept, velocity = bank.u.copy(), bank.inputs.index("velocity")
+    forward, back = (_pushed(bank, sign * SPEED, step, time, kept, velocity) for sign in (1.0, -1.0))
+    bank.u[:] = kept
+    bank.refresh()
+    stiffness = np.maximum((back[0] - forward[0]) / (2 * SPEED * step), 0.0)
+    feedthrough = np.maximum((back[1] - forward[1]) / (2 * SPEED), 0.0)
+    frequency = np.sqrt(stiffness / mass)
+    takes = np.array([bank.capabilities(i).acceleration for i in range(bank.count)])
+    limit = np.where(takes, REFUSE, REFUSE * PLAIN_SHARE)
+    return Coupling(stiffness, feedthrough, frequency, frequency * step, feedthrough * step / mass, limit)
+
+
+def _pushed(bank: Actuators, speed: float, step: float, time: float, kept: Float, velocity: int) -> tuple[Float, Float]:
+    """(force after moving for a step and stopping, force at once at that speed)."""
+    force = bank.outputs.index("force")
+    if not all(bank.capabilities(i).rollback for i in range(bank.count)):
+        raise SkillframeError("the coupling cannot be tried out: an actuator's state cannot be restored")
+    bank.u[:] = kept
+    bank.u[:, velocity] = speed
+    bank.refresh()
+    at_once = bank.y[:, force].copy()
+    bank.save()
+    fine = bank.step(time, step)
+    bank.u[:] = kept
+    bank.u[:, bank.inputs.index("position")] += speed * step
+    bank.u[:, velocity] = 0.0
+    fine = bank.refresh() and fine
+    after = bank.y[:, force].copy()
+    bank.restore()
+    if not fine:
+        problem = next((p for p in map(bank.problem, range(bank.count)) if p), "an actuator refused")
+        raise SkillframeError(f"the coupling cannot be tried out: {problem}")
+    return after, at_once
+
+
+def require_stable(
+    coupling: Coupling, step: float, names: Sequence[str], warn: Callable[[str], None] = lambda text: None
+) -> None:
+    """Refuse a step that cannot be stable; warn about one that will be inaccurate.
+
+    Raises:
+        StepTooLarge: with the bond, its numbers, and a step that would do.
+    """
+    share = WARN / REFUSE
+    for i, worst in enumerate(coupling.worst):
+        if worst <= share:
+            continue
+        name = names[i % len(names)]
+        text = (
+            f"{name}: with a step of {step * 1e3:g} ms omega_h H = {coupling.oscillation[i]:.2g} and"
+            f" c H/m = {coupling.damping[i]:.2g}"
+        )
+        if worst > 1.0:
+            raise StepTooLarge(
+                f"{text}, above {coupling.limit[i]:.2g}, which is unstable;"
+                f" take {_enough(worst, step) * 1e3:.2g} ms or less"
+            )
+        warn(
+            f"{text}, above {share * coupling.limit[i]:.2g};"
+            f" take {_enough(worst / share, step) * 1e3:.2g} ms for accuracy"
+        )
+
+
+def _enough(worst: float, step: float) -> float:
+    return step / worst
