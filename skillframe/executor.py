@@ -204,7 +204,7 @@ class _Loop:
             self.skill.start(observation, self.skill_rngs)
         command = self.skill.step(observation)
         torque, law = self._torque(command, reading, min(1.0, time / RAMP_S))
-        self.peak[self.active] = np.maximum(self.peak, self.plant.contact_force())[self.active]
+        np.maximum(self.peak, self.plant.contact_force(), out=self.peak)  # of ended trials it no longer changes
         if self.recorder is not None:
             self.recorder.record(tick, time, observation, command, law)
         self._stop_where_due(tick, time, observation, command, tool.position, law)

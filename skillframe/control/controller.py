@@ -17,7 +17,7 @@ from skillframe.frames import Float, Pose
 from skillframe.skill import Command, Impedance
 
 NULL_SPACE_DAMPING = 10.0  # 1/s; ours: settles the elbow within half a second
-REFRESH = 20  # ticks between two null-space projectors; the posture hardly changes in 20 ms
+REFRESH = 40  # ticks between two null-space projectors; the posture hardly changes in 40 ms
 
 
 class Reading(NamedTuple):

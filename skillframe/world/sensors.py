@@ -49,7 +49,7 @@ class Sensors:
         count = len(self._rngs)
         self._scale = _noise_scales(settings, count, draws)
         self._bias = _biases(settings, self._rngs, draws)  # what is left of it after taring, from then on
-        self._noise, self._turn = np.zeros((count, BLOCK, 12)), np.zeros((count, BLOCK, 3, 3))
+        self._noise, self._turn = np.zeros((BLOCK, count, 12)), np.zeros((BLOCK, count, 3, 3))
         self._next = BLOCK
         tool = plant.tool
         self._weight = tool.mass * np.array(plant.model.opt.gravity)
@@ -59,13 +59,13 @@ class Sensors:
         """Noise of force, torque and position (N, 12), and the rotation (N, 3, 3) that attitude noise turns by."""
         if self._next == BLOCK:
             for i, rng in enumerate(self._rngs):
-                self._noise[i] = rng.standard_normal((BLOCK, 12))
-            self._noise *= self._scale[:, None]
+                self._noise[:, i] = rng.standard_normal((BLOCK, 12))
+            self._noise *= self._scale
             self._turn = _small_rotation(self._noise[..., 9:])
             self._next = 0
         now = self._next
         self._next += 1
-        return self._noise[:, now], self._turn[:, now]
+        return self._noise[now], self._turn[now]
 
     def sample(self, pose: Pose) -> tuple[Pose, Float]:
         """Measured pose of the tool frame, and the wrench (N, 6) on the tool there without weight and tare, base axes.

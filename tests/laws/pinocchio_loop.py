@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 DT = 1e-3
-TARE_TICKS, RAMP, REFRESH = 100, 0.05, 20
+TARE_TICKS, RAMP, REFRESH = 100, 0.05, 40
 HOLD_STIFFNESS = np.diag([2000.0] * 3 + [100.0] * 3)
 FLOOR = (20.0, 0.3)
 WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
