@@ -127,6 +127,8 @@ def value_text(value: Any) -> Markup:
         return escape("yes" if value else "no")
     if isinstance(value, int | float):
         return escape(number(float(value), 4) if math.isfinite(value) else value)
+    if isinstance(value, list) and value and all(isinstance(v, Mapping) for v in value):
+        return escape(f"{len(value)} records, drawn above")
     if isinstance(value, list) and value and all(isinstance(v, list) for v in value):
         return join((value_text(row) for row in value), "<br>")
     if isinstance(value, list):
