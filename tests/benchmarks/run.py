@@ -31,10 +31,10 @@ DOWN = (0.0, 0.0, -1.0)
 HEAVY = {"scipy", "casadi", "fmpy", "filterpy", "mujoco", "matplotlib", "pinocchio"}
 CASES = {
     "arm in the valley": ("panda", "valley", impedance("x"), 0.03, 2.0),
-    "arm with the peg": ("panda", "peg_in_hole", impedance("x", "y"), 0.02, 3.0),
-    "free tool with the peg": ("free_tool", "peg_in_hole", impedance("x", "y"), 0.02, 3.0),
+    "arm with the peg": ("panda", "peg_in_hole", impedance("x", "y"), 0.02, 1.5),
+    "free tool with the peg": ("free_tool", "peg_in_hole", impedance("x", "y"), 0.02, 1.5),
 }
-COUNT, REPLAYED = 256, 24
+COUNT, REPLAYED, REPEATS = 256, 24, 3  # the round with the median ratio is shown
 
 
 def show(what, value, unit, bound=None, below=True):
@@ -59,11 +59,13 @@ def case(name):
 def batch(name):
     """Batch of 256 against the floor and against one trial at a time."""
     setting, draws, stiffness, speed, duration = case(name)
-    with Recorded(keep=REPLAYED) as recorded:
-        cpu, _, _ = timed_run(Push(DOWN, stiffness, speed=speed, stall=False), setting, draws, COUNT, duration)
-    floor = replay(setting, recorded)
-    physics = recorded.seconds / COUNT / (duration + 0.1)
-    alone = one_trial_loop(setting, np.array(DOWN), stiffness, speed, draws, 4, round(1000 * duration))
+    rounds = []
+    for _ in range(REPEATS):
+        with Recorded(keep=REPLAYED) as recorded:
+            cpu, _, _ = timed_run(Push(DOWN, stiffness, speed=speed, stall=False), setting, draws, COUNT, duration)
+        alone = one_trial_loop(setting, np.array(DOWN), stiffness, speed, draws, 4, round(1000 * duration))
+        rounds.append((replay(setting, recorded), cpu, alone, recorded.seconds / COUNT / (duration + 0.1)))
+    floor, cpu, alone, physics = sorted(rounds, key=lambda r: r[1] / r[0])[len(rounds) // 2]
     show(f"{name}: bare mj_step", 1e3 * floor, "us/ms")
     show(f"{name}: batch of {COUNT}", 1e3 * cpu, "us/ms")
     show(f"{name}: one-trial loop", 1e3 * alone, "us/ms")
@@ -77,7 +79,7 @@ def single(name, bound):
     setting, draws, stiffness, speed, duration = case(name)
     draws = {key: values[-40:-39] for key, values in draws.items()}
     skill = Push(DOWN, stiffness, speed=speed, stall=False)
-    cpu, wall, result = timed_run(skill, setting, draws, 1, duration)
+    cpu, wall, result = timed_run(skill, setting, draws, 1, 2.0 * duration)
     touching = np.mean(np.abs(result.traces[0].wrench_true[:, :3]).sum(-1) > 0.0)
     show(
         f"{name}, one run, in contact {100 * touching:.0f} % of the time: real time", 1.0 / cpu, "x", bound, below=False
