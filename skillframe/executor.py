@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +45,7 @@ class Setup:
     Attributes:
         robot: the nominal robot.
         scene: the task.
-        center_of_compliance: (3,) point of the tool frame that the skill sees and steers.
+        center_of_compliance: (3,) point of the tool frame that the skill sees and steers; (arms, 3) for several arms.
         sensors: noise of the sensors.
         filter_wrench: False hands the raw wrench to the skill and the limits.
         stop_when: ends a trial as done, looked at every 10 ms; None leaves the end to the skill.
@@ -116,7 +117,7 @@ def simulate(
     """
     check_quantities(draws)
     with np.errstate(invalid="ignore", over="ignore"):  # a diverging trial is the limits' business, not a warning
-        loop = _Loop(skill, setup, draws, rngs, trace_hz)
+        loop = Loop(skill, setup, draws, rngs, trace_hz)
         loop.tare()
         loop.run(duration_s, progress)
         return loop.result()
@@ -128,15 +129,18 @@ def _joint_limits(robot: RobotModel) -> Limits:
     return replace(limits, torque_rate_nm_s=None) if robot.spec.base == "free" else limits
 
 
-class _Loop:
-    """The state of one batch while it runs."""
+class Loop:
+    """The state of one batch while it runs.
+
+    What is measured and commanded has a row per trial; `skillframe.arms` runs it with a row per trial and arm.
+    """
 
     def __init__(
         self, skill: Skill, setup: Setup, draws: Draws, rngs: Sequence[np.random.Generator], trace_hz: float | None
     ) -> None:
         robot, scene, count = setup.robot, setup.scene, len(rngs)
         self.skill, self.setup, self.count = skill, setup, count
-        rate = robot.spec.control.rate_hz
+        self.rate = rate = robot.spec.control.rate_hz
         self.dt = 1.0 / rate
         children = [rng.spawn(2) for rng in rngs]
         self.skill_rngs = [pair[1] for pair in children]
@@ -145,35 +149,41 @@ class _Loop:
         varied = any(key.startswith("grasp.") or key == "robot.mass_scale" for key in draws)
         self.nominal = Plant(robot, scene, count, fixture, {}, timestep=self.dt) if varied else self.plant
         self.plant.reset(start_configurations(robot, scene, draws, count))
-        self.sensors = Sensors(setup.sensors, self.plant, [pair[0] for pair in children], draws)
+        self._prepare_rows()
+        self.sensors = self._sensors([pair[0] for pair in children], draws)
         self.filter = WrenchFilter(dt=self.dt).steady()
-        self.controller = ImpedanceController(count)
-        self.guard = LimitGuard(_joint_limits(robot), count, self.dt)
-        self.coc = np.asarray(setup.center_of_compliance, dtype=float)
+        self.controller = ImpedanceController(self.rows)
+        self.guard = LimitGuard(_joint_limits(robot), self.rows, self.dt)
         self.active = np.arange(count)
         self.reason, self.status = no_reasons(count), np.zeros(count, dtype=np.int64)
         self.limited = np.zeros(count, dtype=bool)
         self.duration, self.peak = np.zeros(count), np.zeros(count)
         self.goal, self.errors, self.energy = np.zeros(count, dtype=bool), np.zeros((count, 2)), np.zeros(count)
-        self.recorder = (
-            None if trace_hz is None else Recorder(self.plant, ratio(rate, trace_hz, "control", "the trace"), self.coc)
-        )
+        self.recorder = None if trace_hz is None else self._recorder(ratio(rate, trace_hz, "control", "the trace"))
         self.interrupted = False
+
+    def _prepare_rows(self) -> None:
+        self.coc, self.rows = np.asarray(self.setup.center_of_compliance, dtype=float), self.count
+
+    def _sensors(self, rngs: Sequence[np.random.Generator], draws: Draws) -> Sensors:
+        return Sensors(self.setup.sensors, self.plant, rngs, draws)
+
+    def _recorder(self, every: int) -> Recorder:
+        return Recorder(self.plant, every, self.coc)
 
     def tare(self) -> None:
         """Hold still before the start, let the readings settle, and take their mean as the sensor's bias."""
         kinematics = self._kinematics()
         hold = Pose(kinematics.pose.position.copy(), kinematics.pose.rotation.copy()).at(self.coc)
-        command = Command(
-            hold, np.zeros((self.count, 6)), HOLD, np.zeros((self.count, 6)), self.status, no_reasons(self.count)
-        )
-        total = np.zeros((self.count, 6))
+        still = np.zeros((self.rows, 6))
+        command = Command(hold, still, HOLD, still, self.status, no_reasons(self.rows))
+        total = still.copy()
         for _ in range(TARE_TICKS):
             kinematics = self._kinematics()
             pose, wrench = self.sensors.sample(kinematics.pose)
             total += wrench
             torque, _ = self._torque(command, self._reading(kinematics, pose.at(self.coc)), 1.0)
-            self.plant.step(torque, self.active)
+            self._drive(torque)
         self.sensors.set_tare(total / TARE_TICKS, self._kinematics().pose.rotation)
 
     def run(self, duration_s: float, progress: Callable[[float], None] | None) -> None:
@@ -199,17 +209,23 @@ class _Loop:
         tool, raw = self.sensors.sample(kinematics.pose)
         wrench = at_point(self._filtered(raw, tick), tool.rotation, self.coc)
         reading = self._reading(kinematics, tool.at(self.coc))
-        observation = Observation(np.full(self.count, time), self.dt, reading.pose, reading.twist, wrench)
-        if tick == 0:
-            self.skill.start(observation, self.skill_rngs)
-        command = self.skill.step(observation)
+        observation = Observation(np.full(self.rows, time), self.dt, reading.pose, reading.twist, wrench)
+        command = self._ask(tick, observation)
         torque, law = self._torque(command, reading, min(1.0, time / RAMP_S))
         np.maximum(self.peak, self.plant.contact_force(), out=self.peak)  # of ended trials it no longer changes
         if self.recorder is not None:
             self.recorder.record(tick, time, observation, command, law)
         self._stop_where_due(tick, time, observation, command, tool.position, law)
         if len(self.active):
-            self.plant.step(torque, self.active)
+            self._drive(torque)
+
+    def _ask(self, tick: int, observation: Observation) -> Command:
+        if tick == 0:
+            self.skill.start(observation, self.skill_rngs)
+        return self.skill.step(observation)
+
+    def _drive(self, torque: Float) -> None:
+        self.plant.step(torque, self.active)
 
     def _filtered(self, raw: Float, tick: int) -> Float:
         if not self.setup.filter_wrench:
@@ -226,9 +242,10 @@ class _Loop:
 
     def _reading(self, kinematics: Kinematics, measured: Pose) -> Reading:
         twist = (kinematics.jacobian @ kinematics.velocity[..., None])[..., 0]
-        return Reading(
-            measured, twist, kinematics.jacobian, kinematics.bias, kinematics.velocity, self.nominal.mass_matrix
-        )
+        return Reading(measured, twist, kinematics.jacobian, kinematics.bias, kinematics.velocity, self._mass_matrix)
+
+    def _mass_matrix(self) -> Float:
+        return self.nominal.mass_matrix()
 
     def _torque(self, command: Command, reading: Reading, ramp: float) -> tuple[Float, Float]:
         """Generalised forces (N, nv), held to the torque rate, and the law's wrench (N, 6)."""
@@ -239,7 +256,7 @@ class _Loop:
         self, tick: int, time: float, observation: Observation, command: Command, position: Float, law: Float
     ) -> None:
         twist, wrench = observation.twist, observation.wrench
-        for i, cause in self.guard.violations(position, twist, wrench, law, self.active):
+        for i, cause in self._violations(position, twist, wrench, law):
             self._end(np.array([i]), time, f"{cause} (at {time:.3f} s)", True)
         if command.status.any():
             for i in self.active[command.status[self.active] != Status.RUNNING]:
@@ -251,6 +268,13 @@ class _Loop:
             self.status[rows] = Status.SUCCESS
             self._end(rows, time, "done", False)
 
+    def _violations(self, position: Float, twist: Float, wrench: Float, law: Float) -> list[tuple[int, str]]:
+        """Trials that broke a limit, each with the cause in words."""
+        return self.guard.violations(position, twist, wrench, law, self.active)
+
+    def _energy(self, rows: NDArray[np.int64]) -> Float:
+        return self.guard.energy[rows]
+
     def _end(self, rows: NDArray[np.int64], time: float, reason: str, limit: bool) -> None:
         """Close trials: judge them by the scene's goal as they stand now, and stop stepping them."""
         if not len(rows):
@@ -258,7 +282,7 @@ class _Loop:
         state = self.plant.tip_state()
         self.goal[rows] = self.setup.scene.goal(state)[rows]
         self.errors[rows] = np.stack(self.setup.scene.goal_error(state), axis=-1)[rows]
-        self.energy[rows] = self.guard.energy[rows]
+        self.energy[rows] = self._energy(rows)
         self.duration[rows], self.limited[rows] = time, limit
         if limit:
             self.status[rows] = Status.FAILURE
@@ -285,7 +309,7 @@ class _Loop:
             energy_j=self.energy, traces=traces, interrupted=self.interrupted,
         )  # fmt: skip
 
-    def _meta(self, i: int, success: bool, failure: str) -> dict[str, object]:
+    def _meta(self, i: int, success: bool, failure: str) -> dict[str, Any]:
         scene = self.setup.scene
         return {
             "robot": self.setup.robot.spec.name, "world": scene.name, "params": scene.params,

@@ -55,9 +55,13 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Workspace:
-    """Where work is done: `fixture` is the place in base [m] where a world's fixture stands."""
+    """Where work is done: `fixture` is the place in base [m] where a world's fixture stands.
+
+    `attitude` (x, y, z, w) turns it from upright, for a fixture that a second arm holds sideways.
+    """
 
     fixture: Vector = (0.0, 0.0, 0.0)
+    attitude: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,6 +118,7 @@ class RobotFile:
     control: Control = field(default_factory=Control)
     limits: Limits = field(default_factory=Limits)
     workspace: Workspace = field(default_factory=Workspace)
+    friction_share: dict[str, float] = field(default_factory=dict)
     inertia: dict[str, LinkInertia] = field(default_factory=dict)
     payload: Payload | None = None
     loop: tuple[Loop, ...] = ()
@@ -130,6 +135,7 @@ class RobotSpec:
         base: "fixed", or "free" for a free-flying body.
         mimic: joints with a URDF mimic tag follow their leader; False makes every joint independent.
         home: joint positions by joint name [rad or m]; joints not named stand at the neutral position.
+        friction_share: part of the drawn `robot.joint_friction` that a joint gets, by name; 1 for joints not named.
         payload: what is carried, where it can be changed.
         inertia: overlay by link name; loop, actuation: parsed and kept, not simulated yet.
     """
@@ -145,6 +151,7 @@ class RobotSpec:
     control: Control = field(default_factory=Control)
     limits: Limits = field(default_factory=Limits)
     workspace: Workspace = field(default_factory=Workspace)
+    friction_share: dict[str, float] = field(default_factory=dict)
     inertia: dict[str, LinkInertia] = field(default_factory=dict)
     payload: Payload | None = None
     loop: tuple[Loop, ...] = ()
