@@ -4,10 +4,10 @@ Over a step the plant sees the force go linearly from F0 to F1. With the cubic H
 
 \(W = F_0\,\Delta x + (F_1 - F_0)\,(\Delta x / 2 + H (v_1 - v_0) / 12)\),
 
-exact for a cubic x(t) (integration by parts and the corrected trapezoidal rule). The difference to the actuator's own work
-is energy that the coupling has made or lost: it falls with the square of the step in a coupling of second order, which
-makes it a free monitor of convergence (after Sadjina et al., Engineering with Computers 33, 2017, who control the step
-by it).
+exact for a cubic x(t) (integration by parts and the corrected trapezoidal rule). The difference to the actuator's own
+work is energy that the coupling has made or lost: it falls with the square of the step in a coupling of second order,
+which makes it a free monitor of convergence (after Sadjina et al., Engineering with Computers 33, 2017, who control the
+step by it).
 """
 
 from __future__ import annotations

@@ -1,6 +1,5 @@
-"""Every test of FMUs builds into a cache of its own session and keeps its own list of allowed files."""
+"""FMUs of our cylinder and banks of it, for every test of actuators."""
 
-import os
 import sys
 from pathlib import Path
 
@@ -10,23 +9,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from skillframe.actuation.inspection import inspect_fmu
 from skillframe.actuation.library import find_fmu
-from skillframe.actuation.toolchain import find_compiler
+from tests import fmu_cache
 
-
-@pytest.fixture(scope="package", autouse=True)
-def own_cache(tmp_path_factory):
-    before = {name: os.environ.get(name) for name in ("XDG_CACHE_HOME", "XDG_CONFIG_HOME")}
-    for name in before:
-        os.environ[name] = str(tmp_path_factory.mktemp(name.lower()))
-    yield
-    for name, value in before.items():
-        os.environ.pop(name) if value is None else os.environ.__setitem__(name, value)
-
-
-@pytest.fixture(scope="package")
-def compiler():
-    if find_compiler() is None:
-        pytest.skip("no C compiler")
+compiler, own_cache = fmu_cache.compiler, fmu_cache.own_cache
 
 
 @pytest.fixture(params=[2, 3], ids=["fmi2", "fmi3"])

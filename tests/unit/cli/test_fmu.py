@@ -1,25 +1,15 @@
 """`skillframe fmu`: the contract's keys, exit codes and one-sentence refusals."""
 
 import json
-import os
 from pathlib import Path
 
 import pytest
 
 from skillframe.actuation.toolchain import find_compiler
 from skillframe.cli.main import run
+from tests.fmu_cache import own_cache  # noqa: F401
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
-
-
-@pytest.fixture(scope="module", autouse=True)
-def own_cache(tmp_path_factory):
-    before = {name: os.environ.get(name) for name in ("XDG_CACHE_HOME", "XDG_CONFIG_HOME")}
-    for name in before:
-        os.environ[name] = str(tmp_path_factory.mktemp(name.lower()))
-    yield
-    for name, value in before.items():
-        os.environ.pop(name) if value is None else os.environ.__setitem__(name, value)
 
 
 def said(capsys, *arguments):

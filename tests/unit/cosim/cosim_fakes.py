@@ -1,5 +1,6 @@
 """Mechanics in closed form, and the same coupled to the cylinder's equations in one system for scipy's Radau."""
 
+import itertools
 import math
 
 import numpy as np
@@ -99,7 +100,7 @@ def monolithic(boom, values, commands, hold, tolerance=1e-9):
 
         atol = [1e-11, 1e-11, 1e-10, 1e-8, 0.1, 0.1, 0.1, 1e-13]
         pieces = sorted({0.0, min(arrival, hold * 1e-3), hold * 1e-3})
-        for begin, end in zip(pieces[:-1], pieces[1:], strict=True):
+        for begin, end in itertools.pairwise(pieces):
             wanted = times[(times > begin) & (times <= end + 1e-12)]
             at = np.unique([*wanted, end])
             r = solve_ivp(f, (begin, end), y, method="Radau", rtol=tolerance, atol=atol, t_eval=at)

@@ -1,0 +1,23 @@
+"""Fixtures of tests that build FMUs: a cache and an allow-list of their own, and a compiler or a skip."""
+
+import os
+
+import pytest
+
+from skillframe.actuation.toolchain import find_compiler
+
+
+@pytest.fixture(scope="package", autouse=True)
+def own_cache(tmp_path_factory):
+    before = {name: os.environ.get(name) for name in ("XDG_CACHE_HOME", "XDG_CONFIG_HOME")}
+    for name in before:
+        os.environ[name] = str(tmp_path_factory.mktemp(name.lower()))
+    yield
+    for name, value in before.items():
+        os.environ.pop(name) if value is None else os.environ.__setitem__(name, value)
+
+
+@pytest.fixture(scope="package")
+def compiler():
+    if find_compiler() is None:
+        pytest.skip("no C compiler")

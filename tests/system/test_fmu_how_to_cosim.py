@@ -1,0 +1,24 @@
+"""What docs/how-to/co-simulation.md shows is run, and its mass ends where the oil puts it."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from skillframe.actuation.toolchain import find_compiler
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "how-to" / "co-simulation.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
+def test_the_python_of_the_page_runs(capsys):
+    names = {}
+    for block in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL):
+        exec(compile(block, "co-simulation.md", "exec"), names)
+    assert capsys.readouterr().out.rstrip().endswith("{}")  # no trouble
+    mass, master = names["mass"], names["master"]
+    assert 0.3 < mass.position[0] < 0.59
+    # speed is the valve's flow over the piston's area once the oil has settled, to its compression
+    area = 3.14159265 / 4 * 0.08**2
+    assert mass.velocity[0] == pytest.approx(names["bank"].y[0, 5] / area, rel=0.02)
+    assert master.residual[0] < 3e-4
