@@ -318,5 +318,6 @@ class Loop:
             "status": Status(int(self.status[i])).name, "duration_s": float(self.duration[i]),
             "peak_force_n": float(self.peak[i]), "final_error_m": float(self.errors[i, 0]),
             "final_error_rad": float(self.errors[i, 1]), "analytic": scene.analytic,
+            "events": [[time, text] for time, text in self.skill.journal(i)],
             "limits": asdict(_joint_limits(self.setup.robot)),
         }  # fmt: skip

@@ -99,6 +99,25 @@ class Skill(ABC):
     def step(self, observation: Observation) -> Command:
         """Answer one observation; must return at once."""
 
+    def restart(
+        self, rows: NDArray[np.intp], observation: Observation, rngs: Sequence[np.random.Generator]
+    ) -> None:  # fmt: skip
+        """Begin anew in some trials, as `start` would in them alone; the others go on undisturbed.
+
+        Compositions use it to let trials enter a skill at different times. A skill that does not provide it is run
+        there with one instance per trial.
+
+        Args:
+            rows: (M,) which trials.
+            observation: of all N trials.
+            rngs: M generators.
+        """
+        raise NotImplementedError(f"{type(self).__name__} cannot begin anew in some of its trials; see per_trial")
+
+    def journal(self, trial: int) -> list[tuple[float, str]]:
+        """What happened in a trial and why: times [s] and words; empty if there is nothing to tell."""
+        return []
+
 
 def no_reasons(count: int) -> Reasons:
     """An array of `count` empty reasons."""
@@ -120,6 +139,22 @@ class _PerTrial(Skill):
     def step(self, observation: Observation) -> Command:
         return stack_commands([skill.step(row(observation, i)) for i, skill in enumerate(self._skills)])
 
+    def restart(
+        self, rows: NDArray[np.intp], observation: Observation, rngs: Sequence[np.random.Generator]
+    ) -> None:  # fmt: skip
+        for i, rng in zip(rows.tolist(), rngs, strict=True):
+            self._skills[i] = self._make()
+            self._skills[i].start(row(observation, i), [rng])
+
+    def journal(self, trial: int) -> list[tuple[float, str]]:
+        return self._skills[trial].journal(0)
+
+
+def restartable(make: Callable[[], Skill]) -> Skill:
+    """A skill from a factory that can begin anew in some of its trials: itself, or one instance per trial."""
+    skill = make()
+    return per_trial(make) if type(skill).restart is Skill.restart else skill
+
 
 def per_trial(make: Callable[[], Skill]) -> Skill:
     """A batched skill out of a factory of skills written for one trial (N = 1 arrays), one instance per trial.
@@ -131,9 +166,13 @@ def per_trial(make: Callable[[], Skill]) -> Skill:
 
 def row(observation: Observation, i: int) -> Observation:
     """The observation of trial i alone, as a batch of one."""
-    s = slice(i, i + 1)
-    pose = Pose(observation.pose.position[s], observation.pose.rotation[s])
-    return Observation(observation.time[s], observation.dt, pose, observation.twist[s], observation.wrench[s])
+    return rows_of(observation, slice(i, i + 1))
+
+
+def rows_of(observation: Observation, rows: slice | NDArray[np.intp]) -> Observation:
+    """The observation of some trials as a batch of their own."""
+    pose = Pose(observation.pose.position[rows], observation.pose.rotation[rows])
+    return Observation(observation.time[rows], observation.dt, pose, observation.twist[rows], observation.wrench[rows])
 
 
 def stack_commands(commands: Sequence[Command]) -> Command:

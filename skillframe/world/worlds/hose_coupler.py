@@ -7,7 +7,7 @@ about the fixture's z, the lugs lie under the claws and rest against their backs
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ FACE = 0.15
 LUG, LUG_HEIGHT, PLAY = 0.008, 0.006, 0.0015  # reach and width of a lug, its height, room under the claw [m]
 FALL = 0.025  # how much higher the couplers that interlock start [m]
 TURN_TOLERANCE = 0.035  # [rad]
+TOUCH = 3.0  # force that a person feels [N]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,7 +76,10 @@ def build(params: HoseParams) -> Scene:
     low = FALL if locks else 0.0
     starts = [{"start.tilt_y": sign * float(np.deg2rad(8.0)), **({"start.offset_z": low} if locks else {})}
               for sign in (1.0, -1.0)]  # fmt: skip
-    twist = Task(direction=(0.0, 0.0, -1.0), turn=(0.0, 0.0, 1.0), hand="lever")
+    down = (0.0, 0.0, -1.0)
+    align = Task(direction=down, aligned=TOOL_DOWN, hand="aligning", done=flush, starts=(starts[0], starts[1]))
+    twist = Task(direction=down, turn=(0.0, 0.0, 1.0), hand="lever")
+    lower = Task(direction=down, hand="sliding", done=touched, then=(align, twist), starts=align.starts)
     return Scene(
         name="hose_coupler",
         fixture=(seat, *(_claws(params) if locks else ())),
@@ -88,11 +92,14 @@ def build(params: HoseParams) -> Scene:
         goal_error=(lambda state: (height(state), tilt_of(state) + unturned(state)))
         if locks
         else (lambda state: (height(state), tilt_of(state))),
-        task=Task(
-            direction=(0.0, 0.0, -1.0), aligned=TOOL_DOWN, hand="aligning", starts=(starts[0], starts[1]),
-            done=flush if locks else None, then=(twist,) if locks else (),
-        ),
+        task=lower if locks else replace(align, done=None),
     )  # fmt: skip
+
+
+def touched(state: State) -> NDArray[np.bool_]:
+    """The couplers touch, as a hand feels it (N,)."""
+    felt: NDArray[np.bool_] = state.wrench[..., 2] > TOUCH
+    return felt
 
 
 def turned(state: State) -> Float:
@@ -134,7 +141,9 @@ def _claws(params: HoseParams) -> tuple[Geom, ...]:
     return tuple(claws)
 
 
-def _around(radius: float, angle: float, ahead: float, height: float) -> tuple[Vector, tuple[float, ...]]:
+def _around(
+    radius: float, angle: float, ahead: float, height: float
+) -> tuple[Vector, tuple[float, float, float, float]]:
     """Place and attitude of a box at an angle, `ahead` of it along the circle, its middle at half of `height`."""
     out, along = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
     centre = radius * out + ahead * along

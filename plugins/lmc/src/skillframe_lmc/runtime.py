@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from skillframe.frames import Float, Pose, rotate, rotation_matrix, rotation_vector
 from skillframe.records import Document
-from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
+from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons, rows_of
 from skillframe_lmc.phase import Part, Phase, read_phase
 from skillframe_lmc.stall import StallWatch
 
@@ -62,7 +62,30 @@ class LmcSkill(Skill):
         self._twist = np.concatenate([self._push.velocity, self._turn.velocity], axis=1)
         self._nothing = np.zeros((n, 6))
         self._stall = StallWatch(self._stop)
-        self._first = True
+        self._fresh: NDArray[np.bool_] | None = np.ones(n, dtype=bool)
+
+    def restart(
+        self, rows: NDArray[np.intp], observation: Observation, rngs: Sequence[np.random.Generator]
+    ) -> None:  # fmt: skip
+        """Begin anew in some trials, from where their tools are now."""
+        some = rows_of(observation, rows)
+        anew = LmcSkill(self._phase, self._in_start_attitude)
+        anew.start(some, rngs)
+        for mine, theirs in (
+            (self._home.position, anew._home.position), (self._home.rotation, anew._home.rotation),
+            (self._began, anew._began), (self._status, anew._status), (self._reason, anew._reason),
+        ):  # fmt: skip
+            mine[rows] = theirs
+        self._push.replace(rows, anew._push)
+        self._turn.replace(rows, anew._turn)
+        self._twist = np.concatenate([self._push.velocity, self._turn.velocity], axis=1)
+        if self._in_start_attitude:
+            stiffness = self._impedance.stiffness.copy()
+            stiffness[rows] = anew._impedance.stiffness
+            self._impedance = Impedance(stiffness)
+        self._stall.forget(rows, some)
+        self._fresh = np.zeros(len(self._status), dtype=bool) if self._fresh is None else self._fresh
+        self._fresh[rows] = True
 
     def _stiffness(self, turn: Float) -> Float:
         """(6, 6) in base axes, or (N, 6, 6) where each trial started in its own attitude."""
@@ -76,8 +99,8 @@ class LmcSkill(Skill):
 
     def step(self, observation: Observation) -> Command:
         """Advance the desired pose and look whether the phase has ended."""
-        dt = 0.0 if self._first else observation.dt
-        self._first = False
+        dt = observation.dt if self._fresh is None else np.where(self._fresh, 0.0, observation.dt)
+        self._fresh = None
         travel = observation.pose.position - self._home.position
         pushing = self._push.advance(dt, _dot(travel, self._push.direction))
         position = self._home.position + self._push.progress[:, None] * self._push.direction
@@ -88,7 +111,7 @@ class LmcSkill(Skill):
         pose = Pose(position, rotation)
         return Command(pose, self._twist, self._impedance, self._nothing, self._status.copy(), self._reason.copy())
 
-    def _advance_rotation(self, observation: Observation, dt: float) -> tuple[Float, NDArray[np.bool_]]:
+    def _advance_rotation(self, observation: Observation, dt: float | Float) -> tuple[Float, NDArray[np.bool_]]:
         wanted = self._turn.progress + self._turn.speed * dt
         desired = self._attitude(wanted)
         error = rotation_vector(desired @ np.swapaxes(observation.pose.rotation, -1, -2))
@@ -148,13 +171,20 @@ class _Advance:
         stiffness = float(given @ part.stiffness @ given)
         self._limit = push / stiffness if stiffness > 0.0 else np.inf
 
-    def advance(self, dt: float, reached: Float) -> NDArray[np.bool_]:
+    def advance(self, dt: float | Float, reached: Float) -> NDArray[np.bool_]:
         """Move on, but not ahead of what is `reached` (N,) by more than the limit; says who is pushing."""
         if not self.exists:
             return np.zeros(len(self.progress), dtype=bool)
         self.progress = np.minimum(self.progress + self.speed * dt, reached + self._limit)
         pushing: NDArray[np.bool_] = self.progress - reached >= PUSHING * self._limit
         return pushing
+
+    def replace(self, rows: NDArray[np.intp], other: _Advance) -> None:
+        """Take over some trials from another one that has only those."""
+        for name in ("direction", "progress", "velocity"):
+            values = getattr(self, name).copy()
+            values[rows] = getattr(other, name)
+            setattr(self, name, values)
 
 
 def _dot(a: Float, b: Float) -> Float:

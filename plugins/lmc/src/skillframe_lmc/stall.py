@@ -24,11 +24,21 @@ class StallWatch:
         self._scale = np.repeat([1.0 / stop.stall_m, 1.0 / stop.stall_rad], [3, 9])
         self._smooth: Float | None = None
 
-    def look(self, observation: Observation, pushing: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Which trials have been at rest for `stall_s` and are pushing now (N,)."""
+    def _seen(self, observation: Observation) -> Float:
         n = len(observation.time)
         seen = np.concatenate([observation.pose.position, observation.pose.rotation.reshape(n, 9)], axis=1)
         seen *= self._scale
+        return seen
+
+    def forget(self, rows: NDArray[np.intp], observation: Observation) -> None:
+        """Watch some trials anew from an observation of them alone."""
+        if self._smooth is not None:
+            seen = self._seen(observation)
+            self._smooth[rows], self._anchor[rows], self._since[rows] = seen, seen, observation.time
+
+    def look(self, observation: Observation, pushing: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Which trials have been at rest for `stall_s` and are pushing now (N,)."""
+        seen = self._seen(observation)
         if self._smooth is None:
             self._smooth, self._anchor, self._since = seen, seen.copy(), observation.time.copy()
         self._smooth = self._smooth + (seen - self._smooth) * (observation.dt / (SMOOTHING_S + observation.dt))

@@ -23,7 +23,7 @@ from skillframe_segmenter import em, gate, merge, model, runs
 from skillframe_segmenter.boundaries import Move, moved, moves_of
 from skillframe_segmenter.features import Features, Scales, features, scales, typical_scales
 from skillframe_segmenter.model import PhaseModel, Pose0
-from skillframe_segmenter.settings import Settings
+from skillframe_segmenter.settings import WINDOW_S, Settings
 from skillframe_segmenter.windows import Windows, cut_all
 
 SHORT, SHORT_MERGED = 3, 5  # windows; shorter runs go to a neighbour, before and after phases are joined
@@ -145,8 +145,9 @@ def fit(data: em.Data, prepared: Prepared, phases: int | None, settings: Setting
     tidy = [runs.without_short(path, SHORT) for path in paths]
     groups = np.arange(chosen.model.count)
     if phases is None:
+        travelled = np.concatenate([WINDOW_S * np.cumsum(w.motion, axis=0) for w in prepared.cut])
         groups = np.array(merge.groups_of_one_motion(
-            data.seen, tidy, chosen.model.count, settings.merge_angle_rad, settings.merge_votes
+            data.seen, travelled, tidy, chosen.model.count, settings.merge_angle_rad, settings.merge_votes
         ))  # fmt: skip
     shortest = SHORT_MERGED if phases is None else SHORT
     labels = [runs.without_short(groups[path], shortest) for path in tidy]
