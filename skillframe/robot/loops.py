@@ -55,6 +55,7 @@ class ClosedChain:
     Attributes:
         independent: names of the joints that span the minimal coordinates z, in Pinocchio's order.
         actuated: names of the joints that actuators drive, in robot.toml's order; without actuators, `independent`.
+        driven: (actuators,) indices of these joints in velocities of the tree.
 
     Raises:
         UnknownName: a loop or an actuator names a frame or a joint that the URDF does not have.
@@ -72,8 +73,8 @@ class ClosedChain:
         self.independent = tuple(self.model.names[j] for j in free)
         self._z = np.array([self.model.joints[j].idx_q for j in free], dtype=int)
         self.actuated = tuple(a.joint for a in robot.spec.actuation) or self.independent
-        self._driven = np.array([self._joint(name) for name in self.actuated], dtype=int)
-        if len(self._driven) != len(free):
+        self.driven = np.array([self._joint(name) for name in self.actuated], dtype=int)
+        if len(self.driven) != len(free):
             text = f"{len(self.actuated)} actuators for {len(free)} freedoms ({', '.join(self.independent)})"
             raise InputError(self._where, text, "give one [[actuation]] for each")
         self._data = self.model.createData()
@@ -178,7 +179,7 @@ class ChainState:
         pin.updateFramePlacements(model, self.data)
         self.constraint_rate = self._constraint_rate()
         self.drift: Float = self.drift_of(zd)
-        self.arms: Float = self.embedding[chain._driven]
+        self.arms: Float = self.embedding[chain.driven]
 
     def _dependents(self) -> list[int]:
         joints = self.chain.model.joints
@@ -220,7 +221,7 @@ class ChainState:
     @property
     def piston(self) -> tuple[Float, Float]:
         """Positions and velocities (actuators,) of the actuated joints [m or rad]."""
-        return self.q[self.chain._driven], self.v[self.chain._driven]
+        return self.q[self.chain.driven], self.v[self.chain.driven]
 
     @property
     def mass(self) -> Float:

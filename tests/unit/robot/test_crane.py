@@ -115,7 +115,7 @@ def test_the_reduced_equations_agree_with_a_constrained_solver(z, zd, force):
     state = crane().at(z, zd)
     model, data = crane().model, crane().model.createData()
     drive = np.zeros(model.nv)
-    drive[crane()._driven] = 1e4 * force
+    drive[crane().driven] = 1e4 * force
     drive -= pin.rnea(model, data, state.q, state.v, np.zeros(model.nv)) + model.damping * state.v
     a = state.constraint
     system = np.block([[state.tree_mass, -a.T], [a, np.zeros((len(a), len(a)))]])

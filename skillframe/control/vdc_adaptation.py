@@ -1,0 +1,32 @@
+r"""Virtual Decomposition Control, adaptation: parameters learn from the velocity error, within bounds.
+
+    d theta/dt = rho s  with  s = Y^T (V_r - V),    set to zero for a parameter that would leave its bounds
+
+(projection function, W.-H. Zhu, "Virtual Decomposition Control", Springer 2010). Then
+d/dt (theta - theta^)^2 / (2 rho) <= -(theta - theta^) s for every true theta within the bounds, which is what the
+accompanying function needs.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from skillframe.frames import Float
+
+
+def projected_rate(estimate: Float, drive: Float, gain: float, lower: Float, upper: Float) -> Float:
+    """Rate of parameters (...): gain times drive, zero where it points out of the bounds at a bound."""
+    outward = ((estimate >= upper) & (drive > 0.0)) | ((estimate <= lower) & (drive < 0.0))
+    return np.where(outward, 0.0, gain * drive)
+
+
+def adapt(estimate: Float, drive: Float, gain: float, bounds: tuple[Float, Float], dt: float) -> Float:
+    """Parameters after a step of dt [s], kept within the bounds."""
+    lower, upper = bounds
+    return np.clip(estimate + dt * projected_rate(estimate, drive, gain, lower, upper), lower, upper)
+
+
+def relative_bounds(nominal: Float, share: float) -> tuple[Float, Float]:
+    """Bounds that lie a share of each parameter's size to both sides of it."""
+    width = share * np.abs(nominal)
+    return nominal - width, nominal + width

@@ -1,0 +1,119 @@
+"""The hydraulic part of Virtual Decomposition Control: the valve's inverse is exact, oil and crane together stable."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from skillframe.control import vdc
+from skillframe.control import vdc_actuator as act
+from skillframe.control.vdc_reference import required_motion
+from skillframe.errors import InputError
+from skillframe.robot.spec import load_robot
+from tests.laws.vdc_loop import START, crane, growth, leg, runge_kutta, task
+
+SPEC = load_robot("hiab_xs031")
+CYLINDERS = act.cylinders(SPEC.actuation)
+GAINS = act.CylinderGains(velocity=np.array([5e-3, 5e-3, 1e-3]), force=np.array([2e-8, 2e-8, 8e-9]))  # published
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def random_cylinders(seed):
+    rng = np.random.default_rng(seed)
+    x, xd = rng.uniform(0.05, 0.5, 3), rng.normal(size=3) * 0.2
+    return rng, x, xd, (rng.uniform(15e5, 185e5, 3), rng.uniform(15e5, 185e5, 3))
+
+
+@given(SEEDS)
+def test_the_inverse_valve_makes_the_piston_forces_rate_what_the_law_asks_for(seed):
+    """f_p' = f_pr' + B (k_x (xd_r - xd) + k_f (f_pr - f_p)), for any pressures and motion, leakage included."""
+    rng, x, xd, pressures = random_cylinders(seed)
+    leaky = dataclasses.replace(CYLINDERS, leakage=np.full(3, 1e-12))
+    xd_r, f_pr, f_rate = rng.normal(size=3) * 0.2, rng.normal(size=3) * 4e4, rng.normal(size=3) * 1e5
+    demand = act.flow_demand(leaky, GAINS, (x, xd, xd_r), (f_pr, f_rate), pressures)
+    rate_a, rate_b = act.pressure_rates(leaky, pressures, x, xd, act.inverse_valve(leaky, demand, x, pressures))
+    error = f_pr - act.pressure_force(leaky, *pressures)
+    wanted = f_rate + leaky.bulk_modulus * (GAINS.velocity * (xd_r - xd) + GAINS.force * error)
+    np.testing.assert_allclose(leaky.area_a * rate_a - leaky.area_b * rate_b, wanted, rtol=1e-9, atol=1e-3)
+
+
+@given(SEEDS)
+def test_friction_takes_power_from_a_velocity_error(seed):
+    """(xd_r - xd) (F(xd_r) - F(xd)) >= 0: the law is monotone, so that its difference never feeds the machine."""
+    rng = np.random.default_rng(seed)
+    a, b = rng.normal(size=3) * 0.1, rng.normal(size=3) * 0.1
+    assert np.all((a - b) * (act.friction(CYLINDERS, a) - act.friction(CYLINDERS, b)) >= 0.0)
+
+
+def test_a_cylinder_with_a_parameter_missing_is_refused():
+    lame = dataclasses.replace(SPEC.actuation[0], parameters={"bore": 0.08})
+    with pytest.raises(InputError, match="lift_piston has no rod, stroke"):
+        act.cylinders([lame])
+
+
+OILED = dataclasses.replace(CYLINDERS, coulomb_friction=np.zeros(3))  # tanh at 5 mm/s needs steps of 0.1 ms
+
+
+class Oil:
+    """Crane and oil under the law in continuous time: valves follow at once, `broken` leaves a term out.
+
+    The rate of the required force is a difference along the motion.
+    """
+
+    def __init__(self, broken=""):
+        self.broken, self.control = broken, vdc.VdcController(crane(), vdc.VdcGains(piston=np.zeros(3)))
+        self.begin = task().position(crane().at(START, np.zeros(3)))
+        self.gains = dataclasses.replace(GAINS, velocity=0.0 * GAINS.velocity) if broken == "velocity" else GAINS
+
+    def start(self):
+        """At rest with pressures that do not quite hold the crane."""
+        hold = crane().at(START, np.zeros(3)).holding_force() + np.array([3000.0, -2000.0, 500.0])
+        low = np.full(3, 40e5)
+        p_a = np.maximum((hold + CYLINDERS.area_b * low) / CYLINDERS.area_a, low)
+        return START, np.zeros(3), p_a, (CYLINDERS.area_a * p_a - hold) / CYLINDERS.area_b
+
+    def wanted(self, t, z, zd):
+        state = crane().at(z, zd)
+        path = leg(self.begin, self.begin + np.array([0.3, 0.4, 0.2]), t, 1.0)
+        required = required_motion(task(), state, path, 3.0 * np.eye(3))
+        force, motion = self.control.forces(state, required)
+        xd_r = state.arms @ required.rate
+        return state, xd_r, force + act.friction(OILED, xd_r), motion
+
+    def rates(self, t, y):
+        """Derivatives of (z, zd, p_a, p_b), and nu."""
+        z, zd, p_a, p_b = y
+        state, xd_r, f_pr, motion = self.wanted(t, z, zd)
+        x, xd = state.piston
+        zdd, h = state.acceleration(act.pressure_force(OILED, p_a, p_b) - act.friction(OILED, xd)), 1e-5
+        near = [self.wanted(t + s * h, z + s * h * zd, zd + s * h * zdd)[2] for s in (-1.0, 1.0)]
+        f_rate = (near[1] - near[0]) / (2 * h) * (self.broken != "force rate")
+        demand = act.flow_demand(OILED, self.gains, (x, xd, xd_r), (f_pr, f_rate), (p_a, p_b))
+        command = act.inverse_valve(OILED, demand, x, (p_a, p_b))
+        error = f_pr - act.pressure_force(OILED, p_a, p_b)
+        oil = float(np.sum(error**2 / (2.0 * OILED.bulk_modulus * GAINS.velocity)))
+        theta = self.control.theta
+        nu = vdc.accompanying(motion, theta, theta, 0.0) + oil
+        return (zd, zdd, *act.pressure_rates(OILED, (p_a, p_b), x, xd, command)), nu
+
+    def run(self, seconds=0.4, dt=2e-3):
+        """Nu at every step."""
+        y, history = self.start(), []
+        for k in range(round(seconds / dt)):
+            y, nu = runge_kutta(self.rates, k * dt, y, dt)
+            history.append(nu)
+        return np.array(history)
+
+
+def test_the_accompanying_function_of_crane_and_oil_together_never_grows():
+    """1e-6 of the start: what steps of 2 ms and the difference for the force's rate leave."""
+    nu = Oil().run()
+    assert growth(nu) < 1e-6
+    assert nu[-1] < 0.2 * nu[0]
+
+
+@pytest.mark.parametrize("broken", ["velocity", "force rate"])
+def test_with_a_term_of_the_cylinders_law_left_out_it_grows(broken):
+    assert growth(Oil(broken).run()) > 1e-3
