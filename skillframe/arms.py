@@ -23,12 +23,15 @@ from skillframe.world.placement import check_quantities
 from skillframe.world.plant import Draws, Kinematics
 from skillframe.world.sensors import Sensors
 
-__all__ = ["ArmsResult", "simulate_arms"]
+__all__ = ["ArmsResult", "FirstArm", "simulate_arms"]
+
+STILL = Impedance(np.diag([2000.0] * 3 + [100.0] * 3), np.diag([180.0] * 3 + [8.0] * 3))
+"""How an arm without a task holds its tool; ours: stiff, about critically damped."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArmsResult(Result):
-    """What became of N trials of several arms; `traces` of the base class stays empty.
+    """What became of N trials of several arms; `traces` of the base class are the first arm's.
 
     Attributes:
         arms: their names.
@@ -55,7 +58,8 @@ def simulate_arms(
 ) -> ArmsResult:
     """Run a coordinator on len(rngs) trials until each has ended; arguments as `skillframe.executor.simulate`.
 
-    `start.*` displaces the first arm's tool, `fixture.*` the fixture in the second arm's hand.
+    With one centre of compliance (3,) instead of one per arm, `coordinator` is a skill for one arm, and the others hold
+    still. `start.*` displaces the first arm's tool, `fixture.*` the fixture in the second arm's hand.
 
     Raises:
         SkillframeError: the robot has one arm, or the scene nothing for a second one to hold.
@@ -68,10 +72,57 @@ def simulate_arms(
             "a world whose fixture can be held; take dual_panda and dual_peg"
         )
     with np.errstate(invalid="ignore", over="ignore"):  # as in `simulate`
+        if np.ndim(setup.center_of_compliance) == 1:
+            coordinator = FirstArm(coordinator)
         loop = _ArmsLoop(coordinator, setup, draws, rngs, trace_hz)
         loop.tare()
         loop.run(duration_s, progress)
         return loop.arms_result()
+
+
+class FirstArm(Skill):
+    """A coordinator that runs a skill for one arm on the first, while the others hold their tools where they are."""
+
+    def __init__(self, skill: Skill) -> None:
+        self._skill = skill
+
+    def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
+        """Remember where the tools are, and start the skill."""
+        self._home = Pose(observation.pose.position.copy(), observation.pose.rotation.copy())
+        count, arms = observation.time.shape
+        self._rest = np.zeros((count, arms, 6))
+        self._gains = [np.array(np.broadcast_to(gain, (count, arms, 6, 6))) for gain in STILL if gain is not None]
+        self._skill.start(_first(observation), rngs)
+
+    def step(self, observation: Observation) -> Command:
+        """The skill's command for the first arm, standing still for the others."""
+        wanted = self._skill.step(_first(observation))
+        stiffness, damping = self._gains
+        stiffness[:, 0] = wanted.impedance.stiffness
+        if wanted.impedance.damping is not None:
+            damping[:, 0] = wanted.impedance.damping
+        position = _replaced(self._home.position, wanted.pose.position)
+        return Command(
+            Pose(position, _replaced(self._home.rotation, wanted.pose.rotation)),
+            _replaced(self._rest, wanted.twist),
+            Impedance(stiffness, None if wanted.impedance.damping is None else damping),
+            _replaced(self._rest, wanted.feedforward),
+            wanted.status,
+            wanted.reason,
+        )
+
+
+def _first(observation: Observation) -> Observation:
+    """What the first arm sees, (N, ...)."""
+    pose = Pose(observation.pose.position[:, 0], observation.pose.rotation[:, 0])
+    return Observation(observation.time[:, 0], observation.dt, pose, observation.twist[:, 0], observation.wrench[:, 0])
+
+
+def _replaced(arms: Float, first: Float) -> Float:
+    """(N, arms, ...) with the first arm's part replaced."""
+    result = arms.copy()
+    result[:, 0] = first
+    return result
 
 
 class _ArmsLoop(Loop):
@@ -182,8 +233,10 @@ class _ArmsLoop(Loop):
         if isinstance(recorder, _ArmRecorders):
             metas = [self._meta(i, bool(plain.success[i]), str(plain.failure[i])) for i in range(self.count)]
             traces = [recorder.traces(i, self.names, self.points, meta) for i, meta in enumerate(metas)]
+        first = None if traces is None else [by_arm[self.names[0]] for by_arm in traces]
+        outcome = {f.name: getattr(plain, f.name) for f in fields(Result)} | {"traces": first}
         return ArmsResult(
-            **{f.name: getattr(plain, f.name) for f in fields(Result)}, arms=self.names, joint_path_rad=self.path,
+            **outcome, arms=self.names, joint_path_rad=self.path,
             turned_rad=self.turned, arm_traces=traces,
         )  # fmt: skip
 

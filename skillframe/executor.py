@@ -25,6 +25,7 @@ from skillframe.robot.model import RobotModel
 from skillframe.robot.spec import Limits
 from skillframe.skill import Command, Impedance, Observation, Reasons, Skill, Status, no_reasons
 from skillframe.trace import Trace
+from skillframe.world.convert import held
 from skillframe.world.placement import QUANTITIES, check_quantities, fixture_poses, start_configurations
 from skillframe.world.plant import Draws, Kinematics, Plant
 from skillframe.world.rates import ratio
@@ -101,6 +102,9 @@ def simulate(
 ) -> Result:
     """Run a skill on len(rngs) trials until each has ended.
 
+    Where a second arm holds the scene's fixture, a coordinator runs both arms, and a skill runs the first while the
+    second stands still (`skillframe.arms`).
+
     Args:
         skill: what to run; `start` is called once.
         setup: robot, scene and settings.
@@ -115,6 +119,10 @@ def simulate(
         UnreachablePose: the robot cannot reach a start.
         SkillframeError: rates that do not divide.
     """
+    if held(setup.robot, setup.scene):
+        from skillframe.arms import simulate_arms
+
+        return simulate_arms(skill, setup, draws, rngs, duration_s=duration_s, trace_hz=trace_hz, progress=progress)
     check_quantities(draws)
     with np.errstate(invalid="ignore", over="ignore"):  # a diverging trial is the limits' business, not a warning
         loop = Loop(skill, setup, draws, rngs, trace_hz)

@@ -17,7 +17,7 @@ from skillframe.demonstration.record import resolve_point
 from skillframe.errors import InputError, UnknownName
 from skillframe.executor import QUANTITIES, Setup
 from skillframe.frames import Float
-from skillframe.records import Document
+from skillframe.records import CoordinatorType, Document
 from skillframe.registry import registry
 from skillframe.robot.model import RobotModel, load_model
 from skillframe.robot.spec import load_robot
@@ -87,13 +87,26 @@ def prepare(robot: RobotModel, scene: Scene, document: Document, coc: str | None
         UnknownName: the skill's type or the centre of compliance is unknown.
         InputError: the skill says where it goes, and that is outside the robot's workspace.
     """
+    kind = registry().behaviour(document["type"])
+    if isinstance(kind, CoordinatorType):
+        return kind.build(document), Setup(
+            robot=robot, scene=scene, center_of_compliance=_centers(kind, document, scene, coc)
+        )
     center = center_of_compliance(document, scene, coc)
     placed = {**document, "frame": {**document["frame"], "center_of_compliance": center.tolist()}}
-    kind = registry().skill(document["type"])
     skill = kind.build(placed)
     if kind.area is not None:
         _check_area(robot, scene, document, kind.area(document))
     return skill, Setup(robot=robot, scene=scene, center_of_compliance=center)
+
+
+def _centers(kind: CoordinatorType, document: Document, scene: Scene, coc: str | None) -> Float:
+    """(arms, 3) centres of compliance of a coordinator."""
+    if kind.centers is None:
+        return np.tile(center_of_compliance(document, scene, coc), (2, 1))
+    if coc is not None:
+        raise InputError("--coc", f"each arm of a {kind.name} skill has its own", "set them in the skill file")
+    return kind.centers(document)
 
 
 def _check_area(robot: RobotModel, scene: Scene, document: Document, area: Float) -> None:

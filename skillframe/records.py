@@ -90,13 +90,15 @@ class SegmenterType:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CoordinatorType:
-    """A skill for several arms: its observations and commands carry a dimension (N, arms, ...)."""
+class CoordinatorType(SkillType):
+    """A skill for several arms: its observations and commands carry a dimension (N, arms, ...).
 
-    name: str
-    summary: str
-    version: int = 1
-    build: Callable[[Document], Skill]
+    Attributes:
+        centers: (arms, 3) centres of compliance in each arm's tool frame [m] from a document; None: every arm has the
+            document's one.
+    """
+
+    centers: Callable[[Document], Float] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

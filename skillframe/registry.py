@@ -178,6 +178,10 @@ class Registry:
         record: CoordinatorType = self._get("coordinator", name)
         return record
 
+    def behaviour(self, name: str) -> SkillType:
+        """The coordinator or else the skill type of that name: whatever a skill file can hold; raises as `skill`."""
+        return self.coordinator(name) if name in self._records["coordinator"] else self.skill(name)
+
     def world(self, name: str) -> WorldType:
         """The world of that name; raises as `skill` does."""
         record: WorldType = self._get("world", name)

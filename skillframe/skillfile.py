@@ -20,7 +20,7 @@ from skillframe import __version__
 from skillframe.demonstration.record import Demonstration
 from skillframe.demonstration.safe import replace_file
 from skillframe.errors import InputError, UnknownName
-from skillframe.records import Document, SkillType
+from skillframe.records import CoordinatorType, Document, SkillType
 from skillframe.registry import registry
 
 FORMAT, VERSION = "skillframe.skill", 1
@@ -60,7 +60,8 @@ def new_document(skill: SkillType, body: Document, demonstrations: Sequence[Demo
 
 def _creator(name: str) -> dict[str, str]:
     try:
-        plugin = registry().provider("skill", name)
+        kind = "coordinator" if isinstance(registry().behaviour(name), CoordinatorType) else "skill"
+        plugin = registry().provider(kind, name)
     except UnknownName:  # a record that was never registered, as in tests
         return {"skillframe": __version__}
     return {"skillframe": __version__, "plugin": plugin.distribution, "plugin_version": plugin.version}
@@ -112,7 +113,7 @@ def load(path: Path) -> Document:
     """
     document = _parse(path)
     _check(document, str(path))
-    skill = registry().skill(document["type"])
+    skill = registry().behaviour(document["type"])
     if document.get("type_version", 1) > skill.version:
         raise InputError(
             path,

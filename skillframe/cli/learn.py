@@ -42,7 +42,7 @@ def command(
     from skillframe.skillfile import save
     from skillframe.skillsource import learned
 
-    kind = registry().skill(skill)
+    kind = registry().behaviour(skill)
     options = LearnOptions(at=at, hand=hand, axes=axes, settings=dict(parse_setting(text) for text in settings))
     document = learned(kind, [read_demonstration(path) for path in files], options)
     save(document, out)

@@ -49,7 +49,7 @@ def show(file: Path, as_json: bool) -> None:
     from skillframe.skillfile import load
 
     document = load(file)
-    kind = registry().skill(document["type"])
+    kind = registry().behaviour(document["type"])
     words = kind.describe(document) if kind.describe is not None else [kind.summary]
     if as_json:
         emit_json({**document, "words": words})
@@ -76,7 +76,7 @@ def explain(file: Path, out: Path) -> None:
     from skillframe.skillfile import load
 
     document = load(file)
-    kind = registry().skill(document["type"])
+    kind = registry().behaviour(document["type"])
     words = kind.describe(document) if kind.describe is not None else [kind.summary]
     pictures = kind.explain(document) if kind.explain is not None else []
     replace_file(out, _page(file.name, document, words, pictures).encode())
