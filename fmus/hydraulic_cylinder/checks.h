@@ -1,0 +1,56 @@
+/* What cannot be meant is refused with a sentence: parameters before the start, motion outside the stroke. */
+#ifndef SKILLFRAME_CHECKS_H
+#define SKILLFRAME_CHECKS_H
+
+#include <stdio.h>
+
+#include "model.h"
+
+#define REPORT(...) (snprintf(r->text, sizeof r->text, __VA_ARGS__))
+
+static inline Outcome check_position(const Model *m, double x, Report *r)
+{
+    double slack = fmin(0.02 + 0.02 * m->value[STROKE],
+                        0.5 * fmin(m->value[DEAD_VOLUME_A] / m->own.area_a, m->value[DEAD_VOLUME_B] / m->own.area_b));
+    if (x >= -slack && x <= m->value[STROKE] + slack) return OK;
+    REPORT("position %.4g m is outside the stroke 0 to %.4g m by more than %.3g m; check the start pose and the end stops",
+           x, m->value[STROKE], slack);
+    return DISCARD;
+}
+
+static inline Outcome require(int fine, const char *name, const char *rule, double value, Report *r)
+{
+    if (fine) return OK;
+    REPORT("parameter %s is %g; it must be %s", name, value, rule);
+    return FAILED;
+}
+
+#define POSITIVE(i) require(v[i] > 0.0, VARIABLES[i].name, "greater than zero", v[i], r)
+#define NOT_NEGATIVE(i) require(v[i] >= 0.0, VARIABLES[i].name, "zero or more", v[i], r)
+
+static inline Outcome check_parameters(const Model *m, Report *r)
+{
+    static const int positive[] = {BORE, STROKE, DEAD_VOLUME_A, DEAD_VOLUME_B, BULK_MODULUS, RATED_FLOW,
+                                   RATED_PRESSURE_DROP, SPOOL_FREQUENCY, SPOOL_DAMPING, LAMINAR_PRESSURE,
+                                   STRIBECK_VELOCITY, PRESLIDING_LENGTH, PUMP_DROOP, SUPPLY_VOLUME, CUSHION_FLOW,
+                                   SUBSTEP, TOLERANCE};
+    static const int not_negative[] = {ROD, BULK_MODULUS_SLOPE, AIR_FRACTION, SPOOL_SLEW, DEADBAND, HYSTERESIS, LEAKAGE,
+                                       COULOMB_FRICTION, VISCOUS_FRICTION, STATIC_FRICTION, PUMP_FLOW,
+                                       ENDSTOP_STIFFNESS, ENDSTOP_DAMPING, CUSHION_LENGTH, RELIEF_CONDUCTANCE,
+                                       CHECK_CONDUCTANCE};
+    const double *v = m->value;
+    Outcome out = OK;
+    for (size_t i = 0; i < sizeof positive / sizeof *positive && out == OK; i++) out = POSITIVE(positive[i]);
+    for (size_t i = 0; i < sizeof not_negative / sizeof *not_negative && out == OK; i++)
+        out = NOT_NEGATIVE(not_negative[i]);
+    if (out == OK) out = require(v[ROD] < v[BORE], "rod", "smaller than bore", v[ROD], r);
+    if (out == OK) out = require(v[AIR_FRACTION] < 0.5, "air_fraction", "below 0.5", v[AIR_FRACTION], r);
+    if (out == OK) out = require(v[DEADBAND] < 1.0, "deadband", "below 1", v[DEADBAND], r);
+    if (out == OK) out = require(v[SUBSTEP] >= 1e-6, "substep", "at least 1e-6 s", v[SUBSTEP], r);
+    if (out == OK)
+        out = require(v[SUPPLY_PRESSURE] > v[RETURN_PRESSURE], "supply_pressure", "above return_pressure",
+                      v[SUPPLY_PRESSURE], r);
+    return out;
+}
+
+#endif
