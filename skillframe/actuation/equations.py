@@ -49,6 +49,8 @@ def derive(values: dict[str, Any]) -> SimpleNamespace:
     p.omega = 2 * math.pi * p.spool_frequency
     p.stiffness = p.coulomb_friction / p.presliding_length
     p.pump_slope = p.pump_flow / p.pump_droop
+    p.has_air, p.has_cushion = bool(np.any(p.air_fraction > 0)), bool(np.any(p.cushion_length > 0))
+    p.has_pump, p.has_stribeck = bool(np.any(p.pump_flow > 0)), bool(np.any(p.static_friction > p.coulomb_friction))
     return p
 
 
@@ -60,7 +62,9 @@ def edge_flow(dp: Float, transition: Float) -> Float:
 
 def bulk_modulus(pressure: Float, p: SimpleNamespace) -> Float:
     """Eq. 5: effective bulk modulus of oil with hoses and undissolved air [Pa] at a gauge pressure [Pa]."""
-    oil = p.bulk_modulus + p.bulk_modulus_slope * pressure
+    oil: Float = p.bulk_modulus + p.bulk_modulus_slope * pressure
+    if not p.has_air:
+        return oil
     absolute = np.maximum(pressure + AMBIENT, LEAST_ABSOLUTE)
     bubbles = p.air_fraction * (AMBIENT / absolute) ** (1 / POLYTROPIC)
     pure = 1.0 - p.air_fraction
@@ -70,13 +74,15 @@ def bulk_modulus(pressure: Float, p: SimpleNamespace) -> Float:
 
 def opening(spool: Float, deadband: Float) -> Float:
     """Eq. 2: opening of the edges from the spool's position, -1 to 1; the overlap opens nothing."""
-    x = np.clip(spool, -1.0, 1.0)
-    result: Float = np.sign(x) * np.maximum(np.abs(x) - deadband, 0.0) / (1.0 - deadband)
+    x = np.minimum(np.maximum(spool, -1.0), 1.0)
+    result: Float = np.copysign(np.maximum(np.abs(x) - deadband, 0.0) / (1.0 - deadband), x)
     return result
 
 
 def _throttled(conductance: Float, room: Float, drop: Float, p: SimpleNamespace) -> Float:
     """Eq. 6: conductance of an edge in series with the cushion of the end that the piston is `room` away from."""
+    if not p.has_cushion:
+        return conductance
     with np.errstate(divide="ignore", invalid="ignore"):
         closing = np.where(p.cushion_length > 0, np.clip(1.0 - room / p.cushion_length, 0.0, 1.0), 0.0)
     q = np.where(drop > 0.0, conductance * closing / p.cushion, 0.0)
@@ -86,8 +92,8 @@ def _throttled(conductance: Float, room: Float, drop: Float, p: SimpleNamespace)
 
 def valve_flows(p: SimpleNamespace, spool: Float, pa: Float, pb: Float, ps: Float, position: Float) -> Flows:
     """Flows of the four edges: supply to a and b to return when the spool is positive, the other way round if not."""
-    u = opening(spool, p.deadband)
-    extend, retract = p.edge * np.maximum(u, 0.0), p.edge * np.maximum(-u, 0.0)
+    u = p.edge * opening(spool, p.deadband)
+    extend, retract = np.maximum(u, 0.0), np.maximum(-u, 0.0)
     drop_a, drop_b, tr = pa - p.return_pressure, pb - p.return_pressure, p.laminar_pressure
     into_a, into_b = extend * edge_flow(ps - pa, tr), retract * edge_flow(ps - pb, tr)
     out_a = _throttled(retract, position, drop_a, p) * edge_flow(drop_a, tr)
@@ -104,6 +110,9 @@ def port_flow(p: SimpleNamespace, pressure: Float) -> Float:
 
 def sliding_deflection(p: SimpleNamespace, velocity: Float) -> Float:
     """Eq. 8: deflection of the seals in steady sliding [m], longer near standstill where break-away exceeds Coulomb."""
+    if not p.has_stribeck:
+        length: Float = p.presliding_length + 0.0 * velocity
+        return length
     with np.errstate(divide="ignore", invalid="ignore"):
         excess = np.where(p.coulomb_friction > 0, np.maximum(p.static_friction / p.coulomb_friction - 1.0, 0.0), 0.0)
     result: Float = p.presliding_length * (1.0 + excess * np.exp(-((velocity / p.stribeck_velocity) ** 2)))
@@ -142,22 +151,24 @@ def pressure_rates(p: SimpleNamespace, y: Float, motion: Motion) -> Float:
     net_b = flows.b + port_flow(p, pb) + p.area_b * motion.velocity + leak
     volume_a = p.dead_volume_a + p.area_a * motion.position
     volume_b = p.dead_volume_b + p.area_b * (p.stroke - motion.position)
-    pump = np.minimum(p.pump_slope * (p.supply_pressure - ps), p.pump_flow)
-    sag = np.where(p.pump_flow > 0, pump - flows.supply - motion.other_flow, 0.0)
-    return np.stack(
-        [
-            bulk_modulus(pa, p) / volume_a * net_a,
-            bulk_modulus(pb, p) / volume_b * net_b,
-            p.bulk_modulus / p.supply_volume * sag,
-        ]
-    )
+    result = np.zeros((3, *np.shape(net_a)))
+    result[0] = bulk_modulus(pa, p) / volume_a * net_a
+    result[1] = bulk_modulus(pb, p) / volume_b * net_b
+    if p.has_pump:
+        pump = np.minimum(p.pump_slope * (p.supply_pressure - ps), p.pump_flow)
+        sag = np.where(p.pump_flow > 0, pump - flows.supply - motion.other_flow, 0.0)
+        result[2] = p.bulk_modulus / p.supply_volume * sag
+    return result
 
 
 def rates(p: SimpleNamespace, y: Float, motion: Motion) -> Float:
     """Rates of all states (6, n): eq. 2 for the spool, eq. 4 for the pressures, eq. 8 for the seals."""
-    spool_acceleration = p.omega**2 * (motion.demand - y[0]) - 2 * p.spool_damping * p.omega * y[1]
-    slide = motion.velocity - np.abs(motion.velocity) * y[5] / sliding_deflection(p, motion.velocity)
-    return np.concatenate([np.stack([y[1], spool_acceleration]), pressure_rates(p, y, motion), slide[None]])
+    result = np.empty_like(y)
+    result[0] = y[1]
+    result[1] = p.omega**2 * (motion.demand - y[0]) - 2 * p.spool_damping * p.omega * y[1]
+    result[2:5] = pressure_rates(p, y, motion)
+    result[5] = motion.velocity - np.abs(motion.velocity) * y[5] / sliding_deflection(p, motion.velocity)
+    return result
 
 
 def equilibrium(p: SimpleNamespace, command: Float) -> Float:

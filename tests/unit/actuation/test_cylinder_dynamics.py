@@ -96,7 +96,9 @@ def test_the_python_reference_and_the_fmu_agree(cylinder2, reference):
             assert b.step(k * H, H)
         # the reference's fourth-order rule where a port's valve opens inside its step: 1e-4 of 100 bar
         np.testing.assert_allclose(both[1].y[:, [PA, PB]], both[0].y[:, [PA, PB]], atol=1000.0)
-        np.testing.assert_allclose(both[1].y[:, [FORCE, 1]], both[0].y[:, [FORCE, 1]], atol=6.0)
+        np.testing.assert_allclose(both[1].y[:, FORCE], both[0].y[:, FORCE], atol=6.0)
+        # the mean takes the speed as constant while the seals' 4 kN turn over within a step: one part in 400 of them
+        np.testing.assert_allclose(both[1].y[:, 1], both[0].y[:, 1], atol=10.0)
         np.testing.assert_allclose(both[1].y[:, 2], both[0].y[:, 2], atol=2e-3)
     both[0].close()
 
