@@ -12,10 +12,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from skillframe.hookspecs import hookimpl
-from skillframe.records import Document, SegmenterType
+from skillframe.records import Document, Illustration, LearnOptions, SegmenterType, SkillType
 
 if TYPE_CHECKING:
     from skillframe.demonstration.record import Demonstration
+    from skillframe.skill import Skill
 
 Fit = Callable[["Sequence[Demonstration]", "int | None", Mapping[str, Any]], Document]
 
@@ -40,3 +41,47 @@ def skillframe_segmenters() -> Iterable[SegmenterType]:
         name="pose_hmm", summary="baseline: the same phases; the pose drives the transitions (Kroemer et al. 2015)",
         fit=_hmm("pose_hmm"),
     )  # fmt: skip
+
+
+def _build(document: Document) -> Skill:
+    from skillframe_segmenter.policy import build
+
+    return build(document)
+
+
+def _check(document: Document) -> None:
+    from skillframe_segmenter.document import check
+
+    check(document)
+
+
+def _learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
+    from skillframe_segmenter.learning import learn
+
+    return learn(demonstrations, options)
+
+
+def _describe(document: Document) -> list[str]:
+    from skillframe_segmenter.describe import describe
+
+    return describe(document)
+
+
+def _explain(document: Document) -> list[Illustration]:
+    from skillframe_segmenter.describe import explain
+
+    return explain(document)
+
+
+@hookimpl
+def skillframe_skills() -> Iterable[SkillType]:
+    """The kind of skill that this plug-in provides."""
+    yield SkillType(
+        name="policy",
+        summary="phases in sequence, found in whole demonstrations; the contact wrench switches between them",
+        build=_build,
+        check=_check,
+        learn=_learn,
+        describe=_describe,
+        explain=_explain,
+    )

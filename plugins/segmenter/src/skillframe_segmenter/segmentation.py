@@ -200,7 +200,7 @@ def rows_of(cut: Sequence[Windows], labels: Sequence[Labels], names: Sequence[st
     for w, each, name in zip(cut, labels, names, strict=True):
         starts = runs.starts_of_runs(each)
         result.append({
-            "file": name, "boundaries": w.edges([int(i) for i in starts[1:]]),
+            "file": name, "start": w.start, "end": w.edges([w.size])[0], "boundaries": w.edges([int(i) for i in starts[1:]]),
             "labels": [int(x) for x in each[starts]],
         })  # fmt: skip
     return result

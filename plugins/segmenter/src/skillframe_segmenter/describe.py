@@ -1,0 +1,74 @@
+"""A policy in words and as a picture: its tree, what each phase does, and where the demonstrations were cut."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+from skillframe.records import Document, Illustration
+from skillframe.registry import registry
+from skillframe_segmenter.document import PolicyDocument, read
+from skillframe_segmenter.policy import successor_words
+
+SIGNALS = {
+    "wrench_hmm": "the contact wrench asks for the next phase, or a phase comes to rest",
+    "pose_hmm": "the pose asks for the next phase, or a phase comes to rest",
+}
+COLOURS = ("#3b6fb6", "#d9772b", "#3a9b5c", "#b0457b", "#8a6fc0", "#7a6a53", "#4aa3b5", "#c2a83e")
+
+
+def describe(document: Document) -> list[str]:
+    """The policy in words, its tree first."""
+    policy = read(document)
+    kind = document["phase_model"].get("type", "?")
+    count = len(policy.skills)
+    lines = [f"policy of {count} phase{'s' * (count != 1)}; {SIGNALS.get(kind, 'a phase gives way when it comes to rest')}"]
+    for i, words in enumerate(_words(policy)):
+        corner = "└─" if i + 1 == count else "├─"
+        lines.append(f"{corner} phase {i + 1}: {words[0]}; then {successor_words(policy.successors, i)}")
+    again = f"begun anew at most {policy.recoveries} time{'s' * (policy.recoveries != 1)}"
+    lines.append(f"a phase that fails (its force, time or travel limit) is {again if policy.recoveries else 'the end'}")
+    for row in document.get("demonstrations", []):
+        cuts = ", ".join(f"{t:.2f} s" for t in row["boundaries"]) or "nowhere"
+        lines.append(f"{row['file'] or 'demonstration'}: cut at {cuts}; phases {' '.join(str(k + 1) for k in row['labels'])}")
+    for i, words in enumerate(_words(policy)):
+        lines += [f"phase {i + 1}: {line}" for line in words[1:]]
+    return lines
+
+
+def _words(policy: PolicyDocument) -> list[list[str]]:
+    result = []
+    for sub in policy.skills:
+        kind = registry().skill(sub["type"])
+        result.append(kind.describe(sub) if kind.describe is not None else [kind.summary])
+    return result
+
+
+def explain(document: Document) -> list[Illustration]:
+    """Where the demonstrations were cut, then the pictures of each phase."""
+    pictures = [Illustration("Phases", "Where each demonstration was cut; equal colours are one phase.", _bars(document))]
+    for i, sub in enumerate(read(document).skills):
+        kind = registry().skill(sub["type"])
+        for picture in kind.explain(sub) if kind.explain is not None else []:
+            pictures.append(picture._replace(title=f"Phase {i + 1}: {picture.title}"))
+    return pictures
+
+
+def _bars(document: Document) -> str:
+    rows = [row for row in document.get("demonstrations", [])]
+    longest = max((row.get("end", 0.0) for row in rows), default=0.0) or 1.0
+    scale, parts = 640.0 / longest, []
+    for i, row in enumerate(rows):
+        y = 24 + 34 * i
+        edges = [row.get("start", 0.0), *row["boundaries"], row.get("end", longest)]
+        for (start, stop), label in zip(pairwise(edges), row["labels"], strict=True):
+            parts.append(
+                f'<rect x="{120 + scale * (start - edges[0]):.1f}" y="{y}" width="{scale * (stop - start):.1f}" '
+                f'height="22" fill="{COLOURS[label % len(COLOURS)]}"/>'
+                f'<text x="{124 + scale * (start - edges[0]):.1f}" y="{y + 16}" fill="#fff" font-size="13">{label + 1}</text>'
+            )
+        parts.append(f'<text x="8" y="{y + 16}" font-size="13" fill="#333">demonstration {i + 1}</text>')
+    height = 40 + 34 * len(rows)
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 780 {height}" width="780" height="{height}" '
+        f'font-family="sans-serif">{"".join(parts)}</svg>'
+    )

@@ -1,0 +1,144 @@
+"""From whole demonstrations to a policy: cut them into phases, and learn each phase as a skill of its own.
+
+Two phases that never share a demonstration and stand at the same place in the sequence (after the same phases, before
+the same phases) may be one skill shown from two sides; they are joined if the learner finds one desired direction for
+both, which is the definition itself. Our choice; the papers join phases by their model alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+from skillframe.demonstration.record import Demonstration
+from skillframe.errors import InputError
+from skillframe.records import Document, LearnOptions
+from skillframe.registry import registry
+from skillframe_segmenter.agreement import check_agreement
+from skillframe_segmenter.settings import Settings
+
+SHORTEST_S = 0.25
+OWN = ("segmenter", "skill", "phases", "recoveries")
+
+
+def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
+    """The body of a policy document.
+
+    Settings: `segmenter` (wrench_hmm), `skill` (lmc), `phases` (found), `recoveries` (1), those of the segmenter, and
+    those of the phases' learner.
+
+    Raises:
+        InputError: demonstrations that cannot be cut or do not agree, or an unknown setting.
+        UnknownName: no such segmenter or skill.
+    """
+    own, cutting, learning = _sorted(options)
+    segmenter = registry().segmenter(own["segmenter"])
+    found = segmenter.fit(demonstrations, own["phases"], cutting)
+    check_agreement(found["demonstrations"], demonstrations)
+    options = LearnOptions(at=options.at, hand=options.hand, axes=options.axes, settings=learning)
+    if own["phases"] is None:
+        found = _joined(found, demonstrations, own["skill"], options)
+    bodies = [_learn(found, demonstrations, k, own["skill"], options) for k in range(_count(found))]
+    shared = {key: value for key, value in bodies[0].items() if key != "phases"}
+    return {
+        **shared,
+        "phases": [{**body["phases"][0], "skill": own["skill"]} for body in bodies],
+        "recoveries": own["recoveries"],
+        **found,
+    }
+
+
+def _sorted(options: LearnOptions) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+    """Settings of the policy, of the segmenter, and of the phases' learner."""
+    own: dict[str, Any] = {"segmenter": "wrench_hmm", "skill": "lmc", "phases": None, "recoveries": 1}
+    own |= {key: value for key, value in options.settings.items() if key in OWN}
+    names = {*Settings.__dataclass_fields__, "boundaries"}
+    cutting = {key: value for key, value in options.settings.items() if key in names}
+    learning = {k: v for k, v in options.settings.items() if k not in names and k not in OWN}
+    for key in ("phases", "recoveries"):
+        value = own[key]
+        if value is not None and (not isinstance(value, int) or isinstance(value, bool) or value < 0):
+            raise InputError(f"--set {key}", f"{value!r} is not a whole number", "give one")
+    return own, {**cutting, "at": options.at, "axes": options.axes}, learning
+
+
+def _count(found: Document) -> int:
+    return len(found["phase_model"]["successors"])
+
+
+def pieces(found: Document, demonstrations: Sequence[Demonstration], phases: Sequence[int]) -> list[Demonstration]:
+    """The parts of all demonstrations that belong to some phases; very short ones only if there are no others.
+
+    Neighbouring intervals of these phases stay one part.
+    """
+    result = []
+    for row, demonstration in zip(found["demonstrations"], demonstrations, strict=True):
+        edges = [float(demonstration.time[0]), *row["boundaries"], float(demonstration.time[-1])]
+        spans: list[tuple[float, float]] = []
+        for (start, stop), label in zip(pairwise(edges), row["labels"], strict=True):
+            if label in phases:
+                joins = bool(spans) and spans[-1][1] == start
+                spans = [*spans[:-1], (spans[-1][0], stop)] if joins else [*spans, (start, stop)]
+        result += [demonstration.between(*span) for span in spans]
+    long = [piece for piece in result if piece.duration >= SHORTEST_S]
+    return long or result
+
+
+def _learn(
+    found: Document, demonstrations: Sequence[Demonstration], phase: int, skill: str, options: LearnOptions
+) -> Document:
+    kind = registry().skill(skill)
+    if kind.learn is None:
+        raise InputError(f"--skill {skill}", "is not learned from demonstrations", "name one that is, such as lmc")
+    return kind.learn(pieces(found, demonstrations, [phase]), options)
+
+
+def _joined(
+    found: Document, demonstrations: Sequence[Demonstration], skill: str, options: LearnOptions
+) -> Document:
+    """The segmentation with alternatives joined that the learner explains by one direction."""
+    kind = registry().skill(skill)
+    for one, two in alternatives(found["demonstrations"]):
+        if kind.learn is None:
+            break
+        body = kind.learn(pieces(found, demonstrations, [one, two]), options)
+        translation = body["phases"][0].get("translation", {})
+        if translation.get("desired_direction") is not None:
+            return _joined(relabelled(found, one, two), demonstrations, skill, options)
+    return found
+
+
+def alternatives(rows: Sequence[Mapping[str, Any]]) -> list[tuple[int, int]]:
+    """Pairs of phases that never share a demonstration and have the same neighbours in the sequence."""
+    labels = [list(row["labels"]) for row in rows]
+    phases = sorted({label for each in labels for label in each})
+    steps = [(a, b) for each in labels for a, b in pairwise([-1, *each, -2])]
+
+    def neighbours(phase: int) -> tuple[set[int], set[int]]:
+        return {a for a, b in steps if b == phase}, {b for a, b in steps if a == phase}
+
+    def apart(one: int, two: int) -> bool:
+        return not any(one in each and two in each for each in labels)
+
+    return [
+        (one, two)
+        for i, one in enumerate(phases)
+        for two in phases[i + 1 :]
+        if apart(one, two) and neighbours(one) == neighbours(two)
+    ]
+
+
+def relabelled(found: Document, one: int, two: int) -> Document:
+    """The segmentation with phase `two` counted as phase `one`, and later ones moved up."""
+    count = _count(found)
+    number = [one if k == two else k - (k > two) for k in range(count)]
+    rows = [{**row, "labels": [number[k] for k in row["labels"]]} for row in found["demonstrations"]]
+    counts = [[0.0] * count for _ in range(count - 1)]
+    for k, before in enumerate(found["phase_model"]["successors"]):
+        for j, value in enumerate(before):
+            counts[number[k]][number[j] if j < count else count - 1] += value
+    model = {**found["phase_model"], "successors": counts}
+    if "phase_of" in model:
+        model["phase_of"] = [number[k] for k in model["phase_of"]]
+    return {**found, "phase_model": model, "demonstrations": rows}

@@ -1,0 +1,172 @@
+"""Which phase is it now? The gate for a robot that runs a policy, and the forward filter for a demonstration.
+
+Both look at windows of 50 ms, N trials at once. A phase takes over when it has been more probable than
+`switch_posterior` for `switch_windows` windows in a row, so that a single odd window makes no switch.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.demonstration.record import Demonstration
+from skillframe.frames import Float, move_wrench, rotate
+from skillframe.skill import Observation
+from skillframe_segmenter import emission, gate, transitions
+from skillframe_segmenter.features import regressors, soft_pair
+from skillframe_segmenter.model import PhaseModel
+from skillframe_segmenter.segmentation import pose_regressors
+from skillframe_segmenter.settings import WINDOW_S
+from skillframe_segmenter.windows import Windows, windows
+
+NOBODY = -1
+
+
+class Debounce:
+    """Turns posteriors of windows into decisions, N trials."""
+
+    def __init__(self, model: PhaseModel, count: int) -> None:
+        self._bar, self._windows = model.switch_posterior, model.switch_windows
+        self._candidate = np.full(count, NOBODY)
+        self._seen = np.zeros(count, dtype=np.intp)
+
+    def decide(self, posterior: Float) -> NDArray[np.intp]:
+        """The phase that has been probable for long enough (N,), or `NOBODY`; posterior (N, P)."""
+        best = posterior.argmax(axis=1)
+        sure = posterior[np.arange(len(best)), best] > self._bar
+        self._seen = np.where(sure & (best == self._candidate), self._seen + 1, sure.astype(np.intp))
+        self._candidate = np.where(sure, best, NOBODY)
+        return np.where(self._seen >= self._windows, best, NOBODY)
+
+
+class Asked(NamedTuple):
+    """What the gate says at the end of a window: the phase it asks for (N,) or `NOBODY`, and the posterior (N, P)."""
+
+    phase: NDArray[np.intp]
+    posterior: Float
+
+
+class Gate:
+    """The gate of `skillframe_segmenter.gate` on observations at the control rate.
+
+    Args:
+        model: the phases.
+        center_of_compliance: (3,) where the observed wrench is taken, in the tool frame.
+    """
+
+    def __init__(self, model: PhaseModel, center_of_compliance: Float) -> None:
+        self._model = model
+        self._shift = model.at - center_of_compliance
+        self._moved = bool(np.abs(self._shift).max() > 1e-9)
+        self._members = model.membership
+
+    def start(self, observation: Observation) -> None:
+        """Begin where the demonstrations began."""
+        n, k = len(observation.time), len(self._model.phase_of)
+        self._belief = np.tile(self._model.initial, (n, 1))
+        self._sum, self._ticks = np.zeros((n, 6)), 0
+        self._per_window = max(1, round(WINDOW_S / observation.dt))
+        self._memory: list[Float] = []
+        self._debounce = Debounce(self._model, n)
+        self._home = observation.pose.rotation.copy() if self._model.axes == "phase_start" else None
+        self.posterior = self._belief @ self._members
+        assert k == len(self._members)
+
+    def look(self, observation: Observation) -> Asked | None:
+        """Take in one tick; says something at the end of each window."""
+        self._sum += observation.wrench
+        self._ticks += 1
+        if self._ticks < self._per_window:
+            return None
+        phi = self._regressors(self._sum / self._ticks, observation)
+        self._sum, self._ticks = np.zeros_like(self._sum), 0
+        self._memory = [*self._memory[1 - gate.MEMORY :], phi]
+        self._belief = gate.advance(self._model.gate, self._belief, sum(self._memory[1:], self._memory[0]) / len(self._memory))
+        self.posterior = self._belief @ self._members
+        return Asked(self._debounce.decide(self.posterior), self.posterior)
+
+    def believe(self, row: int, phase: int) -> None:
+        """A trial has entered a phase for another reason than the gate's; let the belief follow."""
+        mine = np.where(self._model.phase_of == phase, self._model.gate.share, 1e-6)
+        self._belief[row] = mine / mine.sum()
+
+    def _regressors(self, wrench: Float, observation: Observation) -> Float:
+        rotation = observation.pose.rotation
+        shift = rotate(rotation, np.broadcast_to(self._shift, (len(wrench), 3))) if self._moved else None
+        if self._model.origin is not None:
+            position = observation.pose.position if shift is None else observation.pose.position + shift
+            return pose_regressors(position, rotation, self._model.origin)
+        if shift is not None:
+            wrench = move_wrench(wrench, shift)
+        if self._home is not None:
+            wrench = (wrench.reshape(-1, 2, 3) @ self._home).reshape(-1, 6)
+        scales = self._model.scales
+        return regressors(soft_pair(wrench, scales.force, scales.torque))
+
+
+class Filter:
+    """The forward algorithm on windows, for demonstrations: motion and wrench both count."""
+
+    def __init__(self, model: PhaseModel, count: int = 1) -> None:
+        self._model, self._count = model, count
+        self._belief: Float | None = None
+
+    def step(self, motion: Float, wrench: Float, drive: Float | None = None) -> Float:
+        """Posterior (N, P) after a window.
+
+        Args:
+            motion: (N, 6) velocity and angular velocity.
+            wrench: (N, 6).
+            drive: (N, R) regressors of the transitions, if it is not the wrench that drives them.
+        """
+        model = self._model
+        contact = soft_pair(wrench, model.scales.force, model.scales.torque)
+        seen = emission.observe(soft_pair(motion, model.scales.speed, model.scales.turning), contact)
+        log_density = model.temper * emission.log_likelihood(seen, model.phases)
+        density = np.exp(log_density - log_density.max(axis=1, keepdims=True))
+        if self._belief is None:
+            ahead = np.tile(model.initial, (self._count, 1))
+        else:
+            steps = transitions.probabilities(model.weights, regressors(contact) if drive is None else drive)
+            ahead = (self._belief[:, :, None] * steps).sum(axis=1)
+        belief = ahead * density + 1e-300
+        self._belief = belief / belief.sum(axis=1, keepdims=True)
+        result: Float = self._belief @ model.membership
+        return result
+
+
+def drive_of(model: PhaseModel, cut: Windows) -> Float:
+    """Regressors (W, R) of the transitions for a demonstration's windows."""
+    if model.origin is not None:
+        return pose_regressors(cut.position, cut.rotation, model.origin)
+    return regressors(soft_pair(cut.wrench, model.scales.force, model.scales.torque))
+
+
+def follow(model: PhaseModel, demonstration: Demonstration, by: str = "filter") -> list[tuple[float, int]]:
+    """Phases of a demonstration as they would have been recognised while it went on.
+
+    Args:
+        model: learned from other demonstrations of the task.
+        demonstration: a new one.
+        by: "filter", or "gate".
+
+    Returns:
+        Time of each switch and the phase that took over; the first entry is where it began.
+    """
+    cut = windows(demonstration, model.at, model.axes)
+    drive = drive_of(model, cut)
+    averaged = gate.averaged(drive)
+    watch, belief, debounce = Filter(model), model.initial[None].copy(), Debounce(model, 1)
+    switches: list[tuple[float, int]] = []
+    for i in range(cut.size):
+        if by == "gate":
+            belief = gate.advance(model.gate, belief, averaged[i : i + 1])
+            posterior = belief @ model.membership
+        else:
+            posterior = watch.step(cut.motion[i : i + 1], cut.wrench[i : i + 1], drive[i : i + 1])
+        phase = int(debounce.decide(posterior)[0])
+        if phase != NOBODY and (not switches or switches[-1][1] != phase):
+            switches.append((cut.start + (i + 1) * WINDOW_S, phase))
+    return switches

@@ -1,0 +1,110 @@
+"""The policy that runs: phases in sequence, each a skill of its own, and what makes one give way to another.
+
+A phase gives way to another that followed it in a demonstration
+
+- when the contact wrench asks for it: the gate's posterior exceeds its bar for two windows of 50 ms; or
+- when its own skill has ended well, as an LMC does that comes to rest while pushing: then to what followed most often,
+
+and the policy ends where demonstrations ended. A phase whose skill fails (a limit of force, time or travel) is
+recovered from: the phase that the wrench asks for begins anew, `recoveries` times; then the policy fails with that
+phase's reason. The journal says which phase ran when, and why it was left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from skillframe.frames import Float
+from skillframe.records import Document
+from skillframe.registry import registry
+from skillframe.sequence import END, Composition, Part
+from skillframe.skill import Command, Observation, Skill, Status
+from skillframe_segmenter.document import PolicyDocument, read
+from skillframe_segmenter.observer import NOBODY, Gate
+
+SETTLE_S = 0.15  # after entering a phase, before the gate may end it: three windows
+
+
+def build(document: Document) -> Policy:
+    """The runnable policy of a checked document."""
+    policy = read(document)
+    parts = [
+        Part(f"phase {i + 1}", _maker(sub)) for i, sub in enumerate(policy.skills)
+    ]
+    center = np.array(document["frame"]["center_of_compliance"], dtype=float)
+    return Policy(parts, policy, None if policy.model is None else Gate(policy.model, center))
+
+
+def _maker(document: Document) -> Callable[[], Skill]:
+    kind = registry().skill(document["type"])
+    return lambda: kind.build(document)
+
+
+class Policy(Composition):
+    """Phases of N trials.
+
+    Args:
+        parts: the phases' skills.
+        policy: what follows what.
+        gate: what the wrench says; None if phases end by themselves only.
+    """
+
+    def __init__(self, parts: Sequence[Part], policy: PolicyDocument, gate: Gate | None) -> None:
+        super().__init__(parts)
+        self._policy, self._gate = policy, gate
+
+    def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
+        """Begin with the first phase."""
+        super().start(observation, rngs)
+        self._recovered = np.zeros(len(rngs), dtype=np.intp)
+        self._entered = observation.time.copy()
+        if self._gate is not None:
+            self._gate.start(observation)
+
+    def step(self, observation: Observation) -> Command:
+        """Let the phases answer, and look what the wrench asks for at the end of a window."""
+        command = super().step(observation)
+        asked = None if self._gate is None else self._gate.look(observation)
+        if asked is None:
+            return command
+        wanted = (asked.phase != NOBODY) & (asked.phase != self.current) & (command.status == Status.RUNNING)
+        wanted &= observation.time - self._entered >= SETTLE_S
+        for i in np.flatnonzero(wanted).tolist():
+            phase = int(asked.phase[i])
+            pending = self._due is not None and self._due[i] != END
+            if not pending and self._policy.successors[self.current[i], phase] > 0.0:
+                sure = float(asked.posterior[i, phase])
+                self._go(i, phase, float(observation.time[i]), f"begins, as the wrench asks for it ({sure:.0%} sure)")
+        return command
+
+    def follows(self, row: int, part: int, status: int, reason: str) -> tuple[int, int, str]:
+        """What followed most often after a success; after a failure, what the wrench asks for."""
+        if status == Status.SUCCESS:
+            following = int(self._policy.successors[part].argmax())
+            if following == len(self.parts):
+                return END, status, reason
+            return following, Status.RUNNING, f"begins, as phase {part + 1} ended: {reason}"
+        if self._recovered[row] < self._policy.recoveries:
+            self._recovered[row] += 1
+            following = part if self._gate is None else int(self._gate.posterior[row].argmax())
+            return following, Status.RUNNING, f"begins anew, as phase {part + 1} failed: {reason}"
+        return END, status, reason
+
+    def switch(self, row: int, part: int, time: float, why: str) -> None:
+        """Enter a phase for a reason of the phases' own, and let the gate know."""
+        self._go(row, part, time, why)
+        if self._gate is not None:
+            self._gate.believe(row, part)
+
+    def _go(self, row: int, part: int, time: float, why: str) -> None:
+        super().switch(row, part, time, why)
+        self._entered[row] = time
+
+
+def successor_words(successors: Float, phase: int) -> str:
+    """What follows a phase, in words."""
+    names = [f"phase {j + 1}" for j in range(len(successors))] + ["the end"]
+    order = [j for j in np.argsort(-successors[phase]).tolist() if successors[phase, j] > 0.0]
+    return " or ".join(names[j] for j in order) or "the end"
