@@ -6,7 +6,8 @@ import numpy as np
 
 from skillframe.executor import simulate
 from skillframe.world.convert import build_spec
-from skillframe.world.plant import Layout, Plant
+from skillframe.world.layout import Layout
+from skillframe.world.plant import Plant
 from tests.laws.runs import generators
 
 

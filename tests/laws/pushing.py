@@ -60,3 +60,28 @@ class Push(Skill):
         reason = self.none.copy()
         reason[done] = "stalled"
         return np.where(done, Status.SUCCESS, Status.RUNNING), reason
+
+
+class Hold(Skill):
+    """Stay where the run started, plus an offset and a feed-forward; end with a status when told to."""
+
+    def __init__(self, stiffness, offset=(0.0, 0.0, 0.0), feedforward=lambda time: np.zeros(6), damping=None, end=None):
+        self.stiffness, self.offset, self.feedforward, self.damping, self.end = (
+            stiffness,
+            offset,
+            feedforward,
+            damping,
+            end,
+        )
+
+    def start(self, observation, rngs):
+        self.pose = Pose(observation.pose.position + np.array(self.offset), observation.pose.rotation.copy())
+        self.impedance = Impedance(self.stiffness, self.damping)
+
+    def step(self, observation):
+        count, time = len(observation.time), observation.time[0]
+        status, reason = np.zeros(count, dtype=int), no_reasons(count)
+        if self.end is not None and time >= self.end[0]:
+            status[:], reason[:] = self.end[1], self.end[2]
+        push = np.broadcast_to(self.feedforward(time), (count, 6))
+        return Command(self.pose, np.zeros((count, 6)), self.impedance, push, status, reason)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from skillframe.world.convert import build_spec
+from skillframe.world.layout import Layout
 from skillframe.world.placement import fixture_poses, start_configurations
-from skillframe.world.plant import Layout
 from tests.laws.pinocchio_loop import Loop
 from tests.laws.pushing import FORCE_CAP, Push, impedance
 from tests.laws.runs import run, setup

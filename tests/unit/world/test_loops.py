@@ -9,7 +9,7 @@ import pytest
 from skillframe.robot.loops import ClosedChain, step
 from skillframe.robot.model import attach_payload
 from skillframe.world.convert import build_spec
-from skillframe.world.plant import Layout
+from skillframe.world.layout import Layout
 
 START = np.array([np.pi / 4, -np.pi / 2, 0.5])
 POSES = [START, [0.9, -2.0, 0.0], [0.2, -1.5, 0.8], [1.3, -0.9, 0.2], [0.6, -1.2, 1.1]]

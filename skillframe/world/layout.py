@@ -1,0 +1,125 @@
+"""Where an arm's things lie in a compiled model, and its Jacobian from what MuJoCo has already computed.
+
+For a hinge with axis a through the point c the column of a point p is [a x (p - c); a], for a slide [a; 0], for a free
+base [1, -[r]x R; 0, R], whose linear velocity is in base axes and angular velocity in its own. It equals Pinocchio's
+(tested to 1e-10).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.frames import Float, cross
+from skillframe.robot.model import RobotModel
+from skillframe.world.convert import FIXTURE, SECOND, SENSOR, TOOL
+
+
+class Layout:
+    """Where an arm's things lie in the compiled model: body ids, joint addresses, the order of coordinates."""
+
+    def __init__(self, model: mujoco.MjModel, sensor: str = SENSOR, tool: str = TOOL) -> None:
+        self.model = model
+        self.sensor, self.tool, self.fixture = (model.body(name).id for name in (sensor, tool, FIXTURE))
+        self.root = int(model.body_rootid[self.tool])
+        first = int(model.sensor(f"{sensor}_force").adr[0])
+        self.readings = slice(first, first + 6)
+        fixed = {0} | {b for b in range(model.nbody) if model.body(b).name in (FIXTURE, TOOL, SENSOR, SECOND)}
+        self.links = np.array([b for b in range(model.nbody) if b not in fixed])
+        self.free = bool(model.njnt and model.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE)
+        self._set_chain(model)
+        self._rows, self._columns = _sparse_indices(model)
+
+    def _set_chain(self, model: mujoco.MjModel) -> None:
+        ancestors, body = set(), self.sensor
+        while body:
+            ancestors.add(body)
+            body = int(model.body_parentid[body])
+        joints = [j for j in range(model.njnt) if int(model.jnt_bodyid[j]) in ancestors]
+        hinge, slide = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
+        hinges = np.array([j for j in joints if model.jnt_type[j] == hinge], dtype=int)
+        slides = np.array([j for j in joints if model.jnt_type[j] == slide], dtype=int)
+        self.turns, self.shifts = len(hinges) > 0, len(slides) > 0
+        self.hinges, self.hinge_dofs = _span(hinges), _span(model.jnt_dofadr[hinges])
+        self.slides, self.slide_dofs = _span(slides), _span(model.jnt_dofadr[slides])
+        self.dofs = np.sort(model.jnt_dofadr[np.concatenate([hinges, slides])]).astype(np.int64)
+
+    def friction_share(self, robot: RobotModel) -> Float:
+        """(nv,) part of the drawn joint friction that each generalised velocity gets."""
+        share = np.ones(self.model.nv)
+        for name, part in robot.spec.friction_share.items():
+            share[self.model.joint(name).dofadr[0]] = part
+        return share
+
+    def jacobian(self, anchor: Float, axis: Float, xmat: Float, point: Float) -> Float:
+        """(N, 6, nv): for a hinge [a x (p - anchor); a], for a slide [a; 0], for a free base [1, -[r]x R; 0, R]."""
+        jacobian = np.zeros((len(point), 6, self.model.nv))
+        if self.turns:
+            a = axis[:, self.hinges]
+            lever = point[:, None] - anchor[:, self.hinges]
+            jacobian[:, :3, self.hinge_dofs] = np.swapaxes(cross(a, lever), 1, 2)
+            jacobian[:, 3:, self.hinge_dofs] = np.swapaxes(a, 1, 2)
+        if self.shifts:
+            jacobian[:, :3, self.slide_dofs] = np.swapaxes(axis[:, self.slides], 1, 2)
+        if self.free:
+            body = int(self.model.jnt_bodyid[0])
+            rotation = xmat[:, body].reshape(-1, 3, 3)
+            r = point - anchor[:, 0]
+            jacobian[:, [0, 1, 2], [0, 1, 2]] = 1.0
+            jacobian[:, 3:, 3:6] = rotation
+            jacobian[:, :3, 3:6] = np.swapaxes(cross(np.swapaxes(rotation, 1, 2), r[:, None]), 1, 2)
+        return jacobian
+
+    def dense(self, sparse: Float) -> Float:
+        """Symmetric matrices (N, nv, nv) from MuJoCo's row-compressed lower triangles."""
+        nv = self.model.nv
+        result = np.zeros((len(sparse), nv, nv))
+        result[:, self._rows, self._columns] = sparse
+        result[:, self._columns, self._rows] = sparse
+        return result
+
+    def to_mujoco(self, model: Any, configuration: Float) -> Float:
+        """Pinocchio's configuration (N, nq) in MuJoCo's order: quaternions w first, continuous joints as angles."""
+        qpos = np.zeros((len(configuration), self.model.nq))
+        for index in range(1, model.njoints):
+            joint, start = model.joints[index], model.joints[index].idx_q
+            address = int(self.model.joint(model.names[index]).qposadr[0])
+            if joint.nq == 7:
+                qpos[:, address : address + 7] = configuration[:, start + np.array([0, 1, 2, 6, 3, 4, 5])]
+            elif joint.nq == 2:
+                qpos[:, address] = np.arctan2(configuration[:, start + 1], configuration[:, start])
+            else:
+                qpos[:, address] = configuration[:, start]
+        return qpos
+
+    def to_pinocchio(self, model: Any, qpos: Float) -> Float:
+        """The inverse of `to_mujoco`."""
+        configuration = np.zeros((len(qpos), model.nq))
+        for index in range(1, model.njoints):
+            joint, start = model.joints[index], model.joints[index].idx_q
+            address = int(self.model.joint(model.names[index]).qposadr[0])
+            if joint.nq == 7:
+                configuration[:, start : start + 7] = qpos[:, address + np.array([0, 1, 2, 4, 5, 6, 3])]
+            elif joint.nq == 2:
+                angle = qpos[:, address]
+                configuration[:, start], configuration[:, start + 1] = np.cos(angle), np.sin(angle)
+            else:
+                configuration[:, start] = qpos[:, address]
+        return configuration
+
+
+def _span(indices: NDArray[np.int64]) -> slice | NDArray[np.int64]:
+    """Indices as a slice where they follow each other: a view, where an array of indices would copy."""
+    first, count = (int(indices[0]) if len(indices) else 0), len(indices)
+    return slice(first, first + count) if np.array_equal(indices, np.arange(first, first + count)) else indices
+
+
+def _sparse_indices(model: mujoco.MjModel) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    rows = np.repeat(np.arange(model.nv), model.M_rownnz)
+    columns = np.concatenate(
+        [model.M_colind[a : a + n] for a, n in zip(model.M_rowadr, model.M_rownnz, strict=True)] or [np.zeros(0, int)]
+    )
+    return rows.astype(np.int64), columns.astype(np.int64)
