@@ -135,7 +135,7 @@ class _ArmsLoop(Loop):
         self.nominal_views = self.nominal.arms() if self.nominal is not self.plant else self.views
         self.path = np.zeros((self.count, self.arms, len(self.views[0].dofs)))
         self.turned = np.zeros((self.count, self.arms, 3))
-        self.start_rotation = self._by_arm([view.tool_pose().rotation for view in self.views]).copy()
+        self.start_rotation = self._by_arm([view.tool_pose().rotation for view in self.views])
 
     def _prepare_rows(self) -> None:
         self.views = self.plant.arms()
@@ -147,11 +147,14 @@ class _ArmsLoop(Loop):
         self.coc, self.rows = np.tile(self.points, (self.count, 1)), self.count * self.arms
 
     def _by_arm(self, parts: Sequence[Float]) -> Float:
-        """(N, arms, ...) out of one (N, ...) per arm."""
-        return np.stack(parts, axis=1)
+        """(N, arms, ...) out of one (N, ...) per arm; in C order, or rounding would depend on N."""
+        result = np.empty((self.count, self.arms, *parts[0].shape[1:]))
+        for arm, part in enumerate(parts):
+            result[:, arm] = part
+        return result
 
     def _as_rows(self, parts: Sequence[Float]) -> Float:
-        stacked = np.stack(parts, axis=1)
+        stacked = self._by_arm(parts)
         return stacked.reshape(self.rows, *stacked.shape[2:])
 
     def _sensors(self, rngs: Sequence[np.random.Generator], draws: Draws) -> _ArmSensors:  # type: ignore[override]
