@@ -38,8 +38,8 @@ class ReferenceBank:
         self.y = np.full((self.count, len(self.outputs)), np.nan)
         self.active, self.status = np.ones(self.count, np.uint8), np.zeros(self.count, np.int64)
         self.notes: tuple[str, ...] = (
-            "no C compiler: hydraulic_cylinder runs as its Python reference, same equations, in numpy, a hundred times slower for one trial"
-            " (pip install ziglang is one way to get a compiler)",
+            "no C compiler: hydraulic_cylinder runs as its Python reference, the same equations in numpy, a hundred"
+            " times slower for one trial (pip install ziglang is one way to get a compiler)",
         )
         self._specs = [specs[i % len(specs)] for i in range(self.count)]
         self._defaults = {row.name: row.entry.start for row in rows(table) if row.causality == "parameter"}
