@@ -1,0 +1,154 @@
+"""What two arms do together, as checked records, and the published configurations A to E.
+
+One linear motion with compliance is shared by both arms: the same direction, compliant axes and stiffness, each arm in
+its own tool axes at the start (as published). Arms differ in where their centre of compliance is, in which of
+translation and rotation they give way, and in their share of the motion (published: 1 and 0).
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from skillframe.config import build
+from skillframe.errors import InputError, UnknownName
+from skillframe.frames import norm
+from skillframe.records import Document
+
+Vector = tuple[float, float, float]
+Mode = Literal["independent", "relative"]
+PARTS = ("translation", "rotation")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arm:
+    """One arm's part.
+
+    Attributes:
+        center_of_compliance: point of its tool frame [m].
+        compliant: in what it gives way along the phase's compliant axes: "translation", "rotation", both or nothing.
+        share: of the motion along the desired direction; the arms' shares add up to 1.
+    """
+
+    center_of_compliance: Vector
+    compliant: tuple[str, ...] = ()
+    share: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Phase:
+    """A motion with compliance for two arms. Stiffness, speed, lead and limits are ours: the paper gives none.
+
+    Attributes:
+        arms: the arm that holds the tool, then the one that holds the fixture.
+        desired_direction: (3,) unit vector, first arm's tool axes at the start.
+        compliant_translation, compliant_rotation: unit vectors, each arm's own tool axes at the start.
+        mode: "independent": each arm knows itself alone (published); "relative": what is compliant is the motion of
+            one arm relative to the other, while the pair as a whole is held.
+        speed: of one arm relative to the other [m/s].
+        stiffness: [N/m]; turn_stiffness: [Nm/rad]; zero along compliant axes.
+        lead_force_n: largest push; the desired pose of an arm never leads by more than this over the stiffness.
+        stall_s, stall_m: at rest when, while pushing, the arms have approached by less than this for this long.
+        time_limit_s: longer than this fails.
+    """
+
+    arms: tuple[Arm, Arm]
+    desired_direction: Vector = (0.0, 0.0, 1.0)
+    compliant_translation: tuple[Vector, ...] = ((1.0, 0.0, 0.0),)
+    compliant_rotation: tuple[Vector, ...] = ((0.0, 1.0, 0.0),)
+    mode: Mode = "independent"
+    speed: float = 0.02
+    stiffness: float = 600.0
+    turn_stiffness: float = 40.0
+    lead_force_n: float = 30.0
+    stall_s: float = 3.0
+    stall_m: float = 1e-4
+    time_limit_s: float = 60.0
+
+
+BOTH = PARTS
+CONFIGURATIONS: dict[str, tuple[tuple[str, tuple[str, ...]], tuple[str, tuple[str, ...]]]] = {
+    "A": (("wrist", BOTH), ("tip", ())),
+    "B": (("tip", BOTH), ("tip", ())),
+    "C": (("tip", ()), ("tip", BOTH)),
+    "D": (("tip", ("rotation",)), ("tip", ("rotation",))),
+    "E": (("tip", BOTH), ("tip", BOTH)),
+}
+"""Table I of the two-arm paper: per arm the centre of compliance and what is compliant; master (peg), then slave."""
+
+
+def configured(phase: Phase, name: str, frames: dict[str, Vector]) -> Phase:
+    """A phase in one of the configurations A to E, the first arm moving.
+
+    Args:
+        phase: everything else.
+        name: "A" to "E".
+        frames: named points of the tool frames: "wrist" and "tip".
+
+    Raises:
+        UnknownName: no such configuration.
+    """
+    if name not in CONFIGURATIONS:
+        raise UnknownName("configuration", name, CONFIGURATIONS)
+    first, second = (
+        Arm(center_of_compliance=frames[point], compliant=parts, share=share)
+        for (point, parts), share in zip(CONFIGURATIONS[name], (1.0, 0.0), strict=True)
+    )
+    return replace(phase, arms=(first, second))
+
+
+def relative(phase: Phase) -> Phase:
+    """The relative task: both arms give way where either did; who moves stays as it is."""
+    parts = tuple(part for part in PARTS if any(part in arm.compliant for arm in phase.arms))
+    first, second = (replace(arm, compliant=parts) for arm in phase.arms)
+    return replace(phase, arms=(first, second), mode="relative")
+
+
+def body(phase: Phase) -> Document:
+    """The part of a skill document that this kind writes: `frame` and `phases`."""
+    point = list(phase.arms[0].center_of_compliance)
+    frame = {"work_at": point, "learned_at": point, "center_of_compliance": point, "axes": "phase_start"}
+    return {"frame": frame, "phases": [_plain(asdict(phase))]}
+
+
+def _plain(value: Any) -> Any:
+    """Tuples as lists, as JSON gives them back."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
+
+
+def read_phase(document: Document) -> Phase:
+    """The phase of a document.
+
+    Raises:
+        InputError: not exactly one phase or two arms, or a value that makes no sense.
+    """
+    phases = document.get("phases", [])
+    if len(phases) != 1:
+        raise InputError("phases", f"two arms share one phase, this has {len(phases)}", "learn it again")
+    phase = build(Phase, phases[0], "phases[0]")
+    _check(phase)
+    return phase
+
+
+def _check(phase: Phase) -> None:
+    where = "phases[0]"
+    vectors = [phase.desired_direction, *phase.compliant_translation, *phase.compliant_rotation]
+    if any(abs(float(norm(np.array(v))) - 1.0) > 0.01 for v in vectors):
+        raise InputError(where, "holds a direction or compliant axis that is no unit vector", "divide by its length")
+    positive = ("speed", "stiffness", "turn_stiffness", "lead_force_n", "stall_s", "stall_m", "time_limit_s")
+    for key in positive:
+        if getattr(phase, key) <= 0.0:
+            raise InputError(f"{where}.{key}", "should be positive", "mend it")
+    shares = [arm.share for arm in phase.arms]
+    if min(shares) < 0.0 or abs(sum(shares) - 1.0) > 1e-9:
+        raise InputError(f"{where}.arms", f"shares of the motion are {shares}", "let them add up to 1")
+    for i, arm in enumerate(phase.arms):
+        for part in arm.compliant:
+            if part not in PARTS:
+                raise InputError(f"{where}.arms[{i}].compliant", str(UnknownName("part", part, PARTS)))
+    if phase.mode == "relative" and set(phase.arms[0].compliant) != set(phase.arms[1].compliant):
+        raise InputError(f"{where}.arms", "a relative task gives way alike in both arms", "make `compliant` equal")
