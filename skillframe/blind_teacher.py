@@ -7,7 +7,8 @@ How they moved was not published, so **every figure here is our assumption**, no
     via points: a local step of lognormal length (6 in 10), else a fresh draw of the belief
     between them: minimum jerk, s = 10 u^3 - 15 u^4 + 6 u^5, lasting length / speed + 0.15 s, then a dwell
     push: force + Ornstein-Uhlenbeck noise; in 15 of 100 segments a tap, the part just lifted for most of the way
-    hand: 2000 N/m across the push (at 1000 N/m friction alone would hold the part 2 mm behind), none along it
+    hand: 1000 N/m across the push, none along it; it leans on until the part is where he means it, within 0.2 s,
+        because he feels where the part is (or friction alone would hold it 2 mm behind)
 
 The teacher ends when the part falls in (he feels it) or when his time is up. It is a skill, run by the one executor in
 the same world with the same sensors as any run. Rotation about the push is searched too if its belief is not zero.
@@ -22,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from skillframe.errors import InputError
-from skillframe.frames import Float, Pose, norm, rotation_matrix, unit
+from skillframe.frames import Float, Pose, cross, norm, rotation_matrix, unit
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 from skillframe.world.scene import Vector
 
@@ -30,6 +31,7 @@ LEVER = 0.023  # m per rad: what a turn counts as in the length of a step
 CUT = 2.5  # standard deviations
 REST_S = 1.0  # the push grows for this long before the hand moves
 SMOOTH_S = 0.1  # how gently the push changes
+LEAN_S, LEAN_M = 0.2, 0.004  # how fast, and how far at most, the hand leans on
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +63,7 @@ class BlindSettings:
     dwell_s: tuple[float, float] = (0.1, 0.4)
     taps: float = 0.15
     tremor: float = 1e-4
-    stiffness: float = 2000.0
+    stiffness: float = 1000.0
     turn_stiffness: float = 60.0
 
     def __post_init__(self) -> None:
@@ -107,7 +109,7 @@ class BlindTeacher(Skill):
         self._push, self._settings = unit(np.asarray(direction, dtype=float)), settings
         across = np.eye(3)[0 if abs(self._push[0]) < 0.9 else 1]
         first = unit(across - (across @ self._push) * self._push)
-        self._axes = np.stack([first, np.cross(-self._push, first), -self._push])  # last: the turn's axis
+        self._axes = np.stack([first, cross(-self._push, first), -self._push])  # last: the turn's axis
 
     def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
         """Take hold of the tool where it is, and decide the way blindly."""
@@ -121,7 +123,7 @@ class BlindTeacher(Skill):
         # 60 Ns/m across; 200 Ns/m along, because a person lets a part down rather than drops it
         damping[:3, :3], damping[3:, 3:] = 60.0 * np.eye(3) + 140.0 * along, 1.5 * np.eye(3)
         self._impedance, self._tick = Impedance(stiffness, damping), 0
-        self._level = np.full(len(rngs), np.nan)
+        self._level, self._lean = np.full(len(rngs), np.nan), np.zeros((len(rngs), 2))
 
     def step(self, observation: Observation) -> Command:
         """Follow the script; end where the part has fallen in."""
@@ -129,7 +131,9 @@ class BlindTeacher(Skill):
         place, rate, force = self._place[:, tick], self._rate[:, tick], self._force[:, tick]
         self._tick += 1
         count = len(place)
-        position = self._home.position + place[:, :2] @ self._axes[:2]
+        where = (observation.pose.position - self._home.position) @ self._axes[:2].T
+        self._lean = np.clip(self._lean + (place[:, :2] - where) * (observation.dt / LEAN_S), -LEAN_M, LEAN_M)
+        position = self._home.position + (place[:, :2] + self._lean) @ self._axes[:2]
         normal = self._axes[2]
         rotation = rotation_matrix(place[:, 2:] / LEVER * normal) @ self._home.rotation
         twist = np.concatenate([rate[:, :2] @ self._axes[:2], rate[:, 2:] / LEVER * normal], axis=-1)

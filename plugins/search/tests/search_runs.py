@@ -21,6 +21,7 @@ PEG = {"fillet": 0.0008, "done_depth": FOUND_M}
 SOCKET = {"done_depth": FOUND_M}
 PARAMS = {"peg_in_hole": PEG, "socket": SOCKET}
 SPEED = 0.015
+NEAR_M, NEAR_RAD = 0.0015, 0.06  # a part set down this near falls in by itself
 
 
 @cache
@@ -48,11 +49,15 @@ def document(kind, world, believed, centre=(0.0, 0.0, 0.0), **settings):
 
 
 def goals(count, believed, centre=(0.0, 0.0, 0.0), seed=100):
-    """(count, 3) where the goal is against the start [m, m, rad]: draws of the belief, cut at 2.5 deviations each."""
+    """(count, 3) where the goal is against the start [m, m, rad].
+
+    Draws of the belief, cut at 2.5 deviations each, without those so near that there is nothing to search for.
+    """
     rng = np.random.default_rng(seed)
     normal = rng.standard_normal((20 * count, 3))
-    normal = normal[np.abs(normal).max(axis=1) < CUT][:count]
-    return np.array(centre) + normal * np.array(believed)
+    where = np.array(centre) + normal[np.abs(normal).max(axis=1) < CUT] * np.array(believed)
+    trivial = (np.hypot(where[:, 0], where[:, 1]) < NEAR_M) & (np.abs(where[:, 2]) < NEAR_RAD)
+    return where[~trivial][:count]
 
 
 def starts(where):

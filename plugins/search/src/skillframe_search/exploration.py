@@ -57,13 +57,12 @@ class Exploration:
         """(k, k) the covariance in square metres, alike."""
         return np.array(self.covariance) * np.outer(self.scale, self.scale)
 
-    def draw(self, rng: np.random.Generator, count: int) -> Float:
-        """(count, k) samples [m], none farther out than 2.5 standard deviations."""
-        normal = rng.standard_normal((2 * count + 16, len(self.mean)))
-        kept = normal[norm(normal) <= CUT][:count]
-        while len(kept) < count:  # the chance of this is small
-            more = rng.standard_normal((count, len(self.mean)))
-            kept = np.concatenate([kept, more[norm(more) <= CUT]])[:count]
+    def draw(self, rng: np.random.Generator, count: int, cut: float = CUT) -> Float:
+        """(count, k) samples [m], none farther out than `cut` standard deviations."""
+        kept = np.zeros((0, len(self.mean)))
+        while len(kept) < count:
+            more = rng.standard_normal((2 * count + 16, len(self.mean)))
+            kept = np.concatenate([kept, more[norm(more) <= cut]])[:count]
         return self.center + kept @ np.linalg.cholesky(self.spread).T
 
 

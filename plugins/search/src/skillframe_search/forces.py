@@ -5,7 +5,7 @@ calls its model that; its class was not published, the mixture is our choice). G
 
     E[w | v] = sum_k h_k(v) (m_w,k + S_wv,k S_vv,k^-1 (v - m_v,k)),   h_k ~ pi_k N(v; m_v,k, S_vv,k)
 
-The number of components is the best of 1 to 4 by BIC on samples of 25 Hz. More always look better to it, because the
+The number of components is the best of 1 to 8 by BIC on samples of 25 Hz. More always look better to it, because the
 samples of one sliding motion are alike, hence the limit (ours).
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from skillframe.frames import Float
 
-MOST_COMPONENTS, ITERATIONS = 4, 60
+MOST_COMPONENTS, ITERATIONS = 8, 60
 FLOOR = 1e-3  # of each standardised variance, so that no component collapses
 
 

@@ -44,7 +44,7 @@ class Settings:
     feedforward: Literal["learned", "constant"] = "learned"
     speed: float | None = None
     push: float | None = None
-    acceleration: float = 0.15
+    acceleration: float = 0.3
     contact_n: float = 3.0
     stiffness: float = 2000.0
     turn_stiffness: float = 60.0

@@ -83,10 +83,9 @@ class SearchSkill(Skill):
         dt = 0.0 if self._first else observation.dt
         self._first = False
         running = self._status == Status.RUNNING
-        fallen = self._watch.look(observation)
+        fallen = self._watch.look(observation) & np.isfinite(self._touched)
         self._begin(observation, running)
-        searching = running & np.isfinite(self._touched)
-        self._judge(observation, searching, fallen & searching)
+        self._judge(observation, running & np.isfinite(self._touched), fallen)
         return self._command(observation, dt)
 
     def _begin(self, observation: Observation, running: NDArray[np.bool_]) -> None:

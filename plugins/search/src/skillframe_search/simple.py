@@ -19,8 +19,7 @@ FINE = 2e-4  # m between the spiral's points
 def spiral(dimensions: int, pitch: float, length: float, layers: Sequence[float] = (0.0,)) -> Float:
     """(n, k) places [m]: each layer takes its share of the length; a layer is an offset of the last coordinate."""
     share = length / len(layers)
-    # length of r = p t / 2 pi up to angle t is about p t^2 / 4 pi, exact enough beyond the first half turn
-    last = np.sqrt(4.0 * np.pi * share / pitch) + np.pi
+    last = np.sqrt(4.0 * np.pi * share / pitch)  # the length up to angle t is p t^2 / 4 pi, but for the first turn
     angle = np.sqrt(np.linspace(0.0, last**2, max(round(share / FINE), 16)))
     flat = (pitch * angle / (2.0 * np.pi))[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     parts = []

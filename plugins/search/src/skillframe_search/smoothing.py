@@ -21,7 +21,7 @@ from skillframe.errors import SkillframeError
 from skillframe.frames import Float, norm
 
 STEP_S = 0.02
-SLACK = 1.15
+SLACK = 1.05
 WEIGHT = 2.0  # of the third difference in mm
 MARGIN = 0.98  # of the bounds: OSQP meets them to a per cent
 SIDES = 4  # pairs of parallel sides: an octagon
