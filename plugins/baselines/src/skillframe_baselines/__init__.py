@@ -1,4 +1,4 @@
-"""Baselines to compare learned skills with; so far `replay`, the recorded motion played again."""
+"""Baselines to compare learned skills with: `replay`, and the motion learners `dmp`, `gmr` and `seds`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from skillframe.records import SkillType
 @hookimpl
 def skillframe_skills() -> Iterable[SkillType]:
     """The baselines' kinds of skill."""
-    from skillframe_baselines import document, replay
+    from skillframe_baselines import dmp, document, gmr, replay, seds
 
     yield SkillType(
         name="replay",
@@ -21,4 +21,29 @@ def skillframe_skills() -> Iterable[SkillType]:
         learn=document.learn,
         describe=document.describe,
         example=document.example,
+    )
+    yield SkillType(
+        name="dmp",
+        summary="Dynamic movement primitive: a spring to the demonstrated goal with a learned forcing term.",
+        build=dmp.build,
+        check=dmp.check,
+        learn=dmp.learn,
+        describe=dmp.describe,
+        example=dmp.example,
+    )
+    yield SkillType(
+        name="gmr",
+        summary="Gaussian mixture regression: the mean motion and wrench over time.",
+        build=gmr.build,
+        check=gmr.check,
+        learn=gmr.learn,
+        describe=gmr.describe,
+    )
+    yield SkillType(
+        name="seds",
+        summary="A stable dynamical system of the pose that ends at the demonstrated goal.",
+        build=seds.build,
+        check=seds.check,
+        learn=seds.learn,
+        describe=seds.describe,
     )

@@ -102,12 +102,12 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
         blend=settings.blend,
         stop=Stop(time=trajectory["time"][-1] + SETTLE),
     )
-    body = {"frame": _frame(demonstration, options), "phases": [asdict(phase)], "trajectory": trajectory}
+    body = {"frame": frame_of(demonstration, options), "phases": [asdict(phase)], "trajectory": trajectory}
     phase_of(body)
     return body
 
 
-def _frame(demonstration: Demonstration, options: LearnOptions) -> Document:
+def frame_of(demonstration: Demonstration, options: LearnOptions) -> Document:
     """The points of the contract; a replay takes no work anywhere, so that `work_at` is for the record only."""
     at = demonstration.point(options.at).tolist()
     hand = options.hand or demonstration.meta.get("hand")
@@ -130,7 +130,7 @@ def resampled(demonstration: Demonstration) -> dict[str, list[Any]]:
     width = max(round(demonstration.rate / RATE), 1)
 
     def on_grid(values: Float) -> Float:
-        smooth = _moving_average(values, width)
+        smooth = moving_average(values, width)
         return np.stack([np.interp(grid, time, column) for column in smooth.T], axis=1)
 
     quaternion = on_grid(_continuous(demonstration.quaternion))
@@ -142,7 +142,7 @@ def resampled(demonstration: Demonstration) -> dict[str, list[Any]]:
     }
 
 
-def _moving_average(values: Float, width: int) -> Float:
+def moving_average(values: Float, width: int) -> Float:
     """Centred mean over `width` samples (made odd), over fewer towards the ends so that the ends stay in place."""
     half = np.minimum(width // 2, np.minimum(np.arange(len(values)), np.arange(len(values))[::-1]))
     total = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
