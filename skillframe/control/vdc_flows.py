@@ -1,8 +1,8 @@
 r"""Virtual Decomposition Control, virtual power flows: why the whole machine is stable when each part is.
 
 Cut every joint and every loop's eyes. The flow at a cut is p = (V_r - V)^T (F_r - F), the required less the actual
-force that passes through. Per body, what goes in less what comes out is (V_r - V)^T (F_r - F) of its net force. At a pin
-or an eye both sides have one velocity and no torque about the axis, so the two flows cancel; at a piston they leave
+force that passes through. Per body, what goes in less what comes out is (V_r - V)^T (F_r - F) of its net force. At a
+pin or an eye both sides have one velocity and no torque about the axis, so the two flows cancel; at a piston they leave
 (xd_r - xd) (f_cr - f_c), which the cylinder's own accompanying function takes up (W.-H. Zhu, "Virtual Decomposition
 Control", Springer 2010). The eyes' forces lambda follow from the passive joints: tau_tree = S f_c + A^T lambda.
 """
@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from skillframe.control.vdc import Bodies
-from skillframe.frames import Float
+from skillframe.frames import Float, cross
 from skillframe.robot.loops import ChainState
 
 
@@ -100,7 +100,7 @@ def _at_body(state: ChainState, frame: int, force: Float) -> pin.Force:
     joint = state.chain.model.frames[frame].parentJoint
     inside = np.array(state.data.oMi[joint].rotation).T @ force
     lever = np.array(state.chain.model.frames[frame].placement.translation)
-    return pin.Force(inside, np.cross(lever, inside))
+    return pin.Force(inside, cross(lever, inside))
 
 
 def _inner(state: ChainState, error: Float, through: Float) -> Float:

@@ -74,6 +74,24 @@ class Task:
         """Rate of J_t times a rate (n,)."""
         return np.concatenate([state.jacobian_drift(self._frame, rate)[self._axes], np.zeros(len(self._joints))])
 
+    def solve(self, chain: ClosedChain, position: Float, start: Float) -> Float:
+        """Minimal coordinates (n,) that put the rows at a position (n,), by Newton's rule from a start near them.
+
+        Raises:
+            InputError: it does not converge; the position is out of reach or at a singular pose.
+        """
+        z = np.array(start, dtype=float)
+        for _ in range(20):
+            state = chain.at(z, np.zeros(len(z)))
+            left = position - self.position(state)
+            if np.abs(left).max() < 1e-12:
+                return z
+            z = z + np.linalg.solve(self.jacobian(state), left)
+        if np.abs(left).max() < 1e-9:
+            return z
+        place = ", ".join(f"{x:.3f}" for x in position)
+        raise InputError("task", f"the machine does not reach ({place})", "choose a nearer position or start")
+
     def generalised(self, state: ChainState, force: Float) -> Float:
         """(n,) generalised forces of a force (3,) of the environment on the tool, base axes."""
         result: Float = state.jacobian(self._frame)[:3].T @ force
