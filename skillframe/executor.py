@@ -119,7 +119,7 @@ def simulate(
         UnreachablePose: the robot cannot reach a start.
         SkillframeError: rates that do not divide.
     """
-    if held(setup.robot, setup.scene):
+    if held(setup.robot, setup.scene) or np.ndim(setup.center_of_compliance) > 1:
         from skillframe.arms import simulate_arms
 
         return simulate_arms(skill, setup, draws, rngs, duration_s=duration_s, trace_hz=trace_hz, progress=progress)

@@ -180,8 +180,9 @@ def test_joint_friction_has_its_share_in_the_wrist():
 
 
 def test_a_robot_with_one_arm_is_refused_in_words():
-    with pytest.raises(SkillframeError, match="needs a robot with two arms"):
-        simulate_arms(Approach(), setup(robot=robot("panda")), {}, rngs(1))
+    for run in (simulate_arms, simulate):
+        with pytest.raises(SkillframeError, match="needs a robot with two arms"):
+            run(Approach(), setup(robot=robot("panda")), {}, rngs(1))
 
 
 def test_a_world_with_nothing_to_hold_is_refused_in_words():
