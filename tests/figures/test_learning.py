@@ -63,7 +63,7 @@ def test_a_peg_gives_the_published_axes(noise):
     )  # fmt: skip
     assert min(none, along, about) >= MOST
     if noise > 10.0 and near < MOST:
-        # half of what the two persons' aims have in common stays in the direction; over 100 pairs 89 are within 6 degrees
+        # half of what the two aims have in common stays in the direction; of 100 pairs, 89 are within 6 degrees
         pytest.xfail(f"not reached: {near} of {PAIRS} within 6 degrees at 15 degrees of aim noise, {MOST} wanted")
     assert near >= MOST
 
