@@ -81,10 +81,10 @@ def _python() -> Finding:
 
 
 def _libraries() -> Iterator[Finding]:
-    """The core's declared dependencies against what is installed; nothing is imported."""
+    """The declared dependencies, optional ones too, against what is installed; nothing is imported."""
     for requirement in metadata.requires("skillframe") or []:
         match = re.match(r"([\w.-]+)\s*(?:>=\s*([\d.]+))?", requirement)
-        if match is None or "extra ==" in requirement:
+        if match is None:
             continue
         name, lowest = match.group(1), match.group(2) or "0"
         try:
@@ -93,7 +93,9 @@ def _libraries() -> Iterator[Finding]:
             found = ""
         enough = bool(found) and _numbers(found) >= _numbers(lowest)
         fix = "" if enough else f"{sys.executable} -m pip install '{name}>={lowest}'"
-        yield Finding(name=name, found=found, needed_for="the core", required=True, fix=fix)
+        extra = re.search(r"extra == ['\"]([\w-]+)", requirement)
+        purpose = f"the optional part {extra.group(1)}" if extra else "the core"
+        yield Finding(name=name, found=found, needed_for=purpose, required=extra is None, fix=fix)
 
 
 def _numbers(version: str) -> tuple[int, ...]:
