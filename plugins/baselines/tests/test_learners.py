@@ -233,15 +233,15 @@ def test_a_thousand_random_starts_converge_and_the_lyapunov_function_decreases(d
     rng = np.random.default_rng(5)
     states = rng.uniform(-5.0, 5.0, (1000, 6))  # five times as far as was demonstrated, in every coordinate
     energy = 0.5 * (states**2).sum(1)
-    first = energy.copy()
-    for _ in range(4000):  # up to 200 s: the slowest rate allowed is 0.2 per second
-        states = skill.advanced(states, np.full(1000, 0.05))
+    for _ in range(15000):  # steps of 5 ms, as in the loop; the slowest rate allowed is 0.2 per second
+        states = skill.advanced(states, np.full(len(states), 0.005))
         now = 0.5 * (states**2).sum(1)
         assert np.all(now < energy)
-        energy = now
-        if energy.max() < 1e-8:
+        left = now > 1e-4  # 1 % of the demonstrations' spread; the rest go on
+        states, energy = states[left], now[left]
+        if not len(states):
             break
-    assert energy.max() < 1e-8 < first.min()
+    assert not len(states)
 
 
 def test_every_component_is_stable_and_an_unstable_one_is_refused(documents):
