@@ -33,7 +33,19 @@ ASKED_WHEN_CALLED = {  # uphill, and only inside the function that needs it
     ("registry", "builtin"),  # loads it as it loads any plug-in
     ("demonstration", "registry"),  # which format reads this file?
 }
-LOOP = {"skill", "sequence", "teacher", "staged_teacher", "blind_teacher", "control", "world", "actuation", "cosim", "executor", "arms"}
+LOOP = {
+    "skill",
+    "sequence",
+    "teacher",
+    "staged_teacher",
+    "blind_teacher",
+    "control",
+    "world",
+    "actuation",
+    "cosim",
+    "executor",
+    "arms",
+}
 SET_UP = {  # finds, builds and unpacks FMUs before a run, simulates one alone, holds a foreign one in its own process
     f"skillframe/actuation/{name}.py"
     for name in ("allow", "build", "child", "extract", "foreign", "library", "record", "toolchain", "worker")

@@ -1,4 +1,4 @@
-"""`socket`: a plug with two round pins and a key, and its socket; the search that needs three dimensions (seed, Fig. 16).
+"""`socket`: a plug with two round pins and a key, and its socket; a search in three dimensions (seed, Fig. 10).
 
 The published task is an electricity socket; its measures are not given. Ours are of the common European kind: pins of
 4.8 mm at 19 mm from each other, and beside them a key that keeps the plug from going in the wrong way round. The key

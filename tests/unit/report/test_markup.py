@@ -2,7 +2,8 @@ import json
 import math
 from html.parser import HTMLParser
 
-from hypothesis import given, strategies as st
+from hypothesis import given
+from hypothesis import strategies as st
 
 from skillframe.report.markup import Markup, json_script, number, percent, tag
 

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import given
+from hypothesis import strategies as st
 from report_fakes import LENGTH, RADIUS, peg_mesh
 
 from skillframe.frames import norm, unit

@@ -5,7 +5,8 @@ import tomllib
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings, strategies as st
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from skillframe.robot.audit import audit
 from skillframe.robot.mass_matrix import SINGULAR, pivot_ratios
