@@ -64,9 +64,11 @@ def load_robot_model(name: str) -> RobotModel:
     """A robot by name or path, ready to be simulated.
 
     Raises:
-        SkillframeError: unknown, does not load, or has no arm.
+        SkillframeError: unknown, does not load, has no arm, or needs loops or actuators that a run does not simulate.
     """
-    return load_model(load_robot(name))
+    spec = load_robot(name)
+    spec.require_simulated()
+    return load_model(spec)
 
 
 def center_of_compliance(document: Document, scene: Scene, coc: str | None) -> Float:
