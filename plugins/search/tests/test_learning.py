@@ -119,7 +119,7 @@ def test_scaling_the_learned_forces_keeps_the_push_exact():
     np.testing.assert_allclose(exerted(phase, rates)[:, :3] @ np.array(phase.push.direction), 6.0, atol=1e-9)
 
 
-def test_samples_are_never_farther_out_than_two_and_a_half_deviations():
+def test_samples_are_never_farther_out_than_the_cut():
     found = Exploration(coordinates=("across_1", "across_2"), mean=(0.01, 0.0), covariance=((4e-6, 1e-6), (1e-6, 9e-6)))
     drawn = found.draw(np.random.default_rng(0), 2000) - found.center
     distance = np.sqrt(np.einsum("ni,ij,nj->n", drawn, np.linalg.inv(found.spread), drawn))

@@ -20,7 +20,7 @@ from skillframe_search.contact import Samples
 COORDINATES = ("across_1", "across_2", "tilt_1", "tilt_2", "turn")
 LEVER = 0.023  # m per rad
 LEAST_M, LEAST_RAD = 5e-4, radians(1.0)
-CUT = 2.5  # standard deviations: nothing is looked for farther out
+CUT = 3.5  # standard deviations: nothing is looked for farther out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,10 +14,11 @@ from matplotlib.patches import Ellipse
 from skillframe.frames import Float, norm
 from skillframe.records import Document, Illustration
 from skillframe_search.contact import surface_axes
-from skillframe_search.exploration import COORDINATES, CUT
+from skillframe_search.exploration import COORDINATES
 from skillframe_search.phase import Phase, read_phase
 from skillframe_search.plan import Plan, exerted, keyed, plan
 
+FAR = 2.5  # standard deviations of the outer ellipse
 INK, BLUE, RED, GREY = "#1d2025", "#2e6fba", "#d1495b", "#b9bec6"
 STYLE = {"font.family": "DejaVu Sans", "font.size": 10, "svg.fonttype": "none", "svg.hashsalt": "skillframe"}
 
@@ -38,7 +39,7 @@ def _where(phase: Phase) -> Illustration:
     if turning:
         _panel(panels[1], phase, trajectory, 0, len(phase.searched) - 1)
     caption = (
-        f"Grey: where the blindfolded person had the tool, against where it started. Ellipses: one and {CUT:g} "
+        f"Grey: where the blindfolded person had the tool, against where it started. Ellipses: one and {FAR:g} "
         f"standard deviations of the Gaussian fitted to it. Blue: one search, {1e3 * trajectory.length:.0f} mm in "
         f"{phase.stop.time_s:g} s."
     )
@@ -59,7 +60,7 @@ def _panel(canvas: Axes, phase: Phase, trajectory: Plan, first: int, second: int
         mean = np.array(phase.exploration.mean)[pair] * factor
         value, vector = np.linalg.eigh(covariance)
         angle = float(np.degrees(np.arctan2(vector[1, 1], vector[0, 1])))
-        for size in (1.0, CUT):
+        for size in (1.0, FAR):
             wide, high = 2.0 * size * np.sqrt(value[::-1])
             canvas.add_patch(Ellipse(tuple(mean), wide, high, angle=angle, fill=False, ec=INK, lw=1.2))
     canvas.plot(0.0, 0.0, "+", color=RED, ms=12, mew=2)

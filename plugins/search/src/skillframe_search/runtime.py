@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from skillframe.frames import Float, Pose, move_wrench, rotate, rotate_spatial, rotation_matrix
 from skillframe.records import Document
-from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
+from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons, rows_of
 from skillframe_search.phase import Phase, read_phase
 from skillframe_search.plan import NUMBERS, keyed, plan
 from skillframe_search.smoothing import STEP_S
@@ -25,6 +25,10 @@ from skillframe_search.watch import Watch
 
 GROWTH_S = 0.2  # the push grows for this long after the touch
 HOLD = 1000.0  # N/m along the push in the approach and at the end
+PER_TRIAL = (  # arrays with a row per trial
+    "_turn", "_push", "_place", "_rate", "_wrench", "_length", "_lever", "_began", "_touched", "_lead", "_status",
+    "_reason", "_stiffness",
+)  # fmt: skip
 
 
 def build(document: Document) -> SearchSkill:
@@ -55,11 +59,11 @@ class SearchSkill(Skill):
         """Take the pose as the search frame, and choose a trajectory for each trial."""
         n = len(rngs)
         self._home = Pose(observation.pose.position.copy(), observation.pose.rotation.copy())
-        self._turn = self._home.rotation if self._in_start_attitude else np.broadcast_to(np.eye(3), (n, 3, 3))
+        self._turn = self._home.rotation.copy() if self._in_start_attitude else np.tile(np.eye(3), (n, 1, 1))
         self._push = rotate(self._turn, np.array(self._phase.push.direction))
         plans = [plan(self._key, int(rng.integers(NUMBERS))) for rng in rngs]
         self._place, self._rate, self._wrench = (np.stack([p[i] for p in plans]) for i in range(3))
-        self._length = [p.length for p in plans]
+        self._length = np.array([p.length for p in plans])
         self._lever = rotate(self._home.rotation, np.broadcast_to(self._shift, (n, 3)))
         self._began, self._touched = observation.time.copy(), np.full(n, np.inf)
         self._lead = np.zeros(n)
@@ -67,7 +71,20 @@ class SearchSkill(Skill):
         self._watch = Watch(self._phase.push, self._stop, self._push, observation)
         self._end = Pose(self._home.position.copy(), self._home.rotation.copy())
         self._stiffness = self._gain(HOLD, np.ones(n, dtype=bool))
-        self._row, self._first = np.arange(n), True
+        self._row = np.arange(n)
+
+    def restart(
+        self, rows: NDArray[np.intp], observation: Observation, rngs: Sequence[np.random.Generator]
+    ) -> None:  # fmt: skip
+        """Begin anew in some trials, from where their tools are now."""
+        anew = SearchSkill(self._phase, self._in_start_attitude, self._shift)
+        anew.start(rows_of(observation, rows), rngs)
+        self._stiffness = self._stiffness.copy()
+        for name in PER_TRIAL:
+            getattr(self, name)[rows] = getattr(anew, name)
+        for mine, theirs in ((self._home, anew._home), (self._end, anew._end)):
+            mine.position[rows], mine.rotation[rows] = theirs
+        self._watch.replace(rows, anew._watch)
 
     def _gain(self, along: float, rows: NDArray[np.bool_]) -> Float:
         """(n, 6, 6) stiffness of some rows with a stiffness along the push."""
@@ -80,13 +97,11 @@ class SearchSkill(Skill):
 
     def step(self, observation: Observation) -> Command:
         """Approach, search or hold, row by row."""
-        dt = 0.0 if self._first else observation.dt
-        self._first = False
         running = self._status == Status.RUNNING
         fallen = self._watch.look(observation) & np.isfinite(self._touched)
         self._begin(observation, running)
         self._judge(observation, running & np.isfinite(self._touched), fallen)
-        return self._command(observation, dt)
+        return self._command(observation)
 
     def _begin(self, observation: Observation, running: NDArray[np.bool_]) -> None:
         """Those who touch the surface for the first time begin to search."""
@@ -97,14 +112,14 @@ class SearchSkill(Skill):
             self._stiffness = self._stiffness.copy()
             self._stiffness[new] = self._gain(0.0, new)
 
-    def _command(self, observation: Observation, dt: float) -> Command:
+    def _command(self, observation: Observation) -> Command:
         status = self._status
         searching = (status == Status.RUNNING) & np.isfinite(self._touched)
         nearing = (status == Status.RUNNING) & ~searching
         elapsed = np.where(searching, observation.time - np.where(searching, self._touched, 0.0), 0.0)
         place, rate, wrench = self._on_plan(elapsed)
         grown = np.where(searching, np.clip(elapsed / GROWTH_S, 0.0, 1.0), 0.0)[:, None]
-        self._advance(dt, nearing)
+        self._advance(observation.dt, nearing)
         along = np.where(searching, self._watch.depth, self._lead)
         position = self._home.position + place[:, :3] + along[:, None] * self._push
         rotation = rotation_matrix(place[:, 3:]) @ self._home.rotation

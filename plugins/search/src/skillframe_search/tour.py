@@ -6,7 +6,7 @@ next to the way so far is passed over. And rounds go from the middle outwards: w
 at on the way, search theory (Koopman 1957) spends it where the goal is likeliest, here within c standard deviations of
 which the way could just fill the volume,
 
-    l w^(k-1) v_(k-1) = v_k c^k |S|^(1/2),    1 <= c <= 2.5,    v_k the volume of the unit ball
+    l w^(k-1) v_(k-1) = v_k c^k |S|^(1/2),    1 <= c <= 3.5,    v_k the volume of the unit ball
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def tour(exploration: Exploration, length: float, rng: np.random.Generator, seen
 
 
 def reach(exploration: Exploration, length: float) -> float:
-    """The standard deviations within which a way of a length could look everywhere, 1 to 2.5."""
+    """The standard deviations within which a way of a length could look everywhere, 1 to 3.5."""
     k = len(exploration.mean)
     looked = length * SEEN_M ** (k - 1) * BALL[k - 1]
     volume = BALL[k] * float(np.sqrt(np.linalg.det(exploration.spread)))

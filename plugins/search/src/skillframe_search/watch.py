@@ -29,10 +29,15 @@ class Watch:
 
     def __init__(self, push: Push, stop: Stop, direction: Float, observation: Observation) -> None:
         count = len(observation.time)
-        self._push, self._stop, self._direction = push, stop, direction
+        self._push, self._stop, self._direction = push, stop, direction.copy()
         self._home = observation.pose.position.copy()
         self.answer, self.depth = np.zeros(count), np.zeros(count)
         self._surface, self._lost = np.zeros(count), np.full(count, -np.inf)
+
+    def replace(self, rows: NDArray[np.intp], other: Watch) -> None:
+        """Watch some trials as another watch does, which watches them alone."""
+        for name in ("_direction", "_home", "answer", "depth", "_surface", "_lost"):
+            getattr(self, name)[rows] = getattr(other, name)
 
     def touched(self) -> NDArray[np.bool_]:
         """Which trials press against something now."""
