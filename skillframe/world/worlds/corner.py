@@ -81,11 +81,7 @@ def _fixture(half: float) -> tuple[Geom, ...]:
     reach, height = 0.12, 0.04
     table = Geom(kind="box", size=(reach, reach, 0.02), position=(-0.05, -0.05, -0.02), rgba=FIXTURE_COLOUR)
     walls = [
-        Geom(
-            kind="box", size=(WALL, reach, height), position=(half + WALL, -0.05, height - 0.02), rgba=FIXTURE_COLOUR
-        ),
-        Geom(
-            kind="box", size=(reach, WALL, height), position=(-0.05, half + WALL, height - 0.02), rgba=FIXTURE_COLOUR
-        ),
+        Geom(kind="box", size=(WALL, reach, height), position=(half + WALL, -0.05, height - 0.02), rgba=FIXTURE_COLOUR),
+        Geom(kind="box", size=(reach, WALL, height), position=(-0.05, half + WALL, height - 0.02), rgba=FIXTURE_COLOUR),
     ]
     return (table, *walls)

@@ -1,13 +1,14 @@
 """`hose_coupler`: two coupler faces that align flush under push (seed, Fig. 12); tool point at the flange.
 
 A disc of radius 30 mm and fillet 2 mm stands for the coupler's face, 150 mm ahead of the flange; the fixture is the
-other half's flat face. With `interlock` the coupler carries two lugs, and the fixture two claws: turned by that angle
-about the fixture's z, the lugs lie under the claws and rest against their backs.
+other half's flat face. With `interlock` the coupler carries two lugs, the fixture a low collar, 9 mm wider than the
+face, and two claws: turned by that angle about the fixture's z, the lugs lie under the claws and rest against their
+backs. Shapes and sizes are ours.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +19,10 @@ from skillframe.world.shapes import FIXTURE_COLOUR, TOOL_COLOUR, filleted_peg, q
 from skillframe.world.worlds.common import TOOL_DOWN, require, tilt_lift, tilt_of, tool
 
 FACE = 0.15
-LUG, LUG_HEIGHT, PLAY = 0.008, 0.006, 0.0015  # reach and width of a lug, its height, room under the claw [m]
-FALL = 0.025  # how much higher the couplers that interlock start [m]
-TURN_TOLERANCE = 0.035  # [rad]
-TOUCH = 3.0  # force that a person feels [N]
+LUG, LUG_HEIGHT, REACH = 0.008, 0.006, 0.028  # a lug's width, height and length [m]
+ABOVE, PLAY, CLEAR = 0.006, 0.0015, 0.0135  # lug over face, room over lug, claw from face [m]
+TURN_TOLERANCE, TILT_UNDER_CLAWS = 0.035, 0.026  # [rad]; the lugs' room under the claws allows about 2 degrees
+COLLAR_PLAY, COLLAR_WALL, COLLAR_HEIGHT = 0.009, 0.003, 0.003  # [m]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,7 +49,10 @@ class HoseParams:
 
 
 def build(params: HoseParams) -> Scene:
-    """The fixture's face is the plane z = 0; the goal is a flush face (tilt below `tolerance`, within 1 mm)."""
+    """The fixture's face is the plane z = 0; the goal is a flush face (tilt below `tolerance`, within 1 mm).
+
+    With `interlock` the goal is lugs under the claws: turned to 2 degrees, within 1.5 mm and 1.5 degrees of flush.
+    """
     require(
         "hose_coupler",
         {
@@ -70,36 +74,33 @@ def build(params: HoseParams) -> Scene:
         return met
 
     def unturned(state: State) -> Float:
-        return np.maximum(params.interlock - turned(state), 0.0)
+        return np.abs(params.interlock - turned(state))
+
+    def locked(state: State) -> NDArray[np.bool_]:
+        under = (height(state) < PLAY) & (tilt_of(state) < TILT_UNDER_CLAWS)
+        there: NDArray[np.bool_] = under & (unturned(state) < TURN_TOLERANCE)
+        return there
 
     locks = params.interlock > 0.0
-    low = FALL if locks else 0.0
-    starts = [{"start.tilt_y": sign * float(np.deg2rad(8.0)), **({"start.offset_z": low} if locks else {})}
-              for sign in (1.0, -1.0)]  # fmt: skip
-    down = (0.0, 0.0, -1.0)
-    align = Task(direction=down, aligned=TOOL_DOWN, hand="aligning", done=flush, starts=(starts[0], starts[1]))
-    twist = Task(direction=down, turn=(0.0, 0.0, 1.0), hand="lever")
-    lower = Task(direction=down, hand="sliding", done=touched, then=(align, twist), starts=align.starts)
+    twist = Task(direction=(0.0, 0.0, -1.0), turn=(0.0, 0.0, 1.0), hand="lever")
     return Scene(
         name="hose_coupler",
-        fixture=(seat, *(_claws(params) if locks else ())),
+        fixture=(seat, *((*_collar(params), *_claws(params)) if locks else ())),
         tool=tool((face, shaft(0.015, 0.015, FACE - params.length), *(_lugs(params) if locks else ())), tip=FACE),
         friction=params.friction,
         start_tip=(0.0, 0.0, 0.003),
         start_quaternion=TOOL_DOWN,
-        start_lift=tilt_lift(params.radius + (LUG if locks else 0.0)),
-        goal=(lambda state: flush(state) & (unturned(state) < TURN_TOLERANCE)) if locks else flush,
+        start_lift=tilt_lift(params.radius),
+        goal=locked if locks else flush,
         goal_error=(lambda state: (height(state), tilt_of(state) + unturned(state)))
         if locks
         else (lambda state: (height(state), tilt_of(state))),
-        task=lower if locks else replace(align, done=None),
+        task=Task(
+            direction=(0.0, 0.0, -1.0), aligned=TOOL_DOWN, hand="aligning",
+            starts=({"start.tilt_y": float(np.deg2rad(8.0))}, {"start.tilt_y": float(np.deg2rad(-8.0))}),
+            done=flush if locks else None, then=(twist,) if locks else (),
+        ),
     )  # fmt: skip
-
-
-def touched(state: State) -> NDArray[np.bool_]:
-    """The couplers touch, as a hand feels it (N,)."""
-    felt: NDArray[np.bool_] = state.wrench[..., 2] > TOUCH
-    return felt
 
 
 def turned(state: State) -> Float:
@@ -109,42 +110,48 @@ def turned(state: State) -> Float:
 
 
 def _lugs(params: HoseParams) -> tuple[Geom, ...]:
-    """Two lugs on the coupler's sides, at the tool's x and -x, their lower faces 1 mm above its face."""
-    reach = params.radius + 0.5 * LUG - 0.002
+    """Two lugs on the coupler's sides, at the tool's x and -x, high enough for the rim to touch first."""
     return tuple(
         Geom(
-            kind="box", size=(0.5 * LUG + 0.002, 0.5 * LUG, 0.5 * LUG_HEIGHT), rgba=TOOL_COLOUR,
-            position=(side * reach, 0.0, FACE - 0.001 - 0.5 * LUG_HEIGHT),
+            kind="box", size=(0.5 * REACH, 0.5 * LUG, 0.5 * LUG_HEIGHT), rgba=TOOL_COLOUR,
+            position=(side * (params.radius + 0.5 * REACH - 0.002), 0.0, FACE - ABOVE - 0.5 * LUG_HEIGHT),
         )
         for side in (1.0, -1.0)
     )  # fmt: skip
 
 
+def _collar(params: HoseParams, boxes: int = 24) -> tuple[Geom, ...]:
+    """A low ring of boxes that keeps the face from wandering off the seat."""
+    radius = params.radius + COLLAR_PLAY + 0.5 * COLLAR_WALL
+    half = float(radius * np.tan(np.pi / boxes))
+    ring = []
+    for k in range(boxes):
+        place, turn = _around(radius, 2.0 * np.pi * k / boxes, 0.0, 0.5 * COLLAR_HEIGHT)
+        size = (0.5 * COLLAR_WALL, half, 0.5 * COLLAR_HEIGHT)
+        ring.append(Geom(kind="box", size=size, position=place, quaternion=turn, rgba=FIXTURE_COLOUR))
+    return tuple(ring)
+
+
 def _claws(params: HoseParams) -> tuple[Geom, ...]:
-    """Two claws on the fixture: a back that stops the lug, and a roof over it."""
-    radius, back = params.radius + 0.5 * LUG + 0.001, 0.004
-    roof_z = 0.001 + LUG_HEIGHT + PLAY + 0.002
-    half = float(np.arcsin(0.5 * LUG / radius))
+    """Two claws on the fixture: a back that stops the lug, and a roof over it; both clear of the coupler's face."""
+    radius, half, thickness = params.radius + CLEAR + 0.005, 0.005, 0.004
+    roof = ABOVE + LUG_HEIGHT + PLAY
     claws = []
     for side in (0.0, np.pi):
         angle = side + params.interlock
-        stop = _around(radius, angle + half, back, roof_z)
-        claws.append(
-            Geom(kind="box", size=(0.5 * LUG, back, 0.5 * roof_z), position=stop[0], quaternion=stop[1],
-                 rgba=FIXTURE_COLOUR)
-        )  # fmt: skip
-        roof = _around(radius, angle, 0.0, 2.0 * roof_z)
-        claws.append(
-            Geom(kind="box", size=(0.5 * LUG, 0.5 * LUG, 0.002), position=roof[0], quaternion=roof[1],
-                 rgba=FIXTURE_COLOUR)
-        )  # fmt: skip
+        for size, ahead, middle in (
+            ((half, thickness, 0.5 * roof), 0.5 * LUG + thickness, 0.5 * roof),
+            ((half, 0.5 * LUG + 2.0 * thickness, 0.002), thickness, roof + 0.002),
+        ):
+            place, turn = _around(radius, angle, ahead, middle)
+            claws.append(Geom(kind="box", size=size, position=place, quaternion=turn, rgba=FIXTURE_COLOUR))
     return tuple(claws)
 
 
 def _around(
     radius: float, angle: float, ahead: float, height: float
 ) -> tuple[Vector, tuple[float, float, float, float]]:
-    """Place and attitude of a box at an angle, `ahead` of it along the circle, its middle at half of `height`."""
+    """Place and attitude of a box at an angle, `ahead` of it along the circle, its middle at a height."""
     out, along = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
     centre = radius * out + ahead * along
-    return (float(centre[0]), float(centre[1]), 0.5 * height), quaternion_about("z", angle)
+    return (float(centre[0]), float(centre[1]), height), quaternion_about("z", angle)

@@ -102,6 +102,4 @@ def _wall(params: ValleyParams) -> tuple[Geom, ...]:
         return ()
     thickness = 0.005
     place = params.along + params.radius + thickness
-    return (
-        Geom(kind="box", size=(0.03, thickness, 0.03), position=(0.0, place, 0.03), rgba=FIXTURE_COLOUR),
-    )
+    return (Geom(kind="box", size=(0.03, thickness, 0.03), position=(0.0, place, 0.03), rgba=FIXTURE_COLOUR),)

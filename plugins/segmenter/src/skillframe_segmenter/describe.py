@@ -21,7 +21,9 @@ def describe(document: Document) -> list[str]:
     policy = read(document)
     kind = document["phase_model"].get("type", "?")
     count = len(policy.skills)
-    lines = [f"policy of {count} phase{'s' * (count != 1)}; {SIGNALS.get(kind, 'a phase gives way when it comes to rest')}"]
+    lines = [
+        f"policy of {count} phase{'s' * (count != 1)}; {SIGNALS.get(kind, 'a phase gives way when it comes to rest')}"
+    ]
     for i, words in enumerate(_words(policy)):
         corner = "└─" if i + 1 == count else "├─"
         lines.append(f"{corner} phase {i + 1}: {words[0]}; then {successor_words(policy.successors, i)}")
@@ -29,7 +31,9 @@ def describe(document: Document) -> list[str]:
     lines.append(f"a phase that fails (its force, time or travel limit) is {again if policy.recoveries else 'the end'}")
     for row in document.get("demonstrations", []):
         cuts = ", ".join(f"{t:.2f} s" for t in row["boundaries"]) or "nowhere"
-        lines.append(f"{row['file'] or 'demonstration'}: cut at {cuts}; phases {' '.join(str(k + 1) for k in row['labels'])}")
+        lines.append(
+            f"{row['file'] or 'demonstration'}: cut at {cuts}; phases {' '.join(str(k + 1) for k in row['labels'])}"
+        )
     for i, words in enumerate(_words(policy)):
         lines += [f"phase {i + 1}: {line}" for line in words[1:]]
     return lines
@@ -45,7 +49,9 @@ def _words(policy: PolicyDocument) -> list[list[str]]:
 
 def explain(document: Document) -> list[Illustration]:
     """Where the demonstrations were cut, then the pictures of each phase."""
-    pictures = [Illustration("Phases", "Where each demonstration was cut; equal colours are one phase.", _bars(document))]
+    pictures = [
+        Illustration("Phases", "Where each demonstration was cut; equal colours are one phase.", _bars(document))
+    ]
     for i, sub in enumerate(read(document).skills):
         kind = registry().skill(sub["type"])
         for picture in kind.explain(sub) if kind.explain is not None else []:

@@ -197,6 +197,5 @@ def paths(data: Data, model: Model) -> list[NDArray[np.intp]]:
     densities = data.split(log_densities(data, model))
     steps = data.split(transitions.probabilities(model.weights, data.regressors))
     return [
-        chain.most_likely_path(model.initial, density, step[1:])
-        for density, step in zip(densities, steps, strict=True)
+        chain.most_likely_path(model.initial, density, step[1:]) for density, step in zip(densities, steps, strict=True)
     ]

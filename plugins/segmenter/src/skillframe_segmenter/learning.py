@@ -1,8 +1,9 @@
 """From whole demonstrations to a policy: cut them into phases, and learn each phase as a skill of its own.
 
-Two phases that never share a demonstration and stand at the same place in the sequence (after the same phases, before
-the same phases) may be one skill shown from two sides; they are joined if the learner finds one desired direction for
-both, which is the definition itself. Our choice; the papers join phases by their model alone.
+Two phases may be one skill shown from two sides: if they never share a demonstration and stand at the same place in
+the sequence (after the same phases, before the same phases), or if demonstrations begin with the one and with the other
+(a policy has one beginning). They are joined if the learner finds one desired direction for both, which is the
+definition itself. Our choice; the papers join phases by their model alone.
 """
 
 from __future__ import annotations
@@ -94,9 +95,7 @@ def _learn(
     return kind.learn(pieces(found, demonstrations, [phase]), options)
 
 
-def _joined(
-    found: Document, demonstrations: Sequence[Demonstration], skill: str, options: LearnOptions
-) -> Document:
+def _joined(found: Document, demonstrations: Sequence[Demonstration], skill: str, options: LearnOptions) -> Document:
     """The segmentation with alternatives joined that the learner explains by one direction."""
     kind = registry().skill(skill)
     for one, two in alternatives(found["demonstrations"]):
@@ -110,8 +109,9 @@ def _joined(
 
 
 def alternatives(rows: Sequence[Mapping[str, Any]]) -> list[tuple[int, int]]:
-    """Pairs of phases that never share a demonstration and have the same neighbours in the sequence."""
+    """Pairs of phases that begin demonstrations, or never share one and have the same neighbours in the sequence."""
     labels = [list(row["labels"]) for row in rows]
+    firsts = {each[0] for each in labels}
     phases = sorted({label for each in labels for label in each})
     steps = [(a, b) for each in labels for a, b in pairwise([-1, *each, -2])]
 
@@ -125,7 +125,7 @@ def alternatives(rows: Sequence[Mapping[str, Any]]) -> list[tuple[int, int]]:
         (one, two)
         for i, one in enumerate(phases)
         for two in phases[i + 1 :]
-        if apart(one, two) and neighbours(one) == neighbours(two)
+        if {one, two} <= firsts or (apart(one, two) and neighbours(one) == neighbours(two))
     ]
 
 
@@ -133,12 +133,19 @@ def relabelled(found: Document, one: int, two: int) -> Document:
     """The segmentation with phase `two` counted as phase `one`, and later ones moved up."""
     count = _count(found)
     number = [one if k == two else k - (k > two) for k in range(count)]
-    rows = [{**row, "labels": [number[k] for k in row["labels"]]} for row in found["demonstrations"]]
+    rows = [_without_repeats(row, [number[k] for k in row["labels"]]) for row in found["demonstrations"]]
     counts = [[0.0] * count for _ in range(count - 1)]
-    for k, before in enumerate(found["phase_model"]["successors"]):
-        for j, value in enumerate(before):
-            counts[number[k]][number[j] if j < count else count - 1] += value
+    for row in rows:
+        for before, after in pairwise([*row["labels"], count - 1]):
+            counts[before][after] += 1.0
     model = {**found["phase_model"], "successors": counts}
     if "phase_of" in model:
         model["phase_of"] = [number[k] for k in model["phase_of"]]
     return {**found, "phase_model": model, "demonstrations": rows}
+
+
+def _without_repeats(row: Mapping[str, Any], labels: Sequence[int]) -> Document:
+    """A row with new labels, its boundaries between equal ones gone."""
+    kept = [i for i in range(1, len(labels)) if labels[i] != labels[i - 1]]
+    cuts = row["boundaries"]
+    return {**row, "boundaries": [cuts[i - 1] for i in kept], "labels": [labels[0], *(labels[i] for i in kept)]}

@@ -85,9 +85,7 @@ def to_document(model: PhaseModel, kind: str) -> Document:
         "switch_windows": model.switch_windows,
     }  # fmt: skip
     if model.origin is not None:
-        document["origin"] = {
-            name: getattr(model.origin, name).tolist() for name in ("position", "rotation", "spread")
-        }
+        document["origin"] = {name: getattr(model.origin, name).tolist() for name in ("position", "rotation", "spread")}
     return document
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.demonstration.record import Demonstration
-from skillframe.frames import Float, move_wrench, rotate
+from skillframe.frames import Float, Pose, move_wrench, norm, rotate
 from skillframe.skill import Observation
 from skillframe_segmenter import emission, gate, transitions
 from skillframe_segmenter.features import regressors, soft_pair
@@ -22,6 +22,7 @@ from skillframe_segmenter.settings import WINDOW_S
 from skillframe_segmenter.windows import Windows, windows
 
 NOBODY = -1
+STILL = (4e-3, float(np.deg2rad(2.0)))  # m/s, rad/s
 
 
 class Debounce:
@@ -30,22 +31,31 @@ class Debounce:
     def __init__(self, model: PhaseModel, count: int) -> None:
         self._bar, self._windows = model.switch_posterior, model.switch_windows
         self._candidate = np.full(count, NOBODY)
-        self._seen = np.zeros(count, dtype=np.intp)
+        self.seen = np.zeros(count, dtype=np.intp)
 
     def decide(self, posterior: Float) -> NDArray[np.intp]:
         """The phase that has been probable for long enough (N,), or `NOBODY`; posterior (N, P)."""
         best = posterior.argmax(axis=1)
         sure = posterior[np.arange(len(best)), best] > self._bar
-        self._seen = np.where(sure & (best == self._candidate), self._seen + 1, sure.astype(np.intp))
+        self.seen = np.where(sure & (best == self._candidate), self.seen + 1, sure.astype(np.intp))
         self._candidate = np.where(sure, best, NOBODY)
-        return np.where(self._seen >= self._windows, best, NOBODY)
+        return np.where(self.seen >= self._windows, best, NOBODY)
 
 
 class Asked(NamedTuple):
-    """What the gate says at the end of a window: the phase it asks for (N,) or `NOBODY`, and the posterior (N, P)."""
+    """What the gate says at the end of a window, N trials.
+
+    Attributes:
+        phase: (N,) the phase it asks for, or `NOBODY`.
+        posterior: (N, P).
+        windows: (N,) for how many windows it has asked for that phase.
+        still: (N,) the tool hardly moved since the last window.
+    """
 
     phase: NDArray[np.intp]
     posterior: Float
+    windows: NDArray[np.intp]
+    still: NDArray[np.bool_]
 
 
 class Gate:
@@ -69,6 +79,7 @@ class Gate:
         self._sum, self._ticks = np.zeros((n, 6)), 0
         self._per_window = max(1, round(WINDOW_S / observation.dt))
         self._memory: list[Float] = []
+        self._last = Pose(observation.pose.position.copy(), observation.pose.rotation.copy())
         self._debounce = Debounce(self._model, n)
         self._home = observation.pose.rotation.copy() if self._model.axes == "phase_start" else None
         self.posterior = self._belief @ self._members
@@ -83,14 +94,26 @@ class Gate:
         phi = self._regressors(self._sum / self._ticks, observation)
         self._sum, self._ticks = np.zeros_like(self._sum), 0
         self._memory = [*self._memory[1 - gate.MEMORY :], phi]
-        self._belief = gate.advance(self._model.gate, self._belief, sum(self._memory[1:], self._memory[0]) / len(self._memory))
+        self._belief = gate.advance(
+            self._model.gate, self._belief, sum(self._memory[1:], self._memory[0]) / len(self._memory)
+        )
         self.posterior = self._belief @ self._members
-        return Asked(self._debounce.decide(self.posterior), self.posterior)
+        phase = self._debounce.decide(self.posterior)
+        return Asked(phase, self.posterior, self._debounce.seen, self._still(observation))
 
     def believe(self, row: int, phase: int) -> None:
         """A trial has entered a phase for another reason than the gate's; let the belief follow."""
         mine = np.where(self._model.phase_of == phase, self._model.gate.share, 1e-6)
         self._belief[row] = mine / mine.sum()
+
+    def _still(self, observation: Observation) -> NDArray[np.bool_]:
+        now = Pose(observation.pose.position.copy(), observation.pose.rotation.copy())
+        elapsed = self._per_window * observation.dt
+        moved = norm(now.position - self._last.position)
+        turned = norm((now.rotation - self._last.rotation).reshape(-1, 9)) / np.sqrt(2.0)
+        self._last = now
+        still: NDArray[np.bool_] = (moved < STILL[0] * elapsed) & (turned < STILL[1] * elapsed)
+        return still
 
     def _regressors(self, wrench: Float, observation: Observation) -> Float:
         rotation = observation.pose.rotation

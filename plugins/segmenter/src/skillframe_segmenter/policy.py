@@ -2,7 +2,9 @@
 
 A phase gives way to another that followed it in a demonstration
 
-- when the contact wrench asks for it: the gate's posterior exceeds its bar for two windows of 50 ms; or
+- when the contact wrench asks for it: the gate's posterior exceeds its bar for two windows of 50 ms, and the phase has
+  stopped moving the tool (under 4 mm/s and 2 degrees/s), or goes on moving it although the wrench has asked for a
+  second: a coupler that touches with one edge feels like one that is seated, but it is still turning; or
 - when its own skill has ended well, as an LMC does that comes to rest while pushing: then to what followed most often,
 
 and the policy ends where demonstrations ended. A phase whose skill fails (a limit of force, time or travel) is
@@ -25,14 +27,13 @@ from skillframe_segmenter.document import PolicyDocument, read
 from skillframe_segmenter.observer import NOBODY, Gate
 
 SETTLE_S = 0.15  # after entering a phase, before the gate may end it: three windows
+PATIENCE = 20  # windows
 
 
 def build(document: Document) -> Policy:
     """The runnable policy of a checked document."""
     policy = read(document)
-    parts = [
-        Part(f"phase {i + 1}", _maker(sub)) for i, sub in enumerate(policy.skills)
-    ]
+    parts = [Part(f"phase {i + 1}", _maker(sub)) for i, sub in enumerate(policy.skills)]
     center = np.array(document["frame"]["center_of_compliance"], dtype=float)
     return Policy(parts, policy, None if policy.model is None else Gate(policy.model, center))
 
@@ -70,7 +71,7 @@ class Policy(Composition):
         if asked is None:
             return command
         wanted = (asked.phase != NOBODY) & (asked.phase != self.current) & (command.status == Status.RUNNING)
-        wanted &= observation.time - self._entered >= SETTLE_S
+        wanted &= (observation.time - self._entered >= SETTLE_S) & (asked.still | (asked.windows >= PATIENCE))
         for i in np.flatnonzero(wanted).tolist():
             phase = int(asked.phase[i])
             pending = self._due is not None and self._due[i] != END

@@ -88,8 +88,10 @@ def segment(
     if moves:
         rows = moved(rows, moves, names)
         found = _refit(data, prepared, found, rows, moves, chosen)
-        rows = [r if i in {m.demonstration for m in moves} else old for i, (r, old) in enumerate(
-            zip(rows, rows_of(prepared.cut, found.labels, names), strict=True))]
+        rows = [
+            r if i in {m.demonstration for m in moves} else old
+            for i, (r, old) in enumerate(zip(rows, rows_of(prepared.cut, found.labels, names), strict=True))
+        ]
     document = model.to_document(online_model(prepared, found, chosen), kind)
     document["criterion"] = {str(k): value for k, value in found.criterion.items()}
     return {"phase_model": document, "demonstrations": rows}
@@ -174,7 +176,9 @@ def _refit(
     said = {m.demonstration for m in moves}
     k = len(found.phase_of)
     ruled = [
-        np.where(found.phase_of == _labels_of(rows[i], w)[:, None], 0.0, em.NEVER) if i in said else np.zeros((w.size, k))
+        np.where(found.phase_of == _labels_of(rows[i], w)[:, None], 0.0, em.NEVER)
+        if i in said
+        else np.zeros((w.size, k))
         for i, w in enumerate(prepared.cut)
     ]
     held = data._replace(ruled=np.concatenate(ruled))
