@@ -22,6 +22,7 @@ COMMANDS = {
     "quickstart": "The whole way in minutes: demonstrate, learn, run, prove, report.",
     "demonstration": "Record, check and convert demonstrations.",
     "condition": "Filter a demonstration's wrench; remove bias and tool weight.",
+    "segment": "Cut whole demonstrations into phases and learn a policy.",
     "learn": "Learn a skill from demonstrations.",
     "skill": "Show and explain a learned skill.",
     "run": "Run a skill in a simulated world.",

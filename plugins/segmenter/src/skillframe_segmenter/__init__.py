@@ -30,6 +30,12 @@ def _hmm(kind: str) -> Fit:
     return fit
 
 
+def _zvc(demonstrations: Sequence[Demonstration], phases: int | None, settings: Mapping[str, Any]) -> Document:
+    from skillframe_segmenter.zvc import fit
+
+    return fit(demonstrations, phases, settings)
+
+
 @hookimpl
 def skillframe_segmenters() -> Iterable[SegmenterType]:
     """The ways of cutting demonstrations into phases that this plug-in provides."""
@@ -41,6 +47,7 @@ def skillframe_segmenters() -> Iterable[SegmenterType]:
         name="pose_hmm", summary="baseline: the same phases; the pose drives the transitions (Kroemer et al. 2015)",
         fit=_hmm("pose_hmm"),
     )  # fmt: skip
+    yield SegmenterType(name="zvc", summary="baseline: cuts where the tool stands still", fit=_zvc)
 
 
 def _build(document: Document) -> Skill:

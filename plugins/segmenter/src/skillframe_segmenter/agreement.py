@@ -40,7 +40,7 @@ def _check_one(name: str, mine: list[int], others: Sequence[list[int]]) -> None:
         )  # fmt: skip
     if all(theirs[-1] not in mine and mine[-1] in theirs for theirs in others):
         raise InputError(
-            name, f"stops half-way: it ends in phase {mine[-1] + 1}, where the others go on to phase {others[0][-1] + 1}",
+            name, f"stops half-way: ends in phase {mine[-1] + 1}, where the others go on to phase {others[0][-1] + 1}",
             "leave it out, or record it to the end",
         )  # fmt: skip
 

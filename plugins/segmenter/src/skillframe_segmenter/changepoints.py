@@ -93,7 +93,8 @@ def _k_means(points: Float, weight: Float, k: int) -> Labels:
         if np.array_equal(again, groups):
             break
         groups = again
-    return groups.astype(np.intp)
+    result: Labels = groups.astype(np.intp)
+    return result
 
 
 def _distances(points: Float, centres: Float) -> Float:

@@ -60,7 +60,7 @@ def explain(document: Document) -> list[Illustration]:
 
 
 def _bars(document: Document) -> str:
-    rows = [row for row in document.get("demonstrations", [])]
+    rows = list(document.get("demonstrations", []))
     longest = max((row.get("end", 0.0) for row in rows), default=0.0) or 1.0
     scale, parts = 640.0 / longest, []
     for i, row in enumerate(rows):
@@ -70,7 +70,8 @@ def _bars(document: Document) -> str:
             parts.append(
                 f'<rect x="{120 + scale * (start - edges[0]):.1f}" y="{y}" width="{scale * (stop - start):.1f}" '
                 f'height="22" fill="{COLOURS[label % len(COLOURS)]}"/>'
-                f'<text x="{124 + scale * (start - edges[0]):.1f}" y="{y + 16}" fill="#fff" font-size="13">{label + 1}</text>'
+                f'<text x="{124 + scale * (start - edges[0]):.1f}" y="{y + 16}" fill="#fff" font-size="13">'
+                f"{label + 1}</text>"
             )
         parts.append(f'<text x="8" y="{y + 16}" font-size="13" fill="#333">demonstration {i + 1}</text>')
     height = 40 + 34 * len(rows)

@@ -1,4 +1,4 @@
-"""A policy's part of the skill file: `phases`, each with the kind of its skill, and the `phase_model` that follows them."""
+"""A policy's part of the skill file: `phases`, each with the kind of its skill, and the `phase_model`."""
 
 from __future__ import annotations
 

@@ -101,4 +101,4 @@ def _directions(seen: Observed, weight: Float) -> Float:
     moments = (weight.T @ seen.free.reshape(count, 18)).reshape(-1, 2, 3, 3)
     moments += 0.01 * np.maximum(size, 1e-9)[:, None, None, None] * np.eye(3)
     sums = (weight.T @ seen.projected).reshape(-1, 2, 3, 1)
-    return np.linalg.solve(moments, sums).reshape(-1, 6)
+    return np.asarray(np.linalg.solve(moments, sums), dtype=float).reshape(-1, 6)

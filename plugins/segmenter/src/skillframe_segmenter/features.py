@@ -54,7 +54,7 @@ class Features(NamedTuple):
 
 
 def soft(x: Float, scale: float) -> Float:
-    """x (..., 3) softly normalised; shorter than one."""
+    """X (..., 3) softly normalised; shorter than one."""
     result: Float = x / np.sqrt((x * x).sum(-1, keepdims=True) + scale * scale)
     return result
 
@@ -65,7 +65,7 @@ def soft_pair(x: Float, first: float, second: float) -> Float:
 
 
 def regressors(contact: Float) -> Float:
-    """phi (..., 9) of contacts a (..., 6)."""
+    """Phi (..., 9) of contacts a (..., 6)."""
     one = np.ones((*contact.shape[:-1], 1))
     return np.concatenate([contact, norm(contact[..., :3])[..., None], norm(contact[..., 3:])[..., None], one], axis=-1)
 
@@ -85,7 +85,7 @@ def scales(demonstrations: Sequence[Windows]) -> list[Scales]:
 
 
 def features(demonstration: Windows, scale: Scales) -> Features:
-    """u and a of a demonstration."""
+    """U and a of a demonstration."""
     return Features(
         soft_pair(demonstration.motion, scale.speed, scale.turning),
         soft_pair(demonstration.wrench, scale.force, scale.torque),

@@ -17,17 +17,19 @@ from skillframe.errors import InputError
 from skillframe.records import Document, LearnOptions
 from skillframe.registry import registry
 from skillframe_segmenter.agreement import check_agreement
+from skillframe_segmenter.boundaries import parse_move
 from skillframe_segmenter.settings import Settings
+from skillframe_segmenter.zvc import ZvcSettings
 
 SHORTEST_S = 0.25
-OWN = ("segmenter", "skill", "phases", "recoveries")
+OWN = ("segmenter", "skill", "phases", "recoveries", "set_boundary")
 
 
 def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
     """The body of a policy document.
 
-    Settings: `segmenter` (wrench_hmm), `skill` (lmc), `phases` (found), `recoveries` (1), those of the segmenter, and
-    those of the phases' learner.
+    Settings: `segmenter` (wrench_hmm), `skill` (lmc), `phases` (found), `recoveries` (1), `set_boundary` (a list of
+    "DEMONSTRATION:BOUNDARY=SECONDS"), those of the segmenter, and those of the phases' learner.
 
     Raises:
         InputError: demonstrations that cannot be cut or do not agree, or an unknown setting.
@@ -35,6 +37,9 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     """
     own, cutting, learning = _sorted(options)
     segmenter = registry().segmenter(own["segmenter"])
+    moves = [parse_move(text, [d.source for d in demonstrations]) for text in own["set_boundary"]]
+    if moves:
+        cutting = {**cutting, "boundaries": [list(move) for move in moves]}
     found = segmenter.fit(demonstrations, own["phases"], cutting)
     check_agreement(found["demonstrations"], demonstrations)
     options = LearnOptions(at=options.at, hand=options.hand, axes=options.axes, settings=learning)
@@ -52,9 +57,15 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
 
 def _sorted(options: LearnOptions) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
     """Settings of the policy, of the segmenter, and of the phases' learner."""
-    own: dict[str, Any] = {"segmenter": "wrench_hmm", "skill": "lmc", "phases": None, "recoveries": 1}
+    own: dict[str, Any] = {
+        "segmenter": "wrench_hmm",
+        "skill": "lmc",
+        "phases": None,
+        "recoveries": 1,
+        "set_boundary": [],
+    }
     own |= {key: value for key, value in options.settings.items() if key in OWN}
-    names = {*Settings.__dataclass_fields__, "boundaries"}
+    names = {*Settings.__dataclass_fields__, *ZvcSettings.__dataclass_fields__, "boundaries"}
     cutting = {key: value for key, value in options.settings.items() if key in names}
     learning = {k: v for k, v in options.settings.items() if k not in names and k not in OWN}
     for key in ("phases", "recoveries"):

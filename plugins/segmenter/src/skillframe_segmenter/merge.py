@@ -4,16 +4,19 @@ The paper's valley is the test: sliding down either side is one LMC, and so is t
 wrenches are opposite. 600 directions D on the sphere, and "none", are put to every window, translation and rotation
 apart; with M the projector of `emission`, a window that moves (|u| > 1/2) accepts D if
 
-    along > 1/3   and   (beside < 0.3   or   angle(M D, u) < 25 degrees),
+    along > 0.38   and   (beside < 0.3   or   angle(M D, u) < 25 degrees),
 
-with `along` and `beside` the parts of M D along the motion and across it (on a shallow slope a small error of the aim is
-a large one of the motion, so either measure will do); a window at rest accepts D if |M D| < 1/2, and accepts "none"; a tool that never gets 2.5 degrees away from where the phase
-found it, or no farther than a third of the angles it turns through, trembles in a soft hand: its rotation is at rest
-throughout; and so is its translation if both hold, with 5 mm. The votes of a group of phases are the largest share of
-windows that one D finds, in the worst phase and demonstration (of four windows or more); the smaller of translation
-and rotation counts. The best pair is joined as long as its votes are at least max(0.6, min(0.7, base - 0.05)), base
-being the worse of the two alone. All constants are ours; the angle is the delicate one: 20 degrees leaves one motion
-in parts when the person's aim wavers, 30 joins lowering with sliding.
+with `along` and `beside` the parts of M D along the motion and across it (on a shallow slope a small error of the aim
+is a large one of the motion, so either measure will do); a window at rest accepts D if |M D| < 1/2, and accepts
+"none". A tool that never gets 2.5 degrees away from where the phase found it, or no farther than a third of the angles
+it turns through, trembles in a soft hand: its rotation is at rest throughout; and so is its translation if both hold,
+with 5 mm.
+
+The votes of a group of phases are the largest share of windows that one D finds, in the worst phase and demonstration
+(of four windows or more); the smaller of translation and rotation counts. The best pair is joined as long as its votes
+are at least max(0.6, min(0.7, base - 0.05)), base being the worse of the two alone. All constants are ours; the angle
+is the delicate one: at 20 degrees one motion stays in parts when the person's aim wavers, at 30 lowering and sliding
+become one.
 """
 
 from __future__ import annotations
@@ -28,7 +31,7 @@ from skillframe.frames import Float, norm, unit
 from skillframe_segmenter.emission import Observed
 
 DIRECTIONS, FEWEST, MOST = 600, 4, 150
-MOVING, ALONG, BESIDE, STILL = 0.5, 0.33, 0.3, 0.5
+MOVING, ALONG, BESIDE, STILL = 0.5, 0.38, 0.3, 0.5
 BEST_BAR, SLACK = 0.7, 0.05
 HELD = (5e-3, float(np.deg2rad(2.5)))  # m, rad
 TREMBLING = 1.0 / 3.0

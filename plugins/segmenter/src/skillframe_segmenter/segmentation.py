@@ -118,7 +118,7 @@ def _origin(cut: Sequence[Windows]) -> Pose0:
 
 
 def pose_regressors(position: Float, rotation: Float, origin: Pose0) -> Float:
-    """phi (..., 7) of poses: displacement and turn from the mean pose over their spread, and 1."""
+    """Phi (..., 7) of poses: displacement and turn from the mean pose over their spread, and 1."""
     moved_by = (position - origin.position) / origin.spread[0]
     turned_by = rotation_vector(rotation @ origin.rotation.T) / origin.spread[1]
     return np.concatenate([moved_by, turned_by, np.ones((*position.shape[:-1], 1))], axis=-1)
@@ -203,8 +203,9 @@ def rows_of(cut: Sequence[Windows], labels: Sequence[Labels], names: Sequence[st
     result = []
     for w, each, name in zip(cut, labels, names, strict=True):
         starts = runs.starts_of_runs(each)
+        cuts = w.edges([int(i) for i in starts[1:]])
         result.append({
-            "file": name, "start": w.start, "end": w.edges([w.size])[0], "boundaries": w.edges([int(i) for i in starts[1:]]),
+            "file": name, "start": w.start, "end": w.edges([w.size])[0], "boundaries": cuts,
             "labels": [int(x) for x in each[starts]],
         })  # fmt: skip
     return result

@@ -1,7 +1,7 @@
 r"""What makes a phase give way to the next: the contact wrench, p(j | i, phi_t) = softmax_j(w_ij . phi_t).
 
-The wrench of the new window drives the transition into it (Hagos, Suomalainen, Kyrki, IROS 2018, name interaction-driven
-transitions; the softmax per pair is the form of Kroemer et al. 2015). A phase keeps itself with logit 0, and
+The wrench of the new window drives the transition into it (interaction-driven transitions: Hagos, Suomalainen, Kyrki,
+IROS 2018; the softmax per pair is the form of Kroemer et al. 2015). A phase keeps itself with logit 0, and
 
     prior of any other: -ln(20 max(K - 1, 1) s)        a mean stay of s seconds in windows of 50 ms.
 
@@ -40,9 +40,11 @@ def improve(weights: Float, prior: Float, regressors: Float, joint: Float, steps
     """Weights after Newton steps, row by row.
 
     Args:
-        weights: (K, K, R) as they are; prior: where ridge pulls the biases.
+        weights: (K, K, R) as they are.
+        prior: (K, K, R) where the ridge pulls the biases.
         regressors: (W, R) of the windows that are entered.
         joint: (W, K, K) expected transitions into them.
+        steps: of Newton's method.
     """
     result = weights.copy()
     k, size = len(weights), regressors.shape[1]

@@ -1,0 +1,110 @@
+"""Baseline: cut where the tool stands still, or where the contact force comes and goes (zero-velocity crossing).
+
+    cut at the middle of a stop:  |v| < 0.15 P80|v|  and  |w| < 0.15 P80|w|,  for three windows or more
+    cut where |F| crosses the force threshold, if one is given
+
+Speeds are those of windows of 50 ms, smoothed over five. Every interval is a phase of its own in each demonstration,
+counted from its beginning: such a rule knows where something changes, and cannot know that two intervals are the same
+phase. Its policies go on when a phase comes to rest. Standard method; the figures are ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.config import build
+from skillframe.demonstration.record import Demonstration
+from skillframe.errors import InputError
+from skillframe.frames import Float, norm
+from skillframe.records import Document
+from skillframe_segmenter import runs
+from skillframe_segmenter.boundaries import moved, moves_of
+from skillframe_segmenter.segmentation import rows_of, successors
+from skillframe_segmenter.windows import Windows, cut_all
+
+SMOOTHING, SHORTEST = 5, 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ZvcSettings:
+    """What the baseline goes by.
+
+    Attributes:
+        still: share of the 80th percentile of speed below which the tool stands still.
+        force_n: contact force at which it cuts as well [N]; 0: never.
+        axes, at: as for the other segmenters.
+    """
+
+    still: float = 0.15
+    force_n: float = 0.0
+    axes: str = "base"
+    at: str | None = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.still < 1.0 or self.force_n < 0.0:
+            raise InputError("--set", "still is within 0 and 1, force_n not negative", "mend it")
+
+
+def fit(demonstrations: Sequence[Demonstration], phases: int | None, settings: Mapping[str, Any]) -> Document:
+    """`phase_model` and `demonstrations` of a policy file; see `SegmenterType.fit`."""
+    moves, values = moves_of(settings)
+    chosen = build(ZvcSettings, values, "--set")
+    cut, point = cut_all(demonstrations, chosen.at, chosen.axes)
+    labels = [_labels(w, chosen, phases) for w in cut]
+    names = [d.source for d in demonstrations]
+    rows = moved(rows_of(cut, labels, names), moves, names)
+    count = max(int(each.max()) for each in labels) + 1
+    model = {
+        "type": "zvc", "version": 1, "at": point.tolist(), "axes": chosen.axes, "still": chosen.still,
+        "force_n": chosen.force_n, "successors": successors(labels, count).tolist(),
+    }  # fmt: skip
+    return {"phase_model": model, "demonstrations": rows}
+
+
+def _labels(cut: Windows, settings: ZvcSettings, phases: int | None) -> NDArray[np.intp]:
+    at = sorted({*_stops(cut, settings.still), *_crossings(cut, settings.force_n)})
+    strength = {i: _change(cut, i) for i in at}
+    if phases is not None:
+        at = sorted(sorted(at, key=lambda i: -strength[i])[: phases - 1])
+    labels = np.zeros(cut.size, dtype=np.intp)
+    for i in at:
+        labels[i:] += 1
+    return labels
+
+
+def _stops(cut: Windows, share: float) -> list[int]:
+    """Middles of stops that are neither the beginning nor the end."""
+    still = np.ones(cut.size, dtype=bool)
+    for part in (slice(0, 3), slice(3, 6)):
+        speed = _smoothed(norm(cut.motion[:, part]))
+        still &= speed < share * max(float(np.percentile(speed, 80)), 1e-6)
+    starts = runs.starts_of_runs(still.astype(np.intp))
+    ends = np.append(starts[1:], cut.size)
+    return [
+        int(a + b) // 2 for a, b in zip(starts, ends, strict=True)
+        if still[a] and b - a >= SHORTEST and a > 0 and b < cut.size
+    ]  # fmt: skip
+
+
+def _crossings(cut: Windows, force: float) -> list[int]:
+    if force <= 0.0:
+        return []
+    touching = runs.without_short((norm(cut.wrench[:, :3]) > force).astype(np.intp), SHORTEST)
+    return [int(i) for i in runs.starts_of_runs(touching)[1:]]
+
+
+def _change(cut: Windows, i: int, width: int = 6) -> float:
+    """How different the motion is before and after window i."""
+    before, after = cut.motion[max(i - width, 0) : i], cut.motion[i : i + width]
+    return float(norm(before.mean(axis=0) - after.mean(axis=0))) if len(before) and len(after) else 0.0
+
+
+def _smoothed(values: Float) -> Float:
+    kernel = np.ones(SMOOTHING) / SMOOTHING
+    padded = np.pad(values, SMOOTHING // 2, mode="edge")
+    return np.convolve(padded, kernel, mode="valid")

@@ -1,0 +1,83 @@
+"""`skillframe segment`: a policy of several phases from whole demonstrations."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from skillframe.records import Document
+
+
+@click.command()
+@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="Policy file to write (.json).")
+@click.option("--phases", type=int, help="Number of phases; default: it is found.")
+@click.option("--segmenter", default="wrench_hmm", show_default=True, help="How phases are told apart.")
+@click.option("--skill", default="lmc", show_default=True, help="Kind of skill that each phase is learned as.")
+@click.option(
+    "--set-boundary", "boundaries", multiple=True, metavar="DEMO:NUMBER=SECONDS",
+    help="Move a boundary of a demonstration (both counted from 1, or a file's name) and refit (repeatable).",
+)  # fmt: skip
+@click.option(
+    "--at", help='Where it is learned: a frame\'s name or "x,y,z" [m] in the tool frame; default: tool point.'
+)
+@click.option("--hand", help="Where the hand held, for the work of torques; default: the recording's own, else --at.")
+@click.option(
+    "--axes", type=click.Choice(["base", "phase_start"]), default="base", show_default=True,
+    help="Axes of what is learned: base, or the tool's attitude at the start.",
+)  # fmt: skip
+@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A setting of segmenter or learner.")
+@click.option("--json", "as_json", is_flag=True, help="Print the policy document as JSON on stdout as well.")
+def command(
+    files: tuple[Path, ...], out: Path, phases: int | None, segmenter: str, skill: str, boundaries: tuple[str, ...],
+    at: str | None, hand: str | None, axes: str, settings: tuple[str, ...], as_json: bool,
+) -> int:  # fmt: skip
+    """Cut FILES, demonstrations of a whole task, into phases, learn each phase, and write a policy.
+
+    Phases that one motion explains get one label, so that sliding down either side of a valley is one phase. Where a
+    boundary is not where it should be, move it.
+
+    \b
+    Examples:
+      skillframe segment left.npz right.npz --out valley.policy.json
+      skillframe segment a.csv b.csv c.csv --phases 3 --at tip --out box.policy.json
+      skillframe segment left.npz right.npz --set-boundary 2:1=3.45 --out valley.policy.json
+    """
+    from skillframe.config import parse_setting
+    from skillframe.demonstration.files import read_demonstration
+    from skillframe.records import LearnOptions
+    from skillframe.registry import registry
+    from skillframe.skillfile import save
+    from skillframe.skillsource import learned
+
+    registry().segmenter(segmenter)
+    kind = registry().skill("policy")
+    values: dict[str, Any] = dict(parse_setting(text) for text in settings)
+    values |= {"segmenter": segmenter, "skill": skill, "phases": phases, "set_boundary": list(boundaries)}
+    options = LearnOptions(at=at, hand=hand, axes=axes, settings=values)
+    document = learned(kind, [read_demonstration(path) for path in files], options)
+    save(document, out)
+    count = len(document["phases"])
+    _tell(
+        [f"{out}: {count} phase{'s' * (count != 1)} from {len(files)} demonstration{'s' * (len(files) != 1)}"], as_json
+    )
+    _tell(kind.describe(document) if kind.describe is not None else [kind.summary], as_json)
+    if as_json:
+        _emit(document)
+    return 0
+
+
+def _tell(lines: Sequence[str], to_stderr: bool) -> None:
+    for line in lines:
+        click.echo(line, err=to_stderr)
+
+
+def _emit(document: Document) -> None:
+    from skillframe.cli.output import emit_json
+
+    emit_json(document)
