@@ -64,7 +64,7 @@ def batch(name):
         with Recorded(keep=REPLAYED) as recorded:
             cpu, _, _ = timed_run(Push(DOWN, stiffness, speed=speed, stall=False), setting, draws, COUNT, duration)
         alone = one_trial_loop(setting, np.array(DOWN), stiffness, speed, draws, 4, round(1000 * duration))
-        rounds.append((replay(setting, recorded), cpu, alone, recorded.seconds / COUNT / (duration + 0.1)))
+        rounds.append((replay(setting, recorded), cpu, alone, recorded.seconds / COUNT / duration))
     floor, cpu, alone, physics = sorted(rounds, key=lambda r: r[1] / r[0])[len(rounds) // 2]
     show(f"{name}: bare mj_step", 1e3 * floor, "us/ms")
     show(f"{name}: batch of {COUNT}", 1e3 * cpu, "us/ms")

@@ -8,14 +8,15 @@ from skillframe.executor import simulate
 from skillframe.world.convert import build_spec
 from skillframe.world.layout import Layout
 from skillframe.world.plant import Plant
+from skillframe.world.sensors import TARE_TICKS
 from tests.laws.runs import generators
 
 
 class Recorded:
-    """Measures the plant's share of a run, and keeps the torques of some trials, by standing between loop and plant."""
+    """Measures the plant's share of a run after its tare, and keeps the torques of some trials, by standing between."""
 
     def __init__(self, keep=0):
-        self.keep, self.seconds, self.torques, self.start = keep, 0.0, [], None
+        self.keep, self.seconds, self.torques, self.start, self.calls = keep, 0.0, [], None, 0
 
     def __enter__(self):
         self.original = Plant.step
@@ -28,9 +29,10 @@ class Recorded:
                 ]
             if self.keep:
                 self.torques.append(torque[: self.keep].copy())
+            self.calls += 1
             before = time.process_time()
             self.original(plant, torque, ids)
-            self.seconds += time.process_time() - before
+            self.seconds += (time.process_time() - before) * (self.calls > TARE_TICKS)
 
         Plant.step = step
         return self
@@ -52,7 +54,7 @@ def timed_run(skill, setting, draws, count, duration, trace_hz=100.0):
 
 
 def replay(setting, recorded):
-    """CPU seconds per trial and simulated second of bare `mj_step` under the torques of a run."""
+    """CPU seconds per trial and simulated second of bare `mj_step` under the torques of a run, its tare not counted."""
     import mujoco
 
     model = build_spec(setting.robot, setting.scene).compile()
@@ -63,12 +65,13 @@ def replay(setting, recorded):
         data.qpos[:], data.qvel[:] = recorded.start[0][trial], recorded.start[1][trial]
         data.mocap_pos[:], data.mocap_quat[:] = recorded.start[2][trial], recorded.start[3][trial]
         mujoco.mj_forward(model, data)
-        before = time.process_time()
-        for torque in torques[:, trial]:
+        for tick, torque in enumerate(torques[:, trial]):
+            if tick == TARE_TICKS:
+                before = time.process_time()
             data.qfrc_applied[:] = torque
             mujoco.mj_step(model, data)
         seconds += time.process_time() - before
-    return seconds / torques.shape[1] / (len(torques) * model.opt.timestep)
+    return seconds / torques.shape[1] / ((len(torques) - TARE_TICKS) * model.opt.timestep)
 
 
 def one_trial_loop(setting, direction, stiffness, speed, draws, trials, ticks):

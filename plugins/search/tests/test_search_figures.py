@@ -161,7 +161,7 @@ def test_as_an_exception_strategy_it_turns_stalled_insertions_into_done_ones(see
     result, latency = insertions(True, STARTS, seed, 0.008)
     print(
         f"\nexception, seed {seed}: inserted {alone.success.sum()} of {STARTS} without search, "
-        f"{result.success.sum()} with; called {min(latency):.2f} to {max(latency):.2f} s after the touch; all done after "
+        f"{result.success.sum()} with; called {min(latency):.2f} to {max(latency):.2f} s after the touch; done after "
         f"{np.median(result.duration_s):.1f} s (median), {(result.success & (result.duration_s <= 25.0)).sum()} within "
         f"25 s; peak {result.peak_force_n.max():.0f} N",
         end="",
