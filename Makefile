@@ -6,7 +6,9 @@ OUT ?= demo
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
-PYTEST := $(BIN)/python -m pytest -q --timeout 900
+PYTEST := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q --timeout 900
+# Tests run side by side; figures and ratios do not, since some of them measure time.
+SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist worksteal
 PROJECTS := pyproject.toml plugins/all.txt $(wildcard plugins/*/pyproject.toml)
 
 .PHONY: demo install test test-core test-all test-slow figures bench docs lint clean
@@ -37,13 +39,13 @@ test: test-core test-all
 
 # The core on its own: no plug-in is loaded.
 test-core: $(VENV)/.test
-	SKILLFRAME_PLUGINS= $(PYTEST) -m "not slow and not figures and not needs_plugins" tests/unit
+	SKILLFRAME_PLUGINS= $(PYTEST) $(SIDE_BY_SIDE) -m "not slow and not figures and not needs_plugins" tests/unit
 
 test-all: $(VENV)/.test
-	$(PYTEST) -m "not slow and not figures"
+	$(PYTEST) $(SIDE_BY_SIDE) -m "not slow and not figures"
 
 test-slow: $(VENV)/.test
-	$(PYTEST) -m "slow and not figures"
+	$(PYTEST) $(SIDE_BY_SIDE) -m "slow and not figures"
 
 figures: $(VENV)/.test
 	$(PYTEST) -s -m figures
