@@ -7,14 +7,12 @@ outliers); over demonstrations the largest need counts, so that each has equal w
 
 The direction exists if alpha* <= 25 degrees. It is chosen where it lies deepest, D maximising
 
-    M(D) = min over demonstrations of mean_k(depth)    among    {A(D) <= 1.25 alpha*},
+    M(D) = min over demonstrations of mean_k(depth) - P(D)    among    {A(D) <= 1.25 alpha*},
 
-where M is lessened by kappa min(|D . w|, 0.15) if the demonstrations moved in one plane with normal w (two or more
-mean motions that span a plane and no more): a push out of the plane never moved anything, so what the votes say about
-it is the person's wavering, while the cap lets clear votes overrule the plane. The search goes first among cells of
-1.6 degrees, then takes the mean over a disc of 3 degrees around the best, weighted by exp(M / 0.02 rad), which makes
-the result independent of where the cells lie. The papers intersect rectangles in a plane of two angles and do not print
-the constants; votes on the sphere have no poles, and every constant here is ours.
+where P is what is held against directions that leave the way the demonstrations headed as a whole (`heading`). The
+search goes first among cells of 1.6 degrees, then takes the mean over a disc of 3 degrees around the best, weighted by
+exp(M / 0.02 rad), which makes the result independent of where the cells lie. The papers intersect rectangles in a plane
+of two angles and do not print the constants; votes on the sphere have no poles, and every constant here is ours.
 """
 
 from __future__ import annotations
@@ -27,6 +25,7 @@ import numpy as np
 
 from skillframe.frames import Float, cross, norm, unit
 from skillframe_lmc import sphere
+from skillframe_lmc.heading import NO_HEADING, Heading, doubt
 from skillframe_lmc.sectors import Sectors, misses
 from skillframe_lmc.settings import Settings
 
@@ -35,8 +34,6 @@ LEVELS = ((32, radians(15.0)), (64, radians(7.0)), (128, 0.0))
 MOST_CELLS = 700
 DISC = (radians(3.0), radians(0.3))  # radius and spacing of the last search
 DISC_SCALE = 0.02
-PLANE_GAIN, PLANE_CAP, PLANE_SPAN = 0.5, 0.15, 0.15
-"""kappa; and the share of a mean motion that counts as leaving a line or a plane (8.6 degrees)."""
 
 
 class Choice(NamedTuple):
@@ -60,9 +57,9 @@ class Choice(NamedTuple):
 
 
 def needs(
-    directions: Float, demonstrations: Sequence[Sectors], quantile: float, normal: Float | None = None
+    directions: Float, demonstrations: Sequence[Sectors], quantile: float, way: Heading = NO_HEADING
 ) -> tuple[Float, Float]:
-    """A (C,) and M (C,) of directions (C, 3); `normal` is that of the plane of motion, if there is one."""
+    """A (C,) and M (C,) of directions (C, 3)."""
     need = np.full(len(directions), -np.inf)
     depth = np.full(len(directions), np.inf)
     for given in demonstrations:
@@ -70,51 +67,38 @@ def needs(
         k = ceil(quantile * a.shape[1] - 1e-9) - 1
         need = np.maximum(need, np.partition(a, k, axis=1)[:, k])
         depth = np.minimum(depth, deep.mean(axis=1))
-    if normal is not None:
-        depth = depth - PLANE_GAIN * np.minimum(np.abs(directions @ normal), PLANE_CAP)
-    return need, depth
+    return need, depth - doubt(directions, way)
 
 
-def plane_of_motion(demonstrations: Sequence[Sectors]) -> Float | None:
-    """Normal (3,) of the plane that the mean motions of two or more demonstrations span, or None if they span none."""
-    means = np.array([given.motion.mean(axis=0) for given in demonstrations])
-    _, values, axes = np.linalg.svd(means)
-    least = PLANE_SPAN * np.sqrt(len(means))
-    spread = np.append(values, np.zeros(3))
-    return axes[2] if spread[1] >= least > spread[2] else None
-
-
-def choose(demonstrations: Sequence[Sectors], settings: Settings) -> Choice:
+def choose(demonstrations: Sequence[Sectors], settings: Settings, way: Heading = NO_HEADING) -> Choice:
     """The desired direction of one part.
 
     Args:
         demonstrations: sectors of each demonstration, at least one interval each.
         settings: `quantile`, `pyramid_min_rad`, `pyramid_max_rad`, `slack`.
+        way: where the demonstrations headed as a whole.
     """
-    normal = plane_of_motion(demonstrations)
-    directions, need, depth, resolution = _search(demonstrations, settings, normal)
+    directions, need, depth, resolution = _search(demonstrations, settings, way)
     angle = max(settings.pyramid_min_rad, float(need.min()))
     if angle > settings.pyramid_max_rad:
         votes = _votes(directions[np.argmin(need)], demonstrations, settings.pyramid_max_rad)
         return Choice(None, angle, votes, 0.0, 0.0, None)
     feasible = need <= settings.slack * angle
     candidates = directions[feasible]
-    best = _polished(candidates[np.argmax(depth[feasible])], demonstrations, settings, settings.slack * angle, normal)
+    best = _polished(candidates[np.argmax(depth[feasible])], demonstrations, settings, settings.slack * angle, way)
     half_width, widest = _extent(candidates, best)
     area = float(feasible.sum()) * sphere.solid_angle(resolution)
     return Choice(best, angle, _votes(best, demonstrations, angle), area, half_width, widest)
 
 
-def _search(
-    demonstrations: Sequence[Sectors], settings: Settings, normal: Float | None
-) -> tuple[Float, Float, Float, int]:
+def _search(demonstrations: Sequence[Sectors], settings: Settings, way: Heading) -> tuple[Float, Float, Float, int]:
     """Needs and depths on the finest level, only where something may be feasible."""
     cells, directions = sphere.whole(LEVELS[0][0])
     for level, (resolution, margin) in enumerate(LEVELS):
         if level:
             cells = sphere.children(cells)
             directions = sphere.centres(cells, resolution)
-        need, depth = needs(directions, demonstrations, settings.quantile, normal)
+        need, depth = needs(directions, demonstrations, settings.quantile, way)
         bound = settings.slack * max(settings.pyramid_min_rad, float(need.min())) + margin
         keep = np.flatnonzero(need <= bound)
         if margin:
@@ -122,9 +106,7 @@ def _search(
     return directions, need, depth, resolution
 
 
-def _polished(
-    best: Float, demonstrations: Sequence[Sectors], settings: Settings, limit: float, normal: Float | None
-) -> Float:
+def _polished(best: Float, demonstrations: Sequence[Sectors], settings: Settings, limit: float, way: Heading) -> Float:
     """The weighted mean of the directions around the best cell that are feasible too."""
     steps = np.arange(-DISC[0], DISC[0] + 1e-9, DISC[1])
     offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
@@ -132,7 +114,7 @@ def _polished(
     first = unit(np.eye(3)[np.argmin(np.abs(best))] - best[np.argmin(np.abs(best))] * best)
     tangents = np.stack([first, cross(best, first)])
     around = unit(best + offsets @ tangents)
-    need, depth = needs(around, demonstrations, settings.quantile, normal)
+    need, depth = needs(around, demonstrations, settings.quantile, way)
     weight = np.where(need <= limit, np.exp((depth - depth.max()) / DISC_SCALE), 0.0)
     return unit(weight @ around) if weight.sum() > 0.0 else best
 

@@ -4,7 +4,7 @@ First the pitch, then for translation and rotation alike
 
     moved at all?      no: held stiff
     who moved it?      the environment: three-degree-of-freedom compliance, equation (3)       [work]
-    where to push?     intersection of the pyramids; may not exist                              [sectors, directions]
+    where to push?     intersection of the pyramids; may not exist                     [sectors, directions, heading]
     where to give?     principal axes of the motion that the push does not explain              [axes]
     how stiff?         zero along compliant axes, k elsewhere                                   [gains]
 
@@ -31,6 +31,7 @@ from skillframe_lmc import evidence, intervals
 from skillframe_lmc.axes import CompliantAxes, compliant_axes, straightness
 from skillframe_lmc.directions import Choice, choose
 from skillframe_lmc.gains import gains
+from skillframe_lmc.heading import heading
 from skillframe_lmc.intervals import Motion, Track
 from skillframe_lmc.phase import Stop
 from skillframe_lmc.sectors import Sectors, sectors
@@ -157,7 +158,7 @@ def _learn_part(
     if done is not None and done.fraction <= 0.5:
         given = [sectors(m, teacher_driven_only=name == "rotation") for m in moving]
         if all(len(g.contact) >= min(FEWEST_INTERVALS, len(m.work)) for g, m in zip(given, moving, strict=True)):
-            choice = choose(given, settings)
+            choice = choose(given, settings, heading(moving))
         direction = None if choice is None else choice.direction
         axes = compliant_axes(means, direction, _straightness(name, moving, choice, settings))
     path, time = sum(m.path for m in moving), sum(m.duration for m in moving)
