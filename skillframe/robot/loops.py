@@ -20,6 +20,7 @@ import pinocchio as pin
 
 from skillframe.errors import InputError, UnknownName
 from skillframe.frames import Float
+from skillframe.robot.carried import CarriedLoad
 from skillframe.robot.model import RobotModel
 
 _LWA = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -78,6 +79,7 @@ class ClosedChain:
             text = f"{len(self.actuated)} actuators for {len(free)} freedoms ({', '.join(self.independent)})"
             raise InputError(self._where, text, "give one [[actuation]] for each")
         self._data = self.model.createData()
+        self._load: CarriedLoad | None = None
 
     def configuration(self, z: Float) -> Float:
         """(nq,) closed configuration of minimal coordinates (n,).
@@ -104,6 +106,16 @@ class ClosedChain:
         pin.framesForwardKinematics(self.model, self._data, np.asarray(q))
         placed = self._data.oMf
         return np.array([placed[c.eye].translation - placed[c.rod_eye].translation for c in self.cylinders])
+
+    def load_gravity(self, z: Float) -> Float:
+        """(N, n) gravity's generalised forces per kilogram of the robot's payload at minimal coordinates (N, n).
+
+        Raises:
+            InputError: the robot declares no payload, or it hangs on a cylinder.
+        """
+        if self._load is None:
+            self._load = CarriedLoad(self)
+        return self._load.gravity(np.asarray(z, dtype=float))
 
     def at(self, z: Float, zd: Float) -> ChainState:
         """The state of minimal coordinates and their rates (n,).

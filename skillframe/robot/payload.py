@@ -36,7 +36,7 @@ def with_payload(spec: RobotSpec, mass: float) -> RobotSpec:
     if not 0.0 <= mass <= spec.payload.rating:
         text = f"{mass:g} kg is not within 0 and the rating of {spec.payload.rating:g} kg"
         raise InputError(where, text, "carry less")
-    link, published = spec.payload.link, _published(spec)
+    link, published = spec.payload.link, published_inertia(spec)
     left = published.mass - spec.payload.mass
     if left < 0.0:
         text = f"link {link!r} weighs {published.mass:g} kg, less than the payload of {spec.payload.mass:g} kg in it"
@@ -49,7 +49,7 @@ def with_payload(spec: RobotSpec, mass: float) -> RobotSpec:
     )
 
 
-def _published(spec: RobotSpec) -> LinkInertia:
+def published_inertia(spec: RobotSpec) -> LinkInertia:
     """Inertia of the link that carries the load, from robot.toml's overlay or else the URDF."""
     assert spec.payload is not None
     name = spec.payload.link

@@ -1,0 +1,249 @@
+r"""Force of the environment on a hydraulic machine's tool, from chamber pressures and encoders, without a force sensor.
+
+In minimal coordinates, with the momentum \(p = M_z \dot z\) and pistons that push \(F_p = A_a p_a - A_b p_b\) less
+friction \(F_f\), a machine moves by \(\dot p = R^T (F_p - F_f) + C_z^T \dot z - g_z - \delta m\, g_1 + J^T f\). So
+
+    r = L(s) [ p' - R^T (F_p - F_f) - C_z^T zd + g_z ] = L(s) [ J^T f - dm g_1 - R^T dF_f ],  L(s) = K / (s + K)    (1)
+    f = (J W J^T)^-1 J W (r - phi theta),     sigma^2 = diag (J W J^T)^-1                                           (2)
+
+The momentum's rate passes the filter L only as a difference of p, so that no acceleration is needed (De Luca and
+Mattone, ICRA 2003; for cylinders Koivumaki and Mattila, T-RO 31(4), 2015). What friction and payload are known wrongly
+by, theta, is found in air (`identification`), and its regressors phi pass the same filter: matched, so that nothing
+lags. Friction turns over \(\approx\) the sliding length of the seals (Dahl): `seals` follows them. W weighs a joint
+whose piston sticks by what friction may hide there (our choice; 4 kN of the crane's cylinders are some 400 N at the
+tool, whatever is done).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.conditioning.identification import Identification, IdentificationSettings
+from skillframe.conditioning.kalman import SteadyWrenchFilter, steady_gain
+from skillframe.conditioning.seals import Seals
+from skillframe.errors import SkillframeError
+from skillframe.frames import Float
+
+if TYPE_CHECKING:
+    from skillframe.control.hydraulic import Measured, Terms
+    from skillframe.control.vdc_actuator import Cylinders
+    from skillframe.robot.loops import ClosedChain
+
+__all__ = ["Estimate", "ForceEstimator", "ForceSettings", "MomentumObserver", "force_from_residual"]
+
+
+class Estimate(NamedTuple):
+    """Force of the environment on the tool.
+
+    Attributes:
+        force: (N, 2) base x and z [N]; sigma: (N, 2) its standard deviation, from W [N].
+        valid: (N,) at least two pistons slide; elsewhere stiction leaves several hundred newtons open.
+    """
+
+    force: Float
+    sigma: Float
+    valid: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForceSettings:
+    """How to estimate; what is not named otherwise is our choice, from trials with the crane.
+
+    Attributes:
+        corner: of L, published for this crane's derivative filters [Hz].
+        rate_corner: of the piston rates that friction is computed from [Hz].
+        row_noise: standard deviation of the residual r of each joint while its piston slides (n,) [Nm or N].
+        stiction_speed: a piston below it hides friction exp(-(v / stiction_speed)^2) of its Coulomb friction [m/s].
+        least_speed: above it a piston counts as sliding [m/s].
+        sliding_length: deflection of the seals [m]; 0 takes the tanh law with `sliding_speed` [m/s] instead.
+        force_noise, force_corner: of the wrench's Kalman filter [N, Hz]; the corner None leaves it out.
+        weighted: False gives every joint the same weight.
+        identify: of friction and payload in air.
+    """
+
+    corner: float = 8.0
+    rate_corner: float = 8.0
+    row_noise: tuple[float, ...] = (60.0, 60.0, 150.0)
+    stiction_speed: float = 4e-3
+    least_speed: float = 6e-3
+    sliding_length: float = 5e-4
+    sliding_speed: float = 2.5e-3
+    force_noise: float = 60.0
+    force_corner: float | None = 4.0
+    weighted: bool = True
+    identify: IdentificationSettings = field(default_factory=IdentificationSettings)
+
+    def __post_init__(self) -> None:
+        for name in ("corner", "rate_corner", "stiction_speed", "least_speed", "sliding_speed", "force_noise"):
+            if not 0.0 < getattr(self, name) < float("inf"):
+                raise SkillframeError(f"force estimate: {name} must be positive, got {getattr(self, name)}")
+
+
+class MomentumObserver:
+    """Equation (1) for N machines in lock-step: a one-pole filter of whatever the known forces leave of p'.
+
+    Args:
+        corner: [Hz].
+        dt: sample time [s].
+
+    Attributes:
+        share: what a sample moves the filter by, 1 - exp(-2 pi corner dt).
+        residual: r (N, n).
+    """
+
+    def __init__(self, corner: float, dt: float) -> None:
+        self.share, self._dt = float(-np.expm1(-2.0 * np.pi * corner * dt)), dt
+        self.residual: Float = np.zeros((0, 0))
+        self._momentum: Float | None = None
+
+    def start(self) -> None:
+        """Forget the past; the next step settles the filter at once, for a machine at rest."""
+        self._momentum = None
+
+    def step(self, momentum: Float, known: Float) -> Float:
+        """Take in p (N, n) and the rate of it that is accounted for; r (N, n)."""
+        if self._momentum is None:
+            self.residual = -known
+        else:
+            left = (momentum - self._momentum) / self._dt - known
+            self.residual = self.residual + self.share * (left - self.residual)
+        self._momentum = momentum
+        return self.residual
+
+
+def force_from_residual(jacobian: Float, residual: Float, variance: Float) -> tuple[Float, Float]:
+    """Equation (2): the force (N, 2) that explains residuals (N, n) of variances (N, n) best, and its sigma (N, 2).
+
+    Args:
+        jacobian: J (N, 2, n) of the tool's point.
+        residual: what is left for J^T f.
+        variance: diagonal of W^-1.
+    """
+    weighted = jacobian / variance[:, None, :]
+    a = (weighted @ np.swapaxes(jacobian, -1, -2)).reshape(-1, 4).T
+    b = (weighted @ residual[..., None])[..., 0].T
+    determinant = a[0] * a[3] - a[1] * a[2]
+    force = np.stack([a[3] * b[0] - a[1] * b[1], a[0] * b[1] - a[2] * b[0]], axis=-1) / determinant[:, None]
+    return force, np.sqrt(np.stack([a[3], a[0]], axis=-1) / determinant[:, None])
+
+
+class ForceEstimator:
+    """Estimates online, identifies in air when told to, and holds what it found.
+
+    Args:
+        chain: the controller's model of the machine; gives the payload's gravity.
+        cylinders: what the controller knows of them.
+        count: number of trials N.
+        dt: sample time [s].
+        settings: see `ForceSettings`.
+
+    Attributes:
+        identification: theta, its standard deviation, and how many rows it has seen.
+        raw: (N, 2) the force before its Kalman filter [N].
+        residual: (N, n) what is left for J^T f [Nm or N].
+    """
+
+    def __init__(
+        self, chain: ClosedChain, cylinders: Cylinders, count: int, dt: float, settings: ForceSettings | None = None
+    ) -> None:
+        self.settings, self._chain, self._cylinders, self._dt = settings or ForceSettings(), chain, cylinders, dt
+        s = self.settings
+        self.identification = Identification(count, len(cylinders.area_a), s.identify)
+        self._observer = MomentumObserver(s.corner, dt)
+        self._seals = Seals(s.sliding_length, s.sliding_speed)
+        self._rate_share = float(-np.expm1(-2.0 * np.pi * s.rate_corner * dt))
+        self._filter = None if s.force_corner is None else force_filter(s.force_noise, s.force_corner, dt)
+        self._noise: Float = np.square(np.array(s.row_noise))
+        self._every, self._tick, self.calibrating = max(1, round(s.identify.period / dt)), 0, False
+        self._phi: Float = np.zeros((count, len(s.row_noise), 2 * len(cylinders.area_a) + 1))
+        self.raw: Float = np.zeros((count, 2))
+        self.residual: Float = np.zeros((count, len(s.row_noise)))
+
+    def calibrate(self, on: bool) -> None:
+        """Say that the tool is in air (True), or that it may touch from now on (False): an explicit step of a task.
+
+        Turning it on begins the identification anew.
+        """
+        if on and not self.calibrating:
+            self.identification.start()
+        self.calibrating = on
+
+    def start(self, measured: Measured) -> None:
+        """Begin at a measurement, the machine at rest."""
+        count = len(measured.z)
+        self._observer.start()
+        self._rate: Float = np.zeros((count, len(self._cylinders.area_a)))
+        self._seals.start(count, len(self._cylinders.area_a))
+        self._load = self._chain.load_gravity(measured.z)
+        self._tick, self._started = 0, False
+
+    def step(self, measured: Measured, terms: Terms) -> Estimate:
+        """One estimate from one measurement and the model's terms there."""
+        c, s = self._cylinders, self.settings
+        if self._tick % self._every == 0:
+            self._load = self._chain.load_gravity(measured.z)
+        self._rate = self._rate + self._rate_share * (terms.piston_rate - self._rate)
+        shape = self._seals.step(self._rate, self._dt)
+        push = c.area_a * measured.pressure_a - c.area_b * measured.pressure_b
+        push = push - c.coulomb_friction * shape - c.viscous_friction * terms.piston_rate
+        known = pull(terms.arms, push) + terms.drift - terms.gravity
+        momentum = (terms.mass @ measured.rate[..., None])[..., 0]
+        self._regress(self._observer.step(momentum, known), terms, shape)
+        moving = np.abs(self._rate)
+        variance = self._variance(terms.arms, moving)
+        if self.calibrating and self._tick % self._every == 0:
+            sliding = pull(np.abs(terms.arms), np.where(moving > s.least_speed, 0.0, 1.0)) == 0.0
+            self.identification.update(self._phi, self._observer.residual, self._noise, sliding)
+        self.residual = self._observer.residual - (self._phi @ self.identification.theta[..., None])[..., 0]
+        self.raw, sigma = force_from_residual(terms.jacobian, self.residual, variance)
+        self._tick += 1
+        return Estimate(self._smooth(self.raw), sigma, np.sum(moving > s.least_speed, axis=-1) >= 2)
+
+    def _regress(self, residual: Float, terms: Terms, shape: Float) -> None:
+        """Phi (N, n, 2k + 1) of dF_C, dF_v and dm through the same filter as the residual."""
+        spread = spread_of(terms.arms)
+        now = np.concatenate(
+            [-spread * shape[:, None, :], -spread * terms.piston_rate[:, None, :], -self._load[..., None]], axis=-1
+        )
+        self._phi = self._phi + self._observer.share * (now - self._phi) if self._started else now
+        self._started = True
+
+    def _variance(self, arms: Float, moving: Float) -> Float:
+        """(N, n) of each joint's residual: noise, and what its pistons' stiction may hide."""
+        if not self.settings.weighted:
+            return np.broadcast_to(self._noise.mean(), moving.shape)
+        s = self.settings
+        hidden = np.square(self._cylinders.coulomb_friction * np.exp(-np.square(moving / s.stiction_speed)))
+        return self._noise + pull(np.square(arms), hidden)
+
+    def _smooth(self, force: Float) -> Float:
+        if self._filter is None:
+            return force
+        if self._tick == 1:
+            self._filter.start(force)
+        return self._filter.step(force)
+
+
+def force_filter(noise: float, corner: float, dt: float) -> SteadyWrenchFilter:
+    """The converged Kalman filter of a force's two components, `kalman`'s model: noise [N], corner [Hz]."""
+    walk = noise * np.sqrt(dt) * (2.0 * np.pi * corner) ** 2
+    return SteadyWrenchFilter(steady_gain(np.full(2, noise), np.full(2, walk), dt), dt)
+
+
+def spread_of(arms: Float) -> Float:
+    """R^T (N, n, k) of moment arms (N, k, n), or of a diagonal (N, k)."""
+    if arms.ndim == 2:
+        return arms[:, :, None] * np.eye(arms.shape[-1])
+    return np.swapaxes(arms, -1, -2)
+
+
+def pull(arms: Float, force: Float) -> Float:
+    """R^T F (N, n) of piston forces (N, k), with moment arms as in `spread_of`."""
+    if arms.ndim == 2:
+        return arms * force
+    result: Float = (np.swapaxes(arms, -1, -2) @ force[..., None])[..., 0]
+    return result

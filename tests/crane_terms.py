@@ -1,0 +1,57 @@
+"""The crane's terms trial by trial from the loop-embedding model, and measurements of a state, for tests."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+
+class Terms(NamedTuple):
+    """What `control.hydraulic.Terms` holds, from `ChainState`; moment arms not reduced to their diagonal."""
+
+    mass: np.ndarray
+    drift: np.ndarray
+    gravity: np.ndarray
+    jacobian: np.ndarray
+    arms: np.ndarray
+    piston: np.ndarray
+    piston_rate: np.ndarray
+    tip: np.ndarray
+    tip_rate: np.ndarray
+
+
+class Measured(NamedTuple):
+    """What `control.hydraulic.Measured` holds."""
+
+    z: np.ndarray
+    rate: np.ndarray
+    pressure_a: np.ndarray
+    pressure_b: np.ndarray
+    force: np.ndarray
+
+
+def mass_rate_term(state):
+    """C_z^T zd = G' C' v + (dG/dt)' M v (n,), Christoffel's C of the tree."""
+    chain, model = state.chain, state.chain.model
+    data = model.createData()
+    coriolis = pin.computeCoriolisMatrix(model, data, state.q, state.v)
+    h = 1e-6
+    ahead, behind = (chain.at(state.z + s * h * state.zd, state.zd).embedding for s in (1.0, -1.0))
+    embedding_rate = (ahead - behind) / (2 * h)
+    return state.embedding.T @ coriolis.T @ state.v + embedding_rate.T @ state.tree_mass @ state.v
+
+
+def one(chain, z, zd):
+    """Terms of one state, without the leading dimension."""
+    state = chain.at(z, zd)
+    frame = chain.robot.tool_frames[0]
+    jacobian = state.jacobian(frame)[[0, 2]]
+    tip = np.array(state.data.oMf[frame].translation)[[0, 2]]
+    return Terms(
+        state.mass, mass_rate_term(state), state.gravity, jacobian, state.arms, *state.piston, tip, jacobian @ zd
+    )  # fmt: skip
+
+
+def terms(chain, z, rate):
+    """Terms of N states."""
+    return Terms(*(np.array(x) for x in zip(*(one(chain, a, b) for a, b in zip(z, rate, strict=True)), strict=True)))
