@@ -1,4 +1,4 @@
-"""What the core itself registers, as an ordinary plug-in: its worlds and its demonstration readers."""
+"""What the core itself registers, as an ordinary plug-in: worlds, demonstration readers, rows of the crane."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from skillframe.hookspecs import hookimpl
-from skillframe.records import ReaderType, WorldType
+from skillframe.records import ReaderType, RowType, WorldType
 
 if TYPE_CHECKING:
     from skillframe.frames import Float, Pose
@@ -26,6 +26,14 @@ def skillframe_readers() -> Iterable[ReaderType]:
     from skillframe.demonstration.formats import reader_types
 
     return reader_types(_tool_poses)
+
+
+@hookimpl
+def skillframe_rows() -> Iterable[RowType]:
+    """Published results that need no plug-in."""
+    from skillframe.reproduce.crane import row_types
+
+    return row_types()
 
 
 def _tool_poses(robot: str, arm: str | None, names: Sequence[str], positions: Float) -> Pose:

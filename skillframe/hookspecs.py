@@ -1,4 +1,4 @@
-"""The five hooks a plug-in can implement; each yields records and runs once per process, never in the loop.
+"""The six hooks a plug-in can implement; each yields records and runs once per process, never in the loop.
 
 A plug-in is a distribution with an entry point in the group `skillframe` that names a module::
 
@@ -16,7 +16,7 @@ from collections.abc import Iterable
 
 import pluggy
 
-from skillframe.records import CoordinatorType, ReaderType, SegmenterType, SkillType, WorldType
+from skillframe.records import CoordinatorType, ReaderType, RowType, SegmenterType, SkillType, WorldType
 
 GROUP = "skillframe"
 hookspec = pluggy.HookspecMarker(GROUP)
@@ -46,3 +46,8 @@ def skillframe_worlds() -> Iterable[WorldType]:  # type: ignore[empty-body]
 @hookspec
 def skillframe_readers() -> Iterable[ReaderType]:  # type: ignore[empty-body]
     """Demonstration file formats."""
+
+
+@hookspec
+def skillframe_rows() -> Iterable[RowType]:  # type: ignore[empty-body]
+    """Published results and how ours are computed: rows of `skillframe reproduce`."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -132,3 +132,79 @@ class ReaderType:
     suffixes: tuple[str, ...]
     read: Callable[[Path, Mapping[str, Any]], Demonstration]
     write: Callable[[Demonstration, Path], None] | None = None
+
+
+Verdict = Literal["pass", "fail", "reported"]
+Setting = float | int | str | bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RowRun:
+    """How a published result is to be computed now.
+
+    Attributes:
+        settings: the row's own, with what `--set` changed.
+        seed: everything random follows from it.
+        quick: fewer trials, for a first look and for automatic checks.
+        tell: is told in words what happens.
+    """
+
+    settings: Mapping[str, Any]
+    seed: int = 0
+    quick: bool = False
+    tell: Callable[[str], None] = print
+
+    def count(self, full: int, quick: int) -> int:
+        """How many of something: `quick` of them for a first look, else `full`."""
+        return quick if self.quick else full
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RowResult:
+    """What computing a published result gave.
+
+    Attributes:
+        ours: our figure, in the words of the published one.
+        verdict: of the row's bar; "reported" where there is none, or where it could not be computed.
+        difference: by how much it differs from the paper and why, or why it was not computed; "" if it does not.
+        computed: False if there is no figure of ours, for the reason given in `difference`.
+        values: figures by name, for scripts.
+        head, rows: a table that stands behind the figure.
+        pictures: the paper's figures, drawn from our data.
+    """
+
+    ours: str
+    verdict: Verdict = "reported"
+    difference: str = ""
+    computed: bool = True
+    values: Mapping[str, float] = field(default_factory=dict)
+    head: Sequence[str] = ()
+    rows: Sequence[Sequence[str]] = ()
+    pictures: Sequence[Illustration] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RowType:
+    """A published result, and how ours is computed: a row of `skillframe reproduce`.
+
+    Attributes:
+        name: the row's number, "13".
+        summary: what is claimed, one line.
+        published: the published figure.
+        source: where it was published.
+        bar: what ours must be for "pass"; "" if it is reported only.
+        calibrated: what was chosen with the published figure in sight; "" if ours is a prediction.
+        settings: what `--set` can change, with its value as shipped [SI units, unless the name says otherwise].
+        group: rows of one group are computed one after another in one process, so that they can share what is costly.
+        run: computes it; slow, and not in the process of the command.
+    """
+
+    name: str
+    summary: str
+    published: str
+    source: str
+    bar: str = ""
+    calibrated: str = ""
+    settings: Mapping[str, Setting] = field(default_factory=dict)
+    group: str = ""
+    run: Callable[[RowRun], RowResult]

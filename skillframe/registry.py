@@ -22,7 +22,7 @@ import pluggy
 
 from skillframe import hookspecs
 from skillframe.errors import SkillframeError, UnknownName
-from skillframe.records import CoordinatorType, ReaderType, SegmenterType, SkillType, WorldType
+from skillframe.records import CoordinatorType, ReaderType, RowType, SegmenterType, SkillType, WorldType
 
 KINDS: Mapping[str, str] = {
     "skill": "skillframe_skills",
@@ -30,6 +30,7 @@ KINDS: Mapping[str, str] = {
     "coordinator": "skillframe_coordinators",
     "world": "skillframe_worlds",
     "reader": "skillframe_readers",
+    "row": "skillframe_rows",
 }
 RECORDS: Mapping[str, type[Any]] = {
     "skill": SkillType,
@@ -37,6 +38,7 @@ RECORDS: Mapping[str, type[Any]] = {
     "coordinator": CoordinatorType,
     "world": WorldType,
     "reader": ReaderType,
+    "row": RowType,
 }
 
 
@@ -134,7 +136,7 @@ class Registry:
             plugin.fail(conflict)
 
     def names(self, kind: str) -> list[str]:
-        """Sorted names of a kind ("skill", "segmenter", "coordinator", "world", "reader")."""
+        """Sorted names of a kind ("skill", "segmenter", "coordinator", "world", "reader", "row")."""
         return sorted(name for name in self._records[kind] if (kind, name) not in self._conflicts)
 
     def records(self, kind: str) -> Iterator[Any]:
@@ -190,6 +192,11 @@ class Registry:
     def reader(self, name: str) -> ReaderType:
         """The file format of that name; raises as `skill` does."""
         record: ReaderType = self._get("reader", name)
+        return record
+
+    def row(self, name: str) -> RowType:
+        """The published result of that number; raises as `skill` does."""
+        record: RowType = self._get("row", name)
         return record
 
 

@@ -28,6 +28,7 @@ COMMANDS = {
     "run": "Run a skill in a simulated world.",
     "campaign": "Run a skill many times over declared uncertainty.",
     "report": "Make a self-contained HTML report from results.",
+    "reproduce": "The papers' results, row by row.",
     "robots": "List, check and show robots.",
     "fmu": "List, build, check and simulate FMUs.",
     "plugins": "List, check and start plug-ins.",

@@ -24,7 +24,7 @@ FLOORS = [
     {"executor", "arms", "recorder", "trace", "prepare"},
     {"teacher", "staged_teacher", "blind_teacher", "metrics", "campaign"},
     {"report", "demonstrate", "demonstrate_blind"},
-    {"conformance", "testing", "quickstart"},
+    {"conformance", "testing", "quickstart", "reproduce"},
     {"cli"},
 ]
 FLOOR = {name: i for i, names in enumerate(FLOORS) for name in names}

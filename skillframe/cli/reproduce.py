@@ -1,0 +1,113 @@
+"""`skillframe reproduce`: the papers' results beside ours, computed anew."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from skillframe.reproduce.runner import Outcome
+
+
+@click.command(name="reproduce")
+@click.argument("rows", nargs=-1, metavar="[ROW]...")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("reproduce"), show_default=True,
+              help="Folder for rows, reproduce.json, reproduce.html and reproduce.md.")  # fmt: skip
+@click.option("--quick", is_flag=True, help="Fewer trials: all rows in less than three minutes on two cores.")
+@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a row's setting.")
+@click.option("--seed", default=0, show_default=True, help="Seed of everything random.")
+@click.option("--workers", type=click.IntRange(min=1), help="Rows at a time [number of cores].")
+@click.option("--fresh", is_flag=True, help="Compute rows again that OUT holds already.")
+@click.option("--list", "only_list", is_flag=True, help="List rows and their settings, compute nothing.")
+@click.option("--json", "as_json", is_flag=True, help="The table as JSON on stdout.")
+def command(
+    rows: tuple[str, ...], out: Path, quick: bool, settings: tuple[str, ...], seed: int, workers: int | None,
+    fresh: bool, only_list: bool, as_json: bool,
+) -> int:  # fmt: skip
+    """Compute published results (all of them, or each ROW) and show them beside the published figures.
+
+    Rows that OUT holds already, computed with the same settings, are kept; Ctrl-C keeps what is done. Exit code 0 if
+    every verdict is the one in the docs, 1 if one has changed.
+
+    \b
+    Example:
+      skillframe reproduce --quick --out reproduce
+      skillframe reproduce 2 --set world.friction=0.3 --out steeper
+    """
+    from skillframe.config import parse_setting
+    from skillframe.registry import registry
+    from skillframe.reproduce.jobs import jobs_of
+    from skillframe.reproduce.runner import run
+
+    changed = dict(parse_setting(text) for text in settings)
+    jobs = jobs_of(registry(), rows, changed, seed=seed, quick=quick)
+    if only_list:
+        return _list([registry().row(job.row) for job in jobs], as_json)
+    outcome = run(jobs, out, workers=workers or os.cpu_count() or 1, fresh=fresh, tell=_tell)
+    _write(outcome.entries, out)
+    return _end(outcome, out, quick, as_json)
+
+
+def _tell(text: str) -> None:
+    click.echo(text, err=True)
+
+
+def _list(rows: Sequence[Any], as_json: bool) -> int:
+    from skillframe.cli.output import emit_json, table
+
+    keys = ("summary", "published", "source", "bar", "calibrated")
+    found = [{"row": r.name, **{k: getattr(r, k) for k in keys}, "settings": dict(r.settings)} for r in rows]
+    if as_json:
+        emit_json(found)
+    else:
+        lines = [(f["row"], f["summary"], f["published"], _settings(f["settings"])) for f in found]
+        table(("row", "what", "published", "settings"), lines)
+    return 0
+
+
+def _settings(values: Mapping[str, Any]) -> str:
+    return ", ".join(f"{key}={value}" for key, value in values.items())
+
+
+def _write(entries: Sequence[Mapping[str, Any]], out: Path) -> None:
+    from skillframe.demonstration.safe import replace_file
+    from skillframe.reproduce import document, page, store
+
+    store.write_table(out, entries)
+    replace_file(out / "reproduce.html", page.render(entries).encode())
+    replace_file(out / "reproduce.md", document.render(entries).encode())
+
+
+def _end(outcome: Outcome, out: Path, quick: bool, as_json: bool) -> int:
+    from skillframe.reproduce import committed
+
+    changed = committed.changes(outcome.entries, committed.verdicts(quick=quick))
+    _show(outcome.entries, as_json)
+    _tell(f"table: {out / 'reproduce.json'}, page: {out / 'reproduce.html'}")
+    for sentence in changed:
+        _tell(f"changed: {sentence}")
+    if outcome.interrupted:
+        raise KeyboardInterrupt
+    if outcome.broken:
+        raise RuntimeError("; ".join(outcome.broken))
+    if outcome.refused:
+        from skillframe.reproduce.runner import RowFailed
+
+        raise RowFailed("; ".join(outcome.refused))
+    return 1 if changed else 0
+
+
+def _show(entries: Sequence[Mapping[str, Any]], as_json: bool) -> None:
+    from skillframe.cli.output import emit_json, table
+    from skillframe.reproduce import store
+
+    if as_json:
+        emit_json(store.table(entries))
+        return
+    columns = ("row", "summary", "published", "ours", "verdict", "values_are", "wall_s")
+    head = ("row", "what", "published", "ours", "verdict", "values", "wall [s]")
+    table(head, [[each[c] for c in columns] for each in entries])

@@ -1,0 +1,70 @@
+"""The table as a page of the docs, in Markdown: written by the command, committed as it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+HEAD = ("row", "what", "published", "ours", "verdict", "values")
+
+
+def render(entries: Sequence[Mapping[str, Any]]) -> str:
+    """The page; the same rows give the same text but for wall times."""
+    seconds = sum(each["wall_s"] for each in entries)
+    lines = [
+        "# The papers' results, row by row", "",
+        "Written by `skillframe reproduce`; do not edit. [How to read it](reproduce.md).", "",
+        "```text", _command(entries), "```", "",
+        f"{len(entries)} rows, {_count(entries, 'pass')} pass, {_count(entries, 'fail')} fail, "
+        f"{_count(entries, 'reported')} are reported only; {seconds:.0f} s of computing.", "",
+        _row(HEAD), _row(["---"] * len(HEAD)),
+    ]  # fmt: skip
+    keys = ("row", "summary", "published", "ours", "verdict", "values_are")
+    lines += [_row([each[key] for key in keys]) for each in entries]
+    for each in entries:
+        lines += ["", *_details(each)]
+    return "\n".join(lines) + "\n"
+
+
+def _command(entries: Sequence[Mapping[str, Any]]) -> str:
+    seeds, quick = {each["seed"] for each in entries}, any(each["quick"] for each in entries)
+    seed = f" --seed {seeds.pop()}" if len(seeds) == 1 else ""
+    return f"skillframe reproduce{' --quick' if quick else ''}{seed} --out reproduce"
+
+
+def origin(each: Mapping[str, Any]) -> str:
+    """Whether our figure was predicted, or what was chosen with the published one in sight."""
+    if each["values_are"] == "calibrated":
+        return f"calibrated: {each['calibrated']}"
+    return "predicted: nothing was tuned to it" if each["values_are"] == "predicted" else "not computed"
+
+
+def _count(entries: Sequence[Mapping[str, Any]], verdict: str) -> int:
+    return sum(each["verdict"] == verdict for each in entries)
+
+
+def _row(cells: Sequence[object]) -> str:
+    return f"| {' | '.join(_cell(cell) for cell in cells)} |"
+
+
+def _cell(value: object) -> str:
+    text = " ".join(str(value).split())
+    for special in ("\\", "|", "*", "_", "<", "[", "`", "$"):
+        text = text.replace(special, f"\\{special}")
+    return text or " "
+
+
+def _details(each: Mapping[str, Any]) -> list[str]:
+    facts = [
+        f"- published: {_cell(each['published'])} ({_cell(each['source'])})",
+        f"- ours: {_cell(each['ours'])}",
+        f"- bar: {_cell(each['bar'])}; **{each['verdict']}**" if each["bar"] else "- no bar: reported only",
+        f"- {origin(each)}",
+    ]
+    facts += [f"- difference: {_cell(each['difference'])}"] if each["difference"] else []
+    facts += [f"- `{each['command']}`, {each['wall_s']:.0f} s"]
+    lines = [f"## Row {each['row']}: {_cell(each['summary'])}", "", *facts]
+    table = each["table"]
+    if table["rows"]:
+        lines += ["", _row(table["head"]), _row(["---"] * len(table["head"])), *(_row(row) for row in table["rows"])]
+    return lines

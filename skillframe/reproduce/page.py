@@ -1,0 +1,102 @@
+"""The page: every row with its published figure, ours, the table behind it and the paper's figures from our data.
+
+One file that reaches for nothing outside; it looks like a report because it takes its parts and style from there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from typing import Any
+
+from skillframe.report.markup import Markup, data_uri, figure, join, note, table, tag
+from skillframe.report.page import POLICY
+from skillframe.reproduce.document import origin
+
+BADGES = {"pass": "badge won", "fail": "badge lost", "reported": "badge"}
+HEAD = ("row", "what is claimed", "published", "ours", "verdict", "values")
+STYLE = """
+.rows { font-size: 0.92rem; } .rows td { min-width: 3.2rem; } .rows td:nth-child(2) { min-width: 13rem; }
+.rows td:nth-child(3), .rows td:nth-child(4) { min-width: 12rem; }
+.facts { display: grid; grid-template-columns: max-content minmax(0, 1fr); gap: 0.25rem 1.2rem; margin: 0.6rem 0; }
+.facts dt { color: var(--soft); } .facts dd { margin: 0; overflow-wrap: anywhere; }
+figure img { max-height: 560px; object-fit: contain; }
+:root[data-theme="dark"] img.paper { filter: brightness(0.86); }
+@media (max-width: 820px) {
+  .facts { grid-template-columns: minmax(0, 1fr); gap: 0 0; } .facts dd { margin-bottom: 0.5rem; }
+}
+@media (prefers-color-scheme: dark) { :root:not([data-theme="light"]) img.paper { filter: brightness(0.86); } }
+"""
+
+
+def render(entries: Sequence[Mapping[str, Any]]) -> str:
+    """The whole document; the same rows give the same text."""
+    head = tag(
+        "head", tag("meta", charset="utf-8"), tag("meta", http_equiv="Content-Security-Policy", content=POLICY),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("title", "skillframe reproduce"), tag("style", _style()),
+    )  # fmt: skip
+    links = [tag("a", each["row"], href=f"#row-{each['row']}", title=each["summary"]) for each in entries]
+    top = tag("nav", tag("span", "skillframe", class_="brand"), tag("div", *links, class_="links"))
+    body = tag("body", top, tag("main", _hero(entries), *(_section(each) for each in entries)), _foot())
+    return "<!DOCTYPE html>\n" + tag("html", head, body, lang="en")
+
+
+def _style() -> Markup:
+    shared = files("skillframe.report").joinpath("assets", "page.css").read_text(encoding="utf-8")
+    return Markup(shared + STYLE)
+
+
+def _hero(entries: Sequence[Mapping[str, Any]]) -> Markup:
+    count = {verdict: sum(each["verdict"] == verdict for each in entries) for verdict in BADGES}
+    lead = (
+        f"{len(entries)} published results, computed anew: {count['pass']} pass their bar, {count['fail']} do not, "
+        f"{count['reported']} are reported without one. A row that does not reproduce is a result, too."
+    )
+    quick = any(each["quick"] for each in entries)
+    lines = [
+        (tag("a", each["row"], href=f"#row-{each['row']}"), each["summary"], each["published"], each["ours"],
+         _badge(each), each["values_are"])
+        for each in entries
+    ]  # fmt: skip
+    return tag(
+        "header", tag("p", "Reproduction", class_="eyebrow"), tag("h1", "The papers' results, row by row"),
+        tag("p", lead, class_="lead"),
+        note("This was a quick run: fewer trials than behind the table of the docs.") if quick else "",
+        table(HEAD, lines, class_="rows", numeric=9), class_="hero",
+    )  # fmt: skip
+
+
+def _badge(each: Mapping[str, Any]) -> Markup:
+    return tag("span", each["verdict"], class_=BADGES[each["verdict"]])
+
+
+def _section(each: Mapping[str, Any]) -> Markup:
+    facts = [
+        ("published", f"{each['published']} ({each['source']})"),
+        ("ours", each["ours"]),
+        ("bar", each["bar"] or "none: reported only"),
+        ("values", origin(each)),
+        ("difference", each["difference"]),
+        ("command", tag("code", each["command"])),
+        ("computed in", f"{each['wall_s']:.1f} s, seed {each['seed']}"),
+    ]
+    listed = tag("dl", *(join([tag("dt", k), tag("dd", v)]) for k, v in facts if v), class_="facts")
+    behind = each["table"]
+    return tag(
+        "section", tag("h2", f"{each['row']}. {each['summary']} ", _badge(each)), listed,
+        table(behind["head"], behind["rows"], numeric=9) if behind["rows"] else "",
+        tag("div", *(_picture(p) for p in each["pictures"]), class_="grid") if each["pictures"] else "",
+        id=f"row-{each['row']}",
+    )  # fmt: skip
+
+
+def _picture(drawn: Mapping[str, str]) -> Markup:
+    """A drawing as an image, so that nothing in it can act on the page."""
+    source = data_uri("image/svg+xml", drawn["svg"].encode("utf-8"))
+    image = tag("img", src=source, alt=drawn["title"], class_="paper")
+    return figure(drawn["title"], drawn["caption"], image, class_="plot")
+
+
+def _foot() -> Markup:
+    return tag("footer", "Made by skillframe reproduce from the rows' files alone.")

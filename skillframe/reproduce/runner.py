@@ -1,0 +1,164 @@
+"""Computes rows in processes of their own, a group each: what fails or is interrupted costs itself and no other.
+
+A process writes its row's file when it is done, so that whatever ends the run, finished rows are kept, and the next run
+computes what is missing.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from time import perf_counter
+from typing import Any, NamedTuple
+
+from skillframe.errors import SkillframeError
+from skillframe.records import RowRun
+from skillframe.registry import registry
+from skillframe.reproduce import store
+from skillframe.reproduce.jobs import Job
+
+Tell = Callable[[str], None]
+
+
+class RowFailed(SkillframeError):
+    """Rows that could not be computed, because of what they were given; says which and why."""
+
+
+class Outcome(NamedTuple):
+    """What became of the jobs.
+
+    Attributes:
+        entries: finished rows, in the order of the jobs.
+        refused: sentences about rows that refused their settings.
+        broken: sentences about rows that ended in an internal error.
+        interrupted: Ctrl-C came before the end.
+    """
+
+    entries: list[dict[str, Any]]
+    refused: list[str]
+    broken: list[str]
+    interrupted: bool
+
+
+def run(jobs: Sequence[Job], folder: Path, *, workers: int, fresh: bool, tell: Tell) -> Outcome:
+    """Compute what is missing of some rows.
+
+    Args:
+        jobs: the rows.
+        folder: where rows are kept.
+        workers: how many at a time.
+        fresh: compute those that are there, too.
+        tell: is told what happens.
+    """
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(name, "1")  # several processes share the machine
+    missing = [job for job in jobs if fresh or store.kept(folder, job) is None]
+    if len(missing) < len(jobs):
+        tell(f"{len(jobs) - len(missing)} of {len(jobs)} rows are there already in {folder}")
+    pool = _Pool(folder, max(1, workers), tell)
+    interrupted = not pool.work_off(_groups(missing))
+    found = [entry for job in jobs if (entry := store.kept(folder, job)) is not None]
+    return Outcome(found, pool.refused, pool.broken, interrupted)
+
+
+def _groups(jobs: Sequence[Job]) -> list[list[Job]]:
+    found: dict[str, list[Job]] = {}
+    for job in jobs:
+        found.setdefault(job.group, []).append(job)
+    return list(found.values())
+
+
+class _Running(NamedTuple):
+    """A process that works off the jobs of a group."""
+
+    process: BaseProcess
+    receiver: Connection
+    open: list[str]  # rows that it has not told the end of
+
+
+class _Pool:
+    """At most so many processes at a time, a group of rows each."""
+
+    def __init__(self, folder: Path, workers: int, tell: Tell) -> None:
+        self._folder, self._workers, self._tell = folder, workers, tell
+        self._running: list[_Running] = []
+        self.refused: list[str] = []
+        self.broken: list[str] = []
+
+    def work_off(self, groups: Sequence[Sequence[Job]]) -> bool:
+        """Do the jobs of all groups; False if Ctrl-C ended it."""
+        waiting = list(groups)
+        try:
+            while waiting or self._running:
+                while waiting and len(self._running) < self._workers:
+                    self._begin(waiting.pop(0))
+                wait([each.receiver for each in self._running])
+                self._collect()
+        except KeyboardInterrupt:
+            for each in self._running:
+                each.process.terminate()
+            for each in self._running:
+                each.process.join()
+            return False
+        return True
+
+    def _begin(self, jobs: Sequence[Job]) -> None:
+        for job in jobs:
+            store.path_of(self._folder, job.row).unlink(missing_ok=True)
+        context = multiprocessing.get_context("spawn")
+        receiver, sender = context.Pipe(duplex=False)
+        described = [store.described(job) for job in jobs]
+        process = context.Process(target=_compute_all, args=(described, str(self._folder), sender), daemon=True)
+        process.start()
+        sender.close()
+        rows = [job.row for job in jobs]
+        self._tell(f"row{'s' if len(rows) > 1 else ''} {', '.join(rows)}: started")
+        self._running.append(_Running(process, receiver, rows))
+
+    def _collect(self) -> None:
+        for each in list(self._running):
+            try:
+                while each.receiver.poll():
+                    self._note(each, *each.receiver.recv())
+            except EOFError:  # the process has ended
+                each.process.join()
+                self._running.remove(each)
+                for row in list(each.open):
+                    self._note(each, row, "broken", f"its process ended with code {each.process.exitcode}")
+
+    def _note(self, running: _Running, row: str, kind: str, text: str) -> None:
+        running.open.remove(row)
+        self._tell(f"row {row}: {text}")
+        if kind != "done":
+            (self.refused if kind == "refused" else self.broken).append(f"row {row}: {text}")
+
+
+def _compute_all(described: Sequence[dict[str, Any]], folder: str, sender: Connection) -> None:
+    """Compute rows one after another and keep each; runs in a process of its own."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends us
+    sys.stdout = sys.stderr  # whatever a row prints, stdout is the command's
+    for each in described:
+        job = Job(**each)
+        sender.send((job.row, *_compute(job, Path(folder))))
+
+
+def _compute(job: Job, folder: Path) -> tuple[str, str]:
+    def tell(text: str) -> None:
+        print(f"row {job.row}: {text}", file=sys.stderr, flush=True)
+
+    try:
+        row, began = registry().row(job.row), perf_counter()
+        result = row.run(RowRun(settings=job.settings, seed=job.seed, quick=job.quick, tell=tell))
+        seconds = perf_counter() - began
+        store.keep(folder, store.entry(row, job, result, seconds))
+    except SkillframeError as error:
+        return "refused", str(error)
+    except Exception as error:  # the other rows go on; the command ends with an internal error
+        return "broken", f"{type(error).__name__}: {error}"
+    return "done", f"{result.verdict} after {seconds:.0f} s: {result.ours}"

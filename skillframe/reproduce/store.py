@@ -1,0 +1,77 @@
+"""What is kept of computed rows: `rows/<row>.json` for each as soon as it is there, `reproduce.json` with all of them.
+
+`reproduce.json` holds a list; its keys are in the contract. Pictures stay in the files of the rows.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from skillframe.demonstration.safe import replace_file
+from skillframe.records import RowResult, RowType
+from skillframe.reproduce.jobs import Job
+
+ROWS, TABLE = "rows", "reproduce.json"
+
+
+def entry(row: RowType, job: Job, result: RowResult, wall_s: float) -> dict[str, Any]:
+    """A computed row as plain JSON values."""
+    return {
+        "row": row.name, "summary": row.summary, "published": row.published, "source": row.source, "bar": row.bar,
+        "ours": result.ours, "verdict": result.verdict, "difference": result.difference,
+        "values_are": values_are(row, result), "calibrated": row.calibrated,
+        "values": {key: float(value) for key, value in result.values.items()},
+        "table": {"head": list(result.head), "rows": [list(each) for each in result.rows]},
+        "pictures": [picture._asdict() for picture in result.pictures],
+        "command": job.command, "seed": job.seed, "quick": job.quick, "settings": dict(job.settings),
+        "wall_s": round(wall_s, 2), "key": job.key,
+    }  # fmt: skip
+
+
+def values_are(row: RowType, result: RowResult) -> str:
+    """Where our figure comes from, in a word."""
+    if not result.computed:
+        return "not computed"
+    return "calibrated" if row.calibrated else "predicted"
+
+
+def keep(folder: Path, found: Mapping[str, Any]) -> None:
+    """Write one row's file, whole or not at all."""
+    replace_file(path_of(folder, found["row"]), _text(found))
+
+
+def path_of(folder: Path, row: str) -> Path:
+    """The file of a row."""
+    return folder / ROWS / f"{row}.json"
+
+
+def kept(folder: Path, job: Job) -> dict[str, Any] | None:
+    """A row computed earlier by an equal job, or None."""
+    try:
+        found: dict[str, Any] = json.loads(path_of(folder, job.row).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return found if isinstance(found, dict) and found.get("key") == job.key else None
+
+
+def write_table(folder: Path, entries: Sequence[Mapping[str, Any]]) -> None:
+    """Write `reproduce.json`."""
+    replace_file(folder / TABLE, _text(table(entries)))
+
+
+def table(entries: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """The rows without their pictures and what only the store needs."""
+    return [{key: value for key, value in each.items() if key not in ("pictures", "key")} for each in entries]
+
+
+def described(job: Job) -> dict[str, Any]:
+    """A job as plain values, for another process."""
+    return asdict(job)
+
+
+def _text(value: Any) -> bytes:
+    return (json.dumps(value, indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False) + "\n").encode()
