@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from skillframe import hookimpl
-from skillframe.records import CoordinatorType, Document, LearnOptions, WorldType
+from skillframe.records import CoordinatorType, Document, LearnOptions, RowType, WorldType
 
 if TYPE_CHECKING:
     from skillframe.demonstration.record import Demonstration
@@ -69,3 +69,11 @@ def skillframe_worlds() -> Iterable[WorldType]:
         name="dual_peg", summary="a peg with a hemispherical tip, and its hole in a second arm's hand",
         params=dual_peg.DualPegParams, build=dual_peg.build,
     )  # fmt: skip
+
+
+@hookimpl
+def skillframe_rows() -> Iterable[RowType]:
+    """Published results that this plug-in computes."""
+    from skillframe_dualarm.rows import row_types
+
+    return row_types()

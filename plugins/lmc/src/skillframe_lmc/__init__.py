@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from skillframe.hookspecs import hookimpl
-from skillframe.records import Document, Illustration, LearnOptions, SkillType
+from skillframe.records import Document, Illustration, LearnOptions, RowType, SkillType
 
 if TYPE_CHECKING:
     from skillframe.demonstration.record import Demonstration
@@ -60,3 +60,11 @@ def skillframe_skills() -> Iterable[SkillType]:
         describe=_describe,
         explain=_explain,
     )
+
+
+@hookimpl
+def skillframe_rows() -> Iterable[RowType]:
+    """Published results that this plug-in computes."""
+    from skillframe_lmc.rows import row_types
+
+    return row_types()

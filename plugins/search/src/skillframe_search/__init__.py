@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from skillframe.hookspecs import hookimpl
-from skillframe.records import Document, Illustration, LearnOptions, SkillType
+from skillframe.records import Document, Illustration, LearnOptions, RowType, SkillType
 
 if TYPE_CHECKING:
     from skillframe.demonstration.record import Demonstration
@@ -82,3 +82,11 @@ def skillframe_skills() -> Iterable[SkillType]:
             name=kind, summary=summary, build=_build, check=_check, learn=_learn(kind), describe=_describe,
             explain=_explain, example=_example(kind), area=_area,
         )  # fmt: skip
+
+
+@hookimpl
+def skillframe_rows() -> Iterable[RowType]:
+    """Published results that this plug-in computes."""
+    from skillframe_search.rows import row_types
+
+    return row_types()
