@@ -125,6 +125,7 @@ def demonstration_from(
         "contact": bool(scene.fixture), "simulated": {**asdict(settings), **provenance},
         "robot": trace.meta["robot"], "world": {"name": scene.name, "params": scene.params},
         "sensor": {"force_noise": noise.force_noise, "torque_noise": noise.torque_noise},
+        "stages": [time for time, _ in trace.meta["events"]],
     }  # fmt: skip
     return Demonstration(
         time=trace.time.copy(), position=pose.at(-handle).position, quaternion=trace.quaternion.copy(),

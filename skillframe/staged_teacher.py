@@ -51,6 +51,10 @@ class StagedTeacher(Skill):
         """Move every hand one tick on."""
         return stack_commands([hand.step(row(observation, i)) for i, hand in enumerate(self._hands)])
 
+    def journal(self, trial: int) -> list[tuple[float, str]]:
+        """When the person went over to the next stage."""
+        return self._hands[trial].journal(0)
+
 
 class _StagedHand(Skill):
     """One hand, stage by stage; N = 1."""
@@ -59,7 +63,7 @@ class _StagedHand(Skill):
         self._stages, self._fixture, self._settings, self._hand_to_tip = stages, fixture, settings, hand_to_tip
 
     def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
-        self._stage, self._held = 0, 0.0
+        self._stage, self._held, self._changes = 0, 0.0, list[float]()
         self._teacher = Teacher(self._stages[0], self._fixture, self._settings)
         self._teacher.start(observation, rngs)
 
@@ -73,9 +77,13 @@ class _StagedHand(Skill):
 
     def _next_stage(self, observation: Observation) -> None:
         self._stage, self._held = self._stage + 1, 0.0
+        self._changes.append(float(observation.time[0]))
         follower = Teacher(self._stages[self._stage], self._fixture, self._settings)
         follower.take_over(self._teacher, observation)
         self._teacher = follower
+
+    def journal(self, trial: int) -> list[tuple[float, str]]:
+        return [(time, f"stage {i} begins") for i, time in enumerate(self._changes, start=2)]
 
     def _seen(self, observation: Observation) -> State:
         """What the person sees and feels of the tip, in the fixture's frame."""

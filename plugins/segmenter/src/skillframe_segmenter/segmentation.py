@@ -26,7 +26,8 @@ from skillframe_segmenter.model import PhaseModel, Pose0
 from skillframe_segmenter.settings import WINDOW_S, Settings
 from skillframe_segmenter.windows import Windows, cut_all
 
-SHORT, SHORT_MERGED = 3, 5  # windows; shorter runs go to a neighbour, before and after phases are joined
+SHORT, SHORT_JOINED = 3, (5, 8)  # windows; shorter runs go to a neighbour, before and after phases are joined
+SHORT_SHARE = 0.05  # of the demonstration, within `SHORT_JOINED`
 FEWEST_PER_PHASE = 4
 Labels = NDArray[np.intp]
 
@@ -151,9 +152,13 @@ def fit(data: em.Data, prepared: Prepared, phases: int | None, settings: Setting
         groups = np.array(merge.groups_of_one_motion(
             data.seen, travelled, tidy, chosen.model.count, settings.merge_angle_rad, settings.merge_votes
         ))  # fmt: skip
-    shortest = SHORT_MERGED if phases is None else SHORT
-    labels = [runs.without_short(groups[path], shortest) for path in tidy]
+    labels = [runs.without_short(groups[path], SHORT if phases else _shortest(path)) for path in tidy]
     return _numbered(Segmented(chosen, groups, paths, labels, {k: f.criterion for k, f in tried.items()}))
+
+
+def _shortest(path: Labels) -> int:
+    """Windows of the shortest interval that is told apart in a demonstration."""
+    return int(np.clip(round(SHORT_SHARE * len(path)), *SHORT_JOINED))
 
 
 def _numbered(found: Segmented) -> Segmented:
@@ -186,7 +191,7 @@ def _refit(
     again = em.with_transitions(held, start, settings)
     paths = em.paths(held, again.model)
     labels = [
-        _labels_of(rows[i], w) if i in said else runs.without_short(found.phase_of[path], SHORT_MERGED)
+        _labels_of(rows[i], w) if i in said else runs.without_short(found.phase_of[path], _shortest(path))
         for i, (w, path) in enumerate(zip(prepared.cut, paths, strict=True))
     ]
     return _numbered(found._replace(fit=again, paths=paths, labels=labels))
