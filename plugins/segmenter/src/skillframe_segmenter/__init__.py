@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from skillframe.hookspecs import hookimpl
-from skillframe.records import Document, Illustration, LearnOptions, SegmenterType, SkillType
+from skillframe.records import Document, Illustration, LearnOptions, RowType, SegmenterType, SkillType
 
 if TYPE_CHECKING:
     from skillframe.demonstration.record import Demonstration
@@ -92,3 +92,11 @@ def skillframe_skills() -> Iterable[SkillType]:
         describe=_describe,
         explain=_explain,
     )
+
+
+@hookimpl
+def skillframe_rows() -> Iterable[RowType]:
+    """Published results that this plug-in computes."""
+    from skillframe_segmenter.rows import row_types
+
+    return row_types()
