@@ -72,6 +72,11 @@ class Sweep(NamedTuple):
         return largest(self.of(name, posture, stuck=stuck), sign, self.stiff if stuck else 0.0)
 
     @property
+    def names(self) -> list[str]:
+        """Configurations that were run."""
+        return [n for n in NAMES if (n, "upright") in self.rows]
+
+    @property
     def postures(self) -> list[str]:
         """Those that were run."""
         return [p for p in POSTURES if ("A", p) in self.rows]
@@ -89,11 +94,11 @@ def _computed(settings: tuple[tuple[str, float], ...], seed: int, quick: bool) -
     tilts = [sign * tilt for sign in (1.0, -1.0) for tilt in (QUICK if quick else FULL)]
     rows = {}
     for posture in POSTURES[:1] if quick else POSTURES:
-        for name in NAMES:
+        for name in NAMES[:5] if quick else NAMES:
             phase = _phase(name, scene.tool.frames, values)
             stiff = [0.0, values["robot.joint_friction"]]
             rows[name, posture] = insert(
-                robot, scene, phase, tilts, stiff, posture=posture, seed=seed, duration_s=12.0 if quick else 30.0
+                robot, scene, phase, tilts, stiff, posture=posture, seed=seed, duration_s=9.0 if quick else 20.0
             )
     return Sweep(rows, values["robot.joint_friction"])
 
@@ -106,7 +111,8 @@ def _phase(name: str, frames: dict[str, Any], values: dict[str, float]) -> Phase
 
 
 def _table(job: RowRun) -> RowResult:
-    sweep, names = _sweep(job), NAMES
+    sweep = _sweep(job)
+    names = sweep.names
     reach = {n: sweep.reach(n, 1, stuck=True) for n in names}
     good = reach["C"] <= 6.0 <= reach["D"] <= 10.0 and reach["B"] >= 12.0 and reach["C"] < reach["D"] < reach["B"]
     columns = [(stuck, posture) for stuck in (False, True) for posture in sweep.postures]
@@ -157,14 +163,14 @@ def _compared(job: RowRun, row: str, key: str, text: Any, ours: Any) -> RowResul
     rows = [
         [n, _number(PUBLISHED.get(n, {}).get(key)),
          *(text(_at_8(sweep, n, stuck, sign)) for stuck in (False, True) for sign in (1.0, -1.0))]
-        for n in NAMES
+        for n in sweep.names
     ]  # fmt: skip
     found = ", ".join(f"{n} {text(_at_8(sweep, n, True))}" for n in "BDE")
     stiff = f"{sweep.stiff:g} Nm"
     return RowResult(
         ours=f"{found} with joint friction", difference=DIFFERENCE[row], rows=rows,
         head=("", "published", "0 Nm, +", "0 Nm, -", f"{stiff}, +", f"{stiff}, -"),
-        values={f"{n}_{'stuck' if stuck else 'free'}": ours(_at_8(sweep, n, stuck)) for n in NAMES
+        values={f"{n}_{'stuck' if stuck else 'free'}": ours(_at_8(sweep, n, stuck)) for n in sweep.names
                 for stuck in (False, True)},
     )  # fmt: skip
 
@@ -191,9 +197,9 @@ def _signs(job: RowRun) -> RowResult:
         return abs(plus - minus)
 
     free = max(apart(n, False, posture) for n in "ABCD" for posture in sweep.postures)
-    stuck = {n: max(apart(n, True, posture) for posture in sweep.postures) for n in NAMES}
+    stuck = {n: max(apart(n, True, posture) for posture in sweep.postures) for n in sweep.names}
     head = ["", *(f"{sweep.stiff if s else 0:g} Nm, {posture}, + / -" for s, posture in columns)]
-    rows = [[n, *(_both(sweep, n, posture, s) for s, posture in columns)] for n in NAMES]
+    rows = [[n, *(_both(sweep, n, posture, s) for s, posture in columns)] for n in sweep.names]
     return RowResult(
         ours=f"signs differ by {free:g} degrees without joint friction, A by {stuck['A']:g}, B to D by "
         f"{max(stuck[n] for n in 'BCD'):g} with it",
@@ -208,7 +214,7 @@ def _failures(job: RowRun) -> RowResult:
     wrong = ("common rotation", "turned away")
     free = sum(r.outcome in wrong for n in "ABCD" for p in sweep.postures for r in sweep.of(n, p, stuck=False))
     rows = []
-    for name in NAMES:
+    for name in sweep.names:
         stuck = [r for p in sweep.postures for r in sweep.of(name, p, stuck=True)]
         first = {kind: _first(stuck, kind) for kind in ("jam", *wrong)}
         rows.append([name, *(first[kind] for kind in first)])
@@ -233,17 +239,17 @@ def _picture(sweep: Sweep) -> Illustration:
 
     figure = Figure(figsize=(7.0, 3.8))
     canvas = figure.add_subplot()
-    place = np.arange(len(NAMES), dtype=float)
+    place = np.arange(len(sweep.names), dtype=float)
     bars = (
-        ("published", INK, [PUBLISHED.get(n, {}).get("largest_deg", np.nan) for n in NAMES]),
-        (f"ours, {sweep.stiff:g} Nm, +", RED, [sweep.reach(n, 1, stuck=True) for n in NAMES]),
-        (f"ours, {sweep.stiff:g} Nm, -", BLUE, [sweep.reach(n, -1, stuck=True) for n in NAMES]),
-        ("ours, no joint friction, +", GREY, [sweep.reach(n, 1, stuck=False) for n in NAMES]),
+        ("published", INK, [PUBLISHED.get(n, {}).get("largest_deg", np.nan) for n in sweep.names]),
+        (f"ours, {sweep.stiff:g} Nm, +", RED, [sweep.reach(n, 1, stuck=True) for n in sweep.names]),
+        (f"ours, {sweep.stiff:g} Nm, -", BLUE, [sweep.reach(n, -1, stuck=True) for n in sweep.names]),
+        ("ours, no joint friction, +", GREY, [sweep.reach(n, 1, stuck=False) for n in sweep.names]),
     )
     for i, (label, colour, heights) in enumerate(bars):
         drawn = canvas.bar(place + 0.2 * (i - 1.5), heights, width=0.19, color=colour, label=label)
         canvas.bar_label(drawn, fmt="%g", padding=1, fontsize=8)
-    canvas.set_xticks(place, NAMES)
+    canvas.set_xticks(place, sweep.names)
     canvas.set_ylabel("largest tilt [degrees]")
     canvas.margins(y=0.12)
     canvas.legend(ncols=2, frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=9)

@@ -1,0 +1,188 @@
+"""Rows come from a plug-in made on disk, so that each is computed in a process of its own, as in earnest."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+
+import pytest
+
+from skillframe.cli.main import run
+from skillframe.records import Illustration, RowResult, RowType
+from skillframe.registry import Plugin, Registry
+from skillframe.reproduce import committed, document, page, store
+from skillframe.reproduce.jobs import jobs_of
+
+PLUGIN = """
+    import os, pathlib, time
+    from skillframe import hookimpl
+    from skillframe.errors import InputError
+    from skillframe.records import RowResult, RowType
+
+    def double(job):
+        print("noise on stdout")
+        value = 2.0 * job.settings["gain"] * job.count(10, 1)
+        with open(os.environ["COUNTED"], "a") as file:
+            file.write("x")
+        return RowResult(ours=f"{value:g}", verdict="pass" if value == 20.0 else "fail", values={"value": value})
+
+    def crash(job):
+        raise ZeroDivisionError("as told")
+
+    def refuse(job):
+        raise InputError("--set gain", "is odd", "make it even")
+
+    def slow(job):
+        time.sleep(60.0)
+
+    @hookimpl
+    def skillframe_rows():
+        for name, function in {"901": double, "902": crash, "903": refuse, "904": slow}.items():
+            yield RowType(name=name, summary=function.__name__, published="20", source="nobody", bar="20",
+                          settings={"gain": 1.0}, run=function)
+"""
+
+
+@pytest.fixture
+def rows(tmp_path, monkeypatch):
+    """The plug-in's folder on the path, and the file that counts how often row 901 was computed."""
+    place = tmp_path / "site"
+    info = place / "toy-1.0.dist-info"
+    info.mkdir(parents=True)
+    (place / "toy_rows.py").write_text(textwrap.dedent(PLUGIN))
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: toy\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[skillframe]\ntoy = toy_rows\n")
+    counted = tmp_path / "counted"
+    counted.write_text("")
+    monkeypatch.setenv("SKILLFRAME_PLUGINS", "toy")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(place), os.environ.get("PYTHONPATH", "")]))
+    monkeypatch.setenv("COUNTED", str(counted))
+    return counted
+
+
+def reproduce(*words):
+    return subprocess.run(
+        [sys.executable, "-m", "skillframe.cli.main", "reproduce", *map(str, words)], capture_output=True, text=True
+    )
+
+
+def test_a_row_is_computed_shown_and_kept_and_computed_once(rows, tmp_path):
+    out = tmp_path / "out"
+    done = reproduce("901", "--out", out, "--json")
+    assert done.returncode == 0, done.stderr
+    (row,) = json.loads(done.stdout)  # what the row printed went elsewhere
+    assert row == json.loads((out / "reproduce.json").read_text())[0]
+    assert (row["row"], row["published"], row["ours"], row["verdict"], row["seed"]) == ("901", "20", "20", "pass", 0)
+    assert row["command"].startswith("skillframe reproduce 901") and row["wall_s"] >= 0.0
+    assert "reproduce 901" in (out / "reproduce.md").read_text()
+    again = reproduce("901", "--out", out)
+    assert "there already" in again.stderr and rows.read_text() == "x"
+    assert reproduce("901", "--out", out, "--fresh").returncode == 0 and rows.read_text() == "xx"
+
+
+def test_a_setting_changes_its_row_and_is_part_of_the_command(rows, tmp_path):
+    done = reproduce("901", "--out", tmp_path, "--set", "gain=3", "--json")
+    (row,) = json.loads(done.stdout)
+    assert (row["ours"], row["verdict"], row["settings"]) == ("60", "fail", {"gain": 3.0})
+    assert "--set gain=3" in row["command"]
+    assert json.loads(reproduce("901", "--out", tmp_path, "--quick", "--json").stdout)[0]["ours"] == "2"
+
+
+def test_rows_that_fail_cost_themselves_only(rows, tmp_path):
+    broken = reproduce("901", "902", "--out", tmp_path)
+    assert broken.returncode == 3 and "ZeroDivisionError" in broken.stderr and "Traceback" not in broken.stderr
+    assert [row["row"] for row in json.loads((tmp_path / "reproduce.json").read_text())] == ["901"]
+    refused = reproduce("903", "--out", tmp_path)
+    assert refused.returncode == 2 and "make it even" in refused.stderr
+
+
+def test_ctrl_c_keeps_what_is_done_and_the_next_run_goes_on(rows, tmp_path):
+    words = [sys.executable, "-m", "skillframe.cli.main", "reproduce", "901", "904", "--out", str(tmp_path)]
+    process = subprocess.Popen([*words, "--workers", "2"], stderr=subprocess.DEVNULL, start_new_session=True)
+    while not (tmp_path / "rows" / "901.json").exists():
+        assert process.poll() is None
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGINT)  # a terminal sends it to all of the group
+    assert process.wait(timeout=20) == 130
+    assert [row["row"] for row in json.loads((tmp_path / "reproduce.json").read_text())] == ["901"]
+    assert "there already" in reproduce("901", "--out", tmp_path).stderr
+
+
+def test_what_is_unknown_is_refused_in_a_sentence(rows, tmp_path, capsys):
+    assert run(["reproduce", "x", "--out", str(tmp_path)]) == 2
+    assert "unknown row" in capsys.readouterr().err
+    assert run(["reproduce", "21", "--set", "cylinder.bor=1", "--out", str(tmp_path)]) == 2
+    assert "did you mean 'cylinder.bore'" in capsys.readouterr().err
+    assert run(["reproduce", "21", "--set", "cylinder.bore=wide", "--out", str(tmp_path)]) == 2
+
+
+def test_the_listing_says_what_can_be_set(capsys):
+    assert run(["reproduce", "21", "--list", "--json"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)
+    assert row["row"] == "21" and row["settings"]["cylinder.bore"] == 0.08
+
+
+def toy(name="1", group="", **settings):
+    return RowType(
+        name=name, summary="a <claim> | of", published="1", source="s", bar="b", settings=settings, group=group,
+        run=lambda job: RowResult(ours="1"),
+    )  # fmt: skip
+
+
+def made(*rows):
+    registry = Registry()
+
+    class Module:
+        pass
+
+    from skillframe import hookimpl
+
+    module = Module()
+    module.skillframe_rows = hookimpl(lambda: rows)
+    module.skillframe_rows.__name__ = "skillframe_rows"
+    registry.add(Plugin(name="toy", distribution="toy", version="1"), lambda: module)
+    return registry
+
+
+def test_rows_come_by_number_and_a_setting_reaches_every_row_that_has_it():
+    registry = made(toy("10", a=1.0), toy("9", a=2, b=True), toy("coulomb"))
+    jobs = jobs_of(registry, [], {"a": 5}, seed=3, quick=False)
+    assert [job.row for job in jobs] == ["9", "10", "coulomb"]
+    assert [dict(job.settings) for job in jobs] == [{"a": 5, "b": True}, {"a": 5.0}, {}]
+    assert len({job.key for job in jobs}) == 3
+    assert jobs[0].key != jobs_of(registry, ["9"], {"a": 5}, seed=4, quick=False)[0].key
+
+
+def entries():
+    picture = Illustration("a picture", "its caption", "<svg><script>alert(1)</script></svg>")
+    result = RowResult(ours="1 <b>", head=("x",), rows=[("y | z",)], pictures=[picture], difference="why")
+    registry = made(toy())
+    (job,) = jobs_of(registry, [], {}, seed=0, quick=True)
+    return [store.entry(registry.row("1"), job, result, 1.0)]
+
+
+def test_the_page_reaches_for_nothing_and_nothing_in_it_acts():
+    text = page.render(entries())
+    assert "default-src &#x27;none&#x27;" in text and "http://" not in text and "https://" not in text
+    assert "<script" not in text and "&lt;claim&gt;" in text and "data:image/svg+xml;base64" in text
+    assert text == page.render(entries())
+
+
+def test_the_docs_page_keeps_its_tables_whole():
+    text = document.render(entries())
+    assert "a \\<claim> \\| of" in text and "| y \\| z |" in text
+    assert "predicted: nothing was tuned to it" in text and "- difference: why" in text
+
+
+def test_only_a_verdict_that_differs_from_the_docs_is_a_change():
+    found = [{"row": "1", "verdict": "pass"}, {"row": "2", "verdict": "fail"}, {"row": "3", "verdict": "fail"}]
+    assert len(committed.changes(found, {"1": "pass", "2": "pass"})) == 1
+
+
+def test_a_row_without_a_figure_is_neither_predicted_nor_calibrated():
+    row = toy()
+    assert store.values_are(row, RowResult(ours="not run here", computed=False)) == "not computed"
+    assert store.values_are(row, RowResult(ours="1")) == "predicted"
