@@ -1,9 +1,10 @@
 """From whole demonstrations to a policy: cut them into phases, and learn each phase as a skill of its own.
 
 Two phases may be one skill shown from two sides: if they never share a demonstration and stand at the same place in
-the sequence (after the same phases, before the same phases), or if demonstrations begin with the one and with the other
-(a policy has one beginning). They are joined if the learner finds one desired direction for both, which is the
-definition itself. Our choice; the papers join phases by their model alone.
+the sequence (after the same phases, before the same phases), if demonstrations begin with the one and with the other
+(a policy has one beginning), or if one is what another demonstration leaves out on its way from the other. They are
+joined if the learner finds one desired direction for both, which is the definition itself. Our choice; the papers join
+phases by their model alone.
 """
 
 from __future__ import annotations
@@ -112,7 +113,8 @@ def _joined(found: Document, demonstrations: Sequence[Demonstration], skill: str
     for one, two in alternatives(found["demonstrations"]):
         if kind.learn is None:
             break
-        body = kind.learn(pieces(found, demonstrations, [one, two]), options)
+        parts = pieces(found, demonstrations, [one]) + pieces(found, demonstrations, [two])
+        body = kind.learn(parts, options)
         translation = body["phases"][0].get("translation", {})
         if translation.get("desired_direction") is not None:
             return _joined(relabelled(found, one, two), demonstrations, skill, options)
@@ -120,7 +122,7 @@ def _joined(found: Document, demonstrations: Sequence[Demonstration], skill: str
 
 
 def alternatives(rows: Sequence[Mapping[str, Any]]) -> list[tuple[int, int]]:
-    """Pairs of phases that begin demonstrations, or never share one and have the same neighbours in the sequence."""
+    """Pairs that begin demonstrations, or never share one and have the same neighbours, or of which one is left out."""
     labels = [list(row["labels"]) for row in rows]
     firsts = {each[0] for each in labels}
     phases = sorted({label for each in labels for label in each})
@@ -132,12 +134,16 @@ def alternatives(rows: Sequence[Mapping[str, Any]]) -> list[tuple[int, int]]:
     def apart(one: int, two: int) -> bool:
         return not any(one in each and two in each for each in labels)
 
-    return [
-        (one, two)
-        for i, one in enumerate(phases)
-        for two in phases[i + 1 :]
-        if {one, two} <= firsts or (apart(one, two) and neighbours(one) == neighbours(two))
-    ]
+    def optional(one: int, two: int) -> bool:
+        """Whether `two` comes after `one` only, and elsewhere `one` goes where `two` goes."""
+        before, after = neighbours(two)
+        return before == {one} and after <= neighbours(one)[1]
+
+    def alike(one: int, two: int) -> bool:
+        same_place = apart(one, two) and neighbours(one) == neighbours(two)
+        return {one, two} <= firsts or same_place or optional(one, two) or optional(two, one)
+
+    return [(one, two) for i, one in enumerate(phases) for two in phases[i + 1 :] if alike(one, two)]
 
 
 def relabelled(found: Document, one: int, two: int) -> Document:

@@ -1,7 +1,8 @@
 """Which phase is it now? The gate for a robot that runs a policy, and the forward filter for a demonstration.
 
 Both look at windows of 50 ms, N trials at once. A phase takes over when it has been more probable than
-`switch_posterior` for `switch_windows` windows in a row, so that a single odd window makes no switch.
+`switch_posterior` for `switch_windows` windows in a row, so that a single odd window makes no switch, and only if it
+followed the present one in a demonstration: there is no way back that nobody has shown.
 """
 
 from __future__ import annotations
@@ -22,14 +23,15 @@ from skillframe_segmenter.settings import WINDOW_S
 from skillframe_segmenter.windows import Windows, windows
 
 NOBODY = -1
+SHARPER, LONGER = 2.0, 1  # the filter's likelihood over the fit's, and windows that it waits beyond `switch_windows`
 STILL = (4e-3, float(np.deg2rad(2.0)))  # m/s, rad/s
 
 
 class Debounce:
     """Turns posteriors of windows into decisions, N trials."""
 
-    def __init__(self, model: PhaseModel, count: int) -> None:
-        self._bar, self._windows = model.switch_posterior, model.switch_windows
+    def __init__(self, model: PhaseModel, count: int, longer: int = 0) -> None:
+        self._bar, self._windows = model.switch_posterior, model.switch_windows + longer
         self._candidate = np.full(count, NOBODY)
         self.seen = np.zeros(count, dtype=np.intp)
 
@@ -130,7 +132,11 @@ class Gate:
 
 
 class Filter:
-    """The forward algorithm on windows, for demonstrations: motion and wrench both count."""
+    """The forward algorithm on windows, for demonstrations: motion and wrench both count.
+
+    It has no later windows to lean on, so each one counts twice what it counts in the fit (ours: half of that is late
+    where a phase begins slowly), and `follow` waits for one window more than the gate.
+    """
 
     def __init__(self, model: PhaseModel, count: int = 1) -> None:
         self._model, self._count = model, count
@@ -147,7 +153,7 @@ class Filter:
         model = self._model
         contact = soft_pair(wrench, model.scales.force, model.scales.torque)
         seen = emission.observe(soft_pair(motion, model.scales.speed, model.scales.turning), contact)
-        log_density = model.temper * emission.log_likelihood(seen, model.phases)
+        log_density = SHARPER * model.temper * emission.log_likelihood(seen, model.phases)
         density = np.exp(log_density - log_density.max(axis=1, keepdims=True))
         if self._belief is None:
             ahead = np.tile(model.initial, (self._count, 1))
@@ -181,7 +187,11 @@ def follow(model: PhaseModel, demonstration: Demonstration, by: str = "filter") 
     cut = windows(demonstration, model.at, model.axes)
     drive = drive_of(model, cut)
     averaged = gate.averaged(drive)
-    watch, belief, debounce = Filter(model), model.initial[None].copy(), Debounce(model, 1)
+    watch, belief, debounce = (
+        Filter(model),
+        model.initial[None].copy(),
+        Debounce(model, 1, 0 if by == "gate" else LONGER),
+    )
     switches: list[tuple[float, int]] = []
     for i in range(cut.size):
         if by == "gate":
@@ -190,6 +200,6 @@ def follow(model: PhaseModel, demonstration: Demonstration, by: str = "filter") 
         else:
             posterior = watch.step(cut.motion[i : i + 1], cut.wrench[i : i + 1], drive[i : i + 1])
         phase = int(debounce.decide(posterior)[0])
-        if phase != NOBODY and (not switches or switches[-1][1] != phase):
+        if phase != NOBODY and (not switches or model.successors[switches[-1][1], phase] > 0.0):
             switches.append((cut.start + (i + 1) * WINDOW_S, phase))
     return switches
