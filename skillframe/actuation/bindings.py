@@ -101,7 +101,8 @@ class Instance:
         self._fmu.instantiate(callbacks=_callbacks2(key))
 
     def _hear(self, text: bytes | None) -> None:
-        self.messages.append((text or b"").decode("utf-8", "replace").strip())
+        """Keep what the FMU said, in one line: makers log whole stack traces."""
+        self.messages.append(" ".join((text or b"").decode("utf-8", "replace").split())[:300])
 
     def sentence(self, problem: str) -> str:
         """A problem with this instance, with what the FMU itself said last."""

@@ -5,8 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from skillframe.actuation.child import Child, SandboxLimits
 from skillframe.actuation.inspection import FmuFacts, inspect_fmu, problems_of
 from skillframe.errors import SkillframeError
+
+LIMITS = SandboxLimits()  # of the short trial
 
 
 def check_fmu(path: Path) -> dict[str, Any]:
@@ -37,12 +40,9 @@ def check_fmu(path: Path) -> dict[str, Any]:
 
 def _try(facts: FmuFacts, state: str) -> tuple[str, list[str]]:
     """Load, initialise, step ten times; save and restore where that is claimed."""
-    from skillframe.actuation.child import Child, SandboxLimits
-
-    limits = SandboxLimits()
-    child = Child(facts.path, facts.name, limits)
+    child = Child(facts.path, facts.name, LIMITS)
     try:
-        repeats = child.ask(b"k", {"path": str(facts.path)}, limits.start_s, "being tried out")
+        repeats = child.ask(b"k", {"path": str(facts.path)}, LIMITS.start_s, "being tried out")
     except SkillframeError as error:
         return state, [str(error)]
     finally:

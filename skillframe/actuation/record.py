@@ -45,9 +45,9 @@ def simulate_to_csv(
         writer = csv.writer(file_out)
         writer.writerow(columns)
         try:
-            for block in simulate(request, sandboxed=not is_allowed(path), limit_s=limit_s):
-                writer.writerows(block)
-                count += len(block)
+            for row in simulate(request, sandboxed=not is_allowed(path), limit_s=limit_s):
+                writer.writerow(row)
+                count += 1
         except (InstanceFailed, ChildLost) as error:
             problem = str(error)
     os.replace(part, out)

@@ -1,6 +1,7 @@
 """Simulate one FMU on its own: inputs from a table held over each step, every output recorded.
 
-Times are k x step from the start, never a running sum, and the last step ends exactly at the stop time.
+Times are k x step from the start, never a running sum, and the last step ends exactly at the stop time. Rows are given
+one by one, so that an FMU that crashes or hangs takes none of them with it.
 """
 
 from __future__ import annotations
@@ -14,8 +15,6 @@ from typing import Any
 from skillframe.actuation.bindings import Instance, InstanceFailed
 from skillframe.actuation.inspection import FmuFacts, FmuVariable, inspect_fmu
 from skillframe.errors import InputError
-
-BLOCK = 200  # rows between two signs of life
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,8 +58,8 @@ def check_request(facts: FmuFacts, request: Request) -> None:
             raise InputError(f"--input: {name}", "is an array", "leave it at its start value")
 
 
-def simulate(request: Request, sandboxed: bool, limit_s: float = 30.0) -> Iterator[list[list[Any]]]:
-    """Blocks of rows, each time then outputs; in a child process if sandboxed.
+def simulate(request: Request, sandboxed: bool, limit_s: float = 30.0) -> Iterator[list[Any]]:
+    """Rows, each time then outputs; in a child process if sandboxed.
 
     Raises:
         InputError, UnknownName: before the first row.
@@ -76,13 +75,13 @@ def simulate(request: Request, sandboxed: bool, limit_s: float = 30.0) -> Iterat
     child = Child(facts.path, facts.name, SandboxLimits())
     try:
         child.tell(b"m", {**asdict(request), "path": str(request.path)})
-        while block := child.heard(limit_s, "simulating"):
-            yield block
+        while row := child.heard(limit_s, "simulating"):
+            yield row
     finally:
         child.close()
 
 
-def run(request: Request) -> Iterator[list[list[Any]]]:
+def run(request: Request) -> Iterator[list[Any]]:
     """As `simulate`, in this process."""
     facts = inspect_fmu(request.path)
     instance = Instance(facts, facts.name)
@@ -92,36 +91,28 @@ def run(request: Request) -> Iterator[list[list[Any]]]:
         instance.close()
 
 
-def _rows(instance: Instance, facts: FmuFacts, request: Request) -> Iterator[list[list[Any]]]:
+def _rows(instance: Instance, facts: FmuFacts, request: Request) -> Iterator[list[Any]]:
     names = request.input_names
     start = dict(zip(names, _inputs_at(request, 0.0), strict=False))
     instance.start({**request.parameters, **start}, {}, 0.0)
     setters = [facts.variables[name] for name in names]
-    block = [[0.0, *_read(instance, facts)]]
+    yield [0.0, *_read(instance, facts)]
     count = max(1, round(request.stop / request.step))
     if abs(count * request.step - request.stop) > 1e-9 * request.stop:
         count = int(request.stop / request.step) + 1
     for k in range(count):
         time, end = k * request.step, min((k + 1) * request.step, request.stop) if k + 1 < count else request.stop
-        values = _inputs_at(request, time)
         try:
-            for variable, value in zip(setters, values, strict=False):
+            for variable, value in zip(setters, _inputs_at(request, time), strict=False):
                 instance.set_value(variable.name, value)
             ended = instance.do_step(time, end - time)
             row = [end, *_read(instance, facts)]
         except Exception as error:
-            if block:
-                yield block
             raise InstanceFailed(instance.sentence(f"failed at {time:.6g} s: {error}")) from None
-        block.append(row)
         _check_finite(instance, facts, row)
-        if len(block) >= BLOCK or ended:
-            yield block
-            block = []
+        yield row
         if ended:
             raise InstanceFailed(instance.sentence(f"asked to end at {end:.6g} s"))
-    if block:
-        yield block
 
 
 def _inputs_at(request: Request, time: float) -> list[float]:

@@ -126,13 +126,13 @@ class Worker:
         return json.dumps(try_out(inspect_fmu(Path(json.loads(payload)["path"])))).encode()
 
     def simulate(self, payload: bytes) -> bytes:
-        """Simulate on its own, sending blocks of rows as they come; the last answer is empty."""
+        """Simulate on its own, sending rows as they come; the last answer is empty."""
         from skillframe.actuation.simulate import Request, run
 
         given = json.loads(payload)
         request = Request(**{**given, "path": Path(given["path"])})
-        for block in run(request):
-            self.pipe.send_bytes(b"." + json.dumps(block).encode())
+        for row in run(request):
+            self.pipe.send_bytes(b"." + json.dumps(row).encode())
         return b"[]"
 
 
