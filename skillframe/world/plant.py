@@ -79,6 +79,7 @@ class Plant:
         self._anchor, self._axis, self._bias = bind("xanchor"), bind("xaxis"), bind("qfrc_bias")
         self._sensor, self._external, self._com = bind("sensordata"), bind("cfrc_ext"), bind("subtree_com")
         self._mocap_pos, self._mocap_quat, self._mass = bind("mocap_pos"), bind("mocap_quat"), bind("M")
+        self._acceleration = bind("qacc")
 
     def _apply(self, draws: Draws) -> None:
         if "world.friction" in draws:
@@ -137,6 +138,12 @@ class Plant:
         """Advance some trials by one time step under generalised forces (N, nv) in MuJoCo's order."""
         self._applied[:] = torque
         self.batch.step(ids=ids, stage=mujoco.mjtStage.mjSTAGE_VEL)
+
+    def acceleration(self, torque: Float, ids: NDArray[np.int64]) -> Float:
+        """Accelerations (N, nv) of some trials under generalised forces (N, nv), MuJoCo's order; no time passes."""
+        self._applied[:] = torque
+        self.batch.forward(ids=ids)
+        return self._acceleration
 
     def tool_pose(self) -> Pose:
         """Pose of the robot's tool frame (where the sensor sits) in base."""
