@@ -9,11 +9,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 INK, BLUE, RED, GREEN, GREY = "#1d2025", "#2e6fba", "#d1495b", "#3a9d6e", "#b9bec6"
-STYLE = {
-    "font.family": "DejaVu Sans", "font.size": 10, "axes.edgecolor": "#8a8f98", "axes.labelcolor": "#30343b",
-    "axes.spines.top": False, "axes.spines.right": False, "xtick.color": "#60656e", "ytick.color": "#60656e",
-    "svg.fonttype": "none", "svg.hashsalt": "skillframe",
-}  # fmt: skip
+STYLE = {"font.family": "DejaVu Sans", "svg.fonttype": "none", "svg.hashsalt": "skillframe"}
 
 
 def svg(figure: Figure) -> str:
@@ -21,6 +17,8 @@ def svg(figure: Figure) -> str:
     from matplotlib import rc_context
 
     text = io.StringIO()
+    for axes in figure.axes:
+        axes.spines[["top", "right"]].set_visible(False)
     with rc_context(STYLE):
         figure.set_layout_engine("constrained")
         figure.savefig(text, format="svg", metadata={"Date": None})

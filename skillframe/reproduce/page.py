@@ -79,7 +79,7 @@ def _section(each: Mapping[str, Any]) -> Markup:
         ("values", origin(each)),
         ("difference", each["difference"]),
         ("command", tag("code", each["command"])),
-        ("computed in", f"{each['wall_s']:.1f} s, seed {each['seed']}"),
+        ("computed in", _effort(each)),
     ]
     listed = tag("dl", *(join([tag("dt", k), tag("dd", v)]) for k, v in facts if v), class_="facts")
     behind = each["table"]
@@ -89,6 +89,11 @@ def _section(each: Mapping[str, Any]) -> Markup:
         tag("div", *(_picture(p) for p in each["pictures"]), class_="grid") if each["pictures"] else "",
         id=f"row-{each['row']}",
     )  # fmt: skip
+
+
+def _effort(each: Mapping[str, Any]) -> str:
+    shared = f"; the first row of {each['group']!r} bears the time of all" if each["group"] != each["row"] else ""
+    return f"{each['wall_s']:.1f} s, seed {each['seed']}{shared}"
 
 
 def _picture(drawn: Mapping[str, str]) -> Markup:

@@ -165,7 +165,7 @@ def _compared(job: RowRun, row: str, key: str, text: Any, ours: Any) -> RowResul
          *(text(_at_8(sweep, n, stuck, sign)) for stuck in (False, True) for sign in (1.0, -1.0))]
         for n in sweep.names
     ]  # fmt: skip
-    found = ", ".join(f"{n} {text(_at_8(sweep, n, True))}" for n in "BDE")
+    found = ", ".join(f"{n}: {text(_at_8(sweep, n, True))}" for n in "BDE")
     stiff = f"{sweep.stiff:g} Nm"
     return RowResult(
         ours=f"{found} with joint friction", difference=DIFFERENCE[row], rows=rows,

@@ -109,11 +109,12 @@ def _enough(hits: int, count: int) -> bool:
     return hits >= ceil(SHARE * count)
 
 
-def _pictures(document: Document, *titles: str) -> list[Illustration]:
-    """Figures 13 and 14, drawn from the skill file; all, or those whose title begins so."""
-    explain = registry().skill("lmc").explain
-    drawn = explain(document) if explain is not None else []
-    return [d for d in drawn if not titles or d.title.startswith(titles)]
+def _pictures(document: Document) -> list[Illustration]:
+    """Figures 13 and 14, and who did the work, drawn from the skill file."""
+    from skillframe_lmc.explain import explain
+
+    figures = {"Which": "Fig. 13: ", "Along": "Fig. 14: "}
+    return [d._replace(title=figures.get(d.title.split()[0], "") + d.title) for d in explain(document)]
 
 
 def _sector_width(job: RowRun) -> RowResult:

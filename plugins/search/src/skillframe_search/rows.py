@@ -179,8 +179,9 @@ def _curves(tried: dict[tuple[str, str], Tried]) -> Illustration:
         for (n, method), each in tried.items():
             if n == name:
                 found = np.sort(each.seconds[np.isfinite(each.seconds)])
-                shares = np.arange(1, len(found) + 1) / len(each.seconds)
-                canvas.step(found, shares, where="post", color=colours[method], label=method)
+                shares = np.arange(len(found) + 1) / len(each.seconds)
+                times = np.concatenate([[0.0], found, [22.0]])
+                canvas.step(times, [*shares, shares[-1]], where="post", color=colours[method], label=method)
         canvas.set(title=name, xlabel="time [s]", ylim=(0.0, 1.02))
         canvas.axhline({"peg": 0.85, "socket": 0.67}[name], color="#1d2025", lw=0.8, ls=":")
     figure.axes[0].set_ylabel("share found")
