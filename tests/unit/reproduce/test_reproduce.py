@@ -186,3 +186,11 @@ def test_a_row_without_a_figure_is_neither_predicted_nor_calibrated():
     row = toy()
     assert store.values_are(row, RowResult(ours="not run here", computed=False)) == "not computed"
     assert store.values_are(row, RowResult(ours="1")) == "predicted"
+
+
+def test_a_quick_run_misses_a_share_only_where_its_counts_exclude_it():
+    from skillframe.reproduce.bars import reached
+
+    assert reached(54, 60, 0.9, quick=False) and not reached(53, 60, 0.9, quick=False)
+    assert reached(9, 15, 0.75, quick=True) and not reached(6, 15, 0.75, quick=True)
+    assert not reached(2, 3, 1.0, quick=True) and reached(3, 3, 1.0, quick=True)

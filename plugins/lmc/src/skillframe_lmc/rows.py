@@ -7,7 +7,7 @@ of its own. The aim noise, the friction and the geometry are ours; the papers pr
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import atan, ceil, degrees, radians
+from math import atan, degrees, radians
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from skillframe.frames import Float
 from skillframe.prepare import load_robot_model, load_world, prepare
 from skillframe.records import Document, Illustration, LearnOptions, RowResult, RowRun, RowType
 from skillframe.registry import registry
+from skillframe.reproduce.bars import reached
 from skillframe.skillfile import new_document
 from skillframe.skillsource import learned
 from skillframe.teacher import TeacherSettings
@@ -103,10 +104,6 @@ def _along(part: dict[str, Any], axis: Float) -> bool:
     """Exactly one compliant axis, within 20 degrees of the published one."""
     axes = part["compliant_axes"]
     return len(axes) == 1 and abs(np.dot(axes[0], axis)) > np.cos(radians(20.0))
-
-
-def _enough(hits: int, count: int) -> bool:
-    return hits >= ceil(SHARE * count)
 
 
 def _pictures(document: Document) -> list[Illustration]:
@@ -203,7 +200,8 @@ def _noise(job: RowRun) -> RowResult:
         rows.append((f"{noise:g}", f"{good} of {pairs}", spread, f"{one} of {pairs}", failed))
     return RowResult(
         ours=f"feasible in {feasible} of {pairs} pairs at {given:g} degrees of aim noise",
-        verdict="pass" if _enough(feasible, pairs) else "fail", values={"feasible_share": feasible / pairs},
+        verdict="pass" if reached(feasible, pairs, SHARE, quick=job.quick) else "fail",
+        values={"feasible_share": feasible / pairs},
         head=("aim noise [degrees]", "feasible direction", "off the middle [degrees]", "one axis along x", ""),
         rows=rows, pictures=_pictures(shown) if shown else [],
     )  # fmt: skip
@@ -222,7 +220,7 @@ def _hose(job: RowRun) -> RowResult:
     run = documents[: job.count(12, 3)]
     aligned = [_align(job, params, document) for document in run]
     both = sum(all(each) for each in aligned)
-    passed = _enough(as_told, pairs) and both == len(run)
+    passed = reached(as_told, pairs, SHARE, quick=job.quick) and both == len(run)
     rows = [
         ("flags and counts as published", f"{as_told} of {pairs} pairs"),
         ("aligned from +8 and -8 degrees", f"{both} of {len(run)} pairs"),
@@ -259,7 +257,8 @@ def _peg(job: RowRun) -> RowResult:
     together = sum(all(each) for each in zip(*(values for _, values in facts), strict=True))
     return RowResult(
         ours=f"identical in {together} of {pairs} pairs; push {np.median(errors):.1f} degrees from z (median)",
-        verdict="pass" if _enough(together, pairs) else "fail", pictures=_pictures(documents[0]), head=("", "ours"),
+        verdict="pass" if reached(together, pairs, SHARE, quick=job.quick) else "fail",
+        pictures=_pictures(documents[0]), head=("", "ours"),
         rows=[*((text, f"{sum(values)} of {pairs}") for text, values in facts), ("", failed)],
         values={"identical_share": together / pairs, "median_error_deg": float(np.median(errors))},
     )  # fmt: skip
