@@ -11,7 +11,7 @@ from skillframe_lmc.gains import gains
 from skillframe_lmc.intervals import rotation, track, translation
 from skillframe_lmc.sectors import Sectors, misses, sectors
 from skillframe_lmc.settings import Settings
-from skillframe_lmc.work import work
+from skillframe_lmc.work import Work, work
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.frames import Float, rotation_matrix, unit
@@ -144,6 +144,21 @@ def test_frictionless_sliding_is_nobodys_work() -> None:
     assert work([translation(track(syn.slide(40, 0.0, recipe), ORIGIN, ORIGIN, "base"), Settings())]).fraction < 0.5
 
 
+@given(share=st.floats(0.0, 1.0), intervals=st.integers(3, 200))
+def test_only_a_surplus_beyond_chance_makes_the_environment_the_driver(share: float, intervals: int) -> None:
+    ahead = round(share * intervals)
+    done = Work(float(intervals - ahead), float(ahead), math.sqrt(intervals))  # intervals of one joule each
+    # of n fair signs, the number of positive ones exceeds n/2 by 0.82 sqrt(n) in 5 % of the cases
+    assert done.environment_drove == (ahead - intervals / 2 > 0.82 * math.sqrt(intervals))
+
+
+def test_the_surplus_is_judged_from_the_intervals_themselves() -> None:
+    done = work([translation(track(syn.slide(30, 0.3), ORIGIN, ORIGIN, "base"), Settings())])
+    # equal intervals: the root of the sum of squares is the sum over the root of their number, 23 +- 3 of 2.2 mm
+    assert done.scatter == pytest.approx(done.teacher / math.sqrt(23), rel=0.1)
+    assert not done.environment_drove
+
+
 def test_rotational_increments_compose_to_the_whole_turn() -> None:
     demo = syn.turning([1.0, 2.0, -0.5], 1.2, [0, 0, 0])
     motion = rotation(track(demo, ORIGIN, ORIGIN, "base"), Settings())
@@ -170,6 +185,14 @@ def test_a_mean_direction_is_the_surer_the_longer_the_path_within_bounds() -> No
     assert found[0] == found[1] <= 0.3
     assert found[2] / found[3] == pytest.approx(math.sqrt(2.0))
     assert found[4] == 0.08
+
+
+def test_to_and_fro_shortens_a_mean_direction_and_its_noise_alike() -> None:
+    whole = np.array([[0.3, 0.0, -0.7], [-0.3, 0.0, -0.7]])
+    usual = straightness(0.05, 0.015, 0.2)
+    assert straightness(0.05, 0.015, 0.2, whole) == usual
+    for part in (0.5, 0.8):
+        assert straightness(0.05, 0.015, 0.2, part * whole) == pytest.approx(usual * part * math.hypot(0.3, 0.7) / 0.7)
 
 
 @given(turn=st.tuples(*[st.floats(-3, 3)] * 3), free=st.integers(0, 3))

@@ -11,11 +11,13 @@ for the singular values s and n demonstrations. The papers take "inspiration fro
 demonstrations a literal BIC is degenerate (no residual), hence the fixed sigma, which is ours: 0.12 rad for rotations,
 and
 
-    sigma = max(clip(0.25 sqrt(15 mm / L), 0.08, 0.25), min(0.6 sin alpha*, 0.18))
+    sigma = max(clip(0.3 sqrt(15 mm / L), 0.08, 0.3), min(0.6 sin alpha*, 0.18)) min(|m| / 0.7, 1)
 
-for translations over a mean path L, because a person's wandering is correlated over 15 mm and averages out beyond; and
-because the pyramids' opening alpha* that the demonstrations needed to agree on a direction says how much they wandered.
-The constants separate the two in simulated valleys, pegs, couplers and funnels with up to 15 degrees of aim noise.
+for translations over a mean path L, because a person's wandering is correlated over 15 mm and averages out beyond;
+because the pyramids' opening alpha* that the demonstrations needed to agree on a direction says how much they wandered;
+and because to and fro shortens a mean direction (|m|, root mean square over the demonstrations), its sideways part and
+its noise alike: unbent wandering leaves means of 0.7 and more. The constants separate the two in simulated valleys,
+pegs, couplers and funnels with up to 15 degrees of aim noise.
 """
 
 from __future__ import annotations
@@ -34,16 +36,26 @@ class CompliantAxes(NamedTuple):
     criterion: list[float]
 
 
-def straightness(path: float, correlation: float, pyramid: float | None = None) -> float:
+SPREAD, LEAST = 0.3, 0.08
+"""Noise of a mean direction over one correlation length, which is also its most; and its least."""
+BY_PYRAMID, MOST_BY_PYRAMID = 0.6, 0.18
+UNBENT = 0.7  # length of a mean direction below which its noise shrinks with it
+
+
+def straightness(path: float, correlation: float, pyramid: float | None = None, means: Float | None = None) -> float:
     """Noise of translational mean directions, see the module's text.
 
     Args:
         path: mean path [m].
         correlation: length over which a person's wandering is correlated [m].
         pyramid: alpha* [rad], where the demonstrations agree on a direction.
+        means: (n, 3) mean unit direction of motion of each demonstration.
     """
-    by_length = float(np.clip(0.25 * np.sqrt(correlation / max(path, 1e-9)), 0.08, 0.25))
-    return by_length if pyramid is None else max(by_length, min(0.6 * float(np.sin(pyramid)), 0.18))
+    noise = float(np.clip(SPREAD * np.sqrt(correlation / max(path, 1e-9)), LEAST, SPREAD))
+    if pyramid is not None:
+        noise = max(noise, min(BY_PYRAMID * float(np.sin(pyramid)), MOST_BY_PYRAMID))
+    length = UNBENT if means is None else float(np.sqrt((means**2).sum(axis=-1).mean()))
+    return noise * min(length / UNBENT, 1.0)
 
 
 def compliant_axes(means: Float, direction: Float | None, sigma: float) -> CompliantAxes:

@@ -60,8 +60,16 @@ def is_ambiguous(part: Learned) -> bool:
 def _message(part: Learned, settings: Settings, open_direction: bool) -> str:
     if part.held:
         return _held_message(part, settings)
+    share = f"the environment did {100.0 * _fraction(part):.0f} % of the work"
     if part.fully_compliant:
-        return f"the environment did {100.0 * _fraction(part):.0f} % of the work, so it is left free in all directions"
+        return f"{share}, so it is left free in all directions"
+    if _fraction(part) > 0.5:
+        share += ", no more than chance makes of even shares, so it is not left free in all directions"
+        return "; ".join(filter(None, [share, _direction_message(part, settings, open_direction)]))
+    return _direction_message(part, settings, open_direction)
+
+
+def _direction_message(part: Learned, settings: Settings, open_direction: bool) -> str:
     choice = part.choice
     if choice is None:
         return "too few intervals in which the teacher did the work to find a direction"

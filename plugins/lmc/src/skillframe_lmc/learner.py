@@ -77,7 +77,7 @@ class Learned:
     @property
     def fully_compliant(self) -> bool:
         """The environment moved it."""
-        return self.work is not None and self.work.fraction > 0.5
+        return self.work is not None and self.work.environment_drove
 
     @property
     def direction(self) -> Float | None:
@@ -155,12 +155,12 @@ def _learn_part(
     means = np.array([unit(m.displacement).mean(axis=0) for m in moving]).reshape(-1, 3)
     done = work(moving) if moving else None
     choice, given, axes = None, [sectors(m) for m in moving], None
-    if done is not None and done.fraction <= 0.5:
+    if done is not None and not done.environment_drove:
         given = [sectors(m, teacher_driven_only=name == "rotation") for m in moving]
         if all(len(g.contact) >= min(FEWEST_INTERVALS, len(m.work)) for g, m in zip(given, moving, strict=True)):
             choice = choose(given, settings, heading(moving))
         direction = None if choice is None else choice.direction
-        axes = compliant_axes(means, direction, _straightness(name, moving, choice, settings))
+        axes = compliant_axes(means, direction, _straightness(name, moving, means, choice, settings))
     path, time = sum(m.path for m in moving), sum(m.duration for m in moving)
     return Learned(
         name=name, motions=motions, moving=moving, given=given, work=done, choice=choice, axes=axes, means=means,
@@ -168,11 +168,13 @@ def _learn_part(
     )  # fmt: skip
 
 
-def _straightness(name: Name, moving: Sequence[Motion], choice: Choice | None, settings: Settings) -> float:
+def _straightness(
+    name: Name, moving: Sequence[Motion], means: Float, choice: Choice | None, settings: Settings
+) -> float:
     if name == "rotation":
         return settings.straightness_rad
     agreed = None if choice is None or choice.direction is None else choice.pyramid_angle
-    return straightness(float(np.mean([m.path for m in moving])), settings.straightness_m, agreed)
+    return straightness(float(np.mean([m.path for m in moving])), settings.straightness_m, agreed, means)
 
 
 def _phase(translation: Learned, rotation: Learned, settings: Settings) -> Document:
