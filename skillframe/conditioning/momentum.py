@@ -75,7 +75,7 @@ class ForceSettings:
     sliding_length: float = 5e-4
     sliding_speed: float = 2.5e-3
     force_noise: float = 60.0
-    force_corner: float | None = 3.0
+    force_corner: float | None = 2.5
     weighted: bool = True
     identify: IdentificationSettings = field(default_factory=IdentificationSettings)
 
