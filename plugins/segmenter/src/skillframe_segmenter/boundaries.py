@@ -64,14 +64,15 @@ def moved(rows: Sequence[Document], moves: Sequence[Move], names: Sequence[str])
             raise InputError(where, f"has no boundary {move.boundary + 1} (there are: {there})", f"mend {OPTION}")
         cuts[move.boundary] = move.time
     for move in moves:
-        _check_order(result[move.demonstration]["boundaries"], move, names)
+        _check_order(result[move.demonstration], move, names)
     return result
 
 
-def _check_order(cuts: Sequence[float], move: Move, names: Sequence[str]) -> None:
-    if any(b <= a for a, b in pairwise(cuts)):
+def _check_order(row: Document, move: Move, names: Sequence[str]) -> None:
+    cuts: list[float] = row["boundaries"]
+    if any(b <= a for a, b in pairwise([row["start"], *cuts, row["end"]])):
         raise InputError(
             names[move.demonstration] or f"demonstration {move.demonstration + 1}",
-            f"boundary {move.boundary + 1} at {move.time:g} s would leave its place between its neighbours",
-            f"boundaries are at {', '.join(f'{t:.2f} s' for t in cuts)}; mend {OPTION}",
+            f"boundary {move.boundary + 1} cannot be at {move.time:g} s: boundaries stay inside and in order",
+            f"it lasts from {row['start']:.2f} s to {row['end']:.2f} s; mend {OPTION}",
         )

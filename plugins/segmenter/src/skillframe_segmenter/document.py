@@ -46,7 +46,7 @@ def read(document: Document) -> PolicyDocument:
     if not phases:
         raise InputError("phases", "a policy needs at least one phase", "segment the demonstrations again")
     model = _get(document, "phase_model", dict[str, Any])
-    followed = from_document(model) if model.get("type") in FOLLOWED else None
+    followed = from_document(model) if _get(model, "type", str, "phase_model.") in FOLLOWED else None
     successors = np.array(coerce(model.get("successors"), list[list[float]], "phase_model.successors"))
     _match(len(phases), successors)
     recoveries = _get(document, "recoveries", int)

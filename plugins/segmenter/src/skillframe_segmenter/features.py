@@ -75,13 +75,15 @@ def scales(demonstrations: Sequence[Windows]) -> list[Scales]:
     wrench = [w.wrench for w in demonstrations]
     force = max(0.2 * _percentile(wrench, slice(0, 3), 90), 1.5 * _noise(wrench, slice(0, 3)), 1e-9)
     torque = max(0.2 * _percentile(wrench, slice(3, 6), 90), 1.5 * _noise(wrench, slice(3, 6)), force * ARM_M)
+    speeds = [typical_speeds(demonstrations, w) for w in demonstrations]
+    return [Scales(0.25 * speed, 0.25 * turning, force, torque) for speed, turning in speeds]
+
+
+def typical_speeds(demonstrations: Sequence[Windows], one: Windows) -> tuple[float, float]:
+    """V_r and w_r of one of the demonstrations [m/s, rad/s]."""
     typical = _percentile([w.motion for w in demonstrations], slice(0, 3), 80)
-    result = []
-    for w in demonstrations:
-        speed = max(_percentile([w.motion], slice(0, 3), 80), SLOWEST[0])
-        turning = max(_percentile([w.motion], slice(3, 6), 80), typical / LEVER_M, SLOWEST[1])
-        result.append(Scales(0.25 * speed, 0.25 * turning, force, torque))
-    return result
+    turning = max(_percentile([one.motion], slice(3, 6), 80), typical / LEVER_M, SLOWEST[1])
+    return max(_percentile([one.motion], slice(0, 3), 80), SLOWEST[0]), turning
 
 
 def features(demonstration: Windows, scale: Scales) -> Features:

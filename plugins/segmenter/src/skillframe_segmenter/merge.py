@@ -14,7 +14,7 @@ with 5 mm.
 
 The votes of a group of phases are the largest share of windows that one D finds, in the worst phase and demonstration
 (of four windows or more); the smaller of translation and rotation counts. The best pair is joined as long as its votes
-are at least max(0.6, min(0.7, base - 0.05)), base being the worse of the two alone. All constants are ours; the angle
+are at least max(0.6, min(0.78, base - 0.05)), base being the worse of the two alone. All constants are ours; the angle
 is the delicate one: at 20 degrees one motion stays in parts when the person's aim wavers, at 30 lowering and sliding
 become one.
 """
@@ -32,7 +32,7 @@ from skillframe_segmenter.emission import Observed
 
 DIRECTIONS, FEWEST, MOST = 600, 4, 150
 MOVING, ALONG, BESIDE, STILL = 0.5, 0.38, 0.3, 0.5
-BEST_BAR, SLACK = 0.7, 0.05
+BEST_BAR, SLACK = 0.78, 0.05
 HELD = (5e-3, float(np.deg2rad(2.5)))  # m, rad
 TREMBLING = 1.0 / 3.0
 

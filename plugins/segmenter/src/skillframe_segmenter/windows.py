@@ -3,7 +3,7 @@ r"""From a recording to windows of 50 ms: mean velocity, angular velocity, force
     v_i = (p_{i+1} - p_i) / h,    w_i = log(R_{i+1} R_i^T) / h,    F_i, T_i = mean over the window
 
 where \(p_i, R_i\) are means over half a window on both sides of edge i. Motion enters through differences only, so
-where the task stands cannot matter: positions are taken relative to the first one and rounded to 0.1 nm, which lets
+where the task stands cannot matter: positions are taken relative to the first one and rounded to 10 nm, which lets
 nothing of a constant through, not even its rounding. The window is our choice: raw samples make a phase model follow
 noise (100 Hz fails), 10 Hz loses short phases, 20 to 40 Hz are equal.
 """
@@ -21,7 +21,7 @@ from skillframe.errors import InputError
 from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, norm, rotate, rotation_vector
 from skillframe_segmenter.settings import WINDOW_S
 
-GRID_M = 1e-10
+GRID_M = 1e-8
 FEWEST = 8  # windows; less is no demonstration of anything
 
 

@@ -1,11 +1,12 @@
 """Baseline: cut where the tool stands still, or where the contact force comes and goes (zero-velocity crossing).
 
-    cut at the middle of a stop:  |v| < 0.15 P80|v|  and  |w| < 0.15 P80|w|,  for three windows or more
+    cut at the middle of a stop:  |v| < 0.15 v_r  and  |w| < 0.15 w_r,  for three windows or more
     cut where |F| crosses the force threshold, if one is given
 
-Speeds are those of windows of 50 ms, smoothed over five. Every interval is a phase of its own in each demonstration,
-counted from its beginning: such a rule knows where something changes, and cannot know that two intervals are the same
-phase. Its policies go on when a phase comes to rest. Standard method; the figures are ours.
+Speeds are those of windows of 50 ms, smoothed over five; v_r and w_r are the typical ones of `features`. Every interval
+is a phase of its own in each demonstration, counted from its beginning: such a rule knows where something changes, and
+cannot know that two intervals are the same phase. Its policies go on when a phase comes to rest. Standard method; the
+figures are ours.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from skillframe.frames import Float, norm
 from skillframe.records import Document
 from skillframe_segmenter import runs
 from skillframe_segmenter.boundaries import moved, moves_of
+from skillframe_segmenter.features import typical_speeds
 from skillframe_segmenter.segmentation import rows_of, successors
 from skillframe_segmenter.windows import Windows, cut_all
 
@@ -79,10 +81,9 @@ def _labels(cut: Windows, settings: ZvcSettings, phases: int | None) -> NDArray[
 
 def _stops(cut: Windows, share: float) -> list[int]:
     """Middles of stops that are neither the beginning nor the end."""
-    still = np.ones(cut.size, dtype=bool)
-    for part in (slice(0, 3), slice(3, 6)):
-        speed = _smoothed(norm(cut.motion[:, part]))
-        still &= speed < share * max(float(np.percentile(speed, 80)), 1e-6)
+    typical = typical_speeds([cut], cut)
+    speeds = [_smoothed(norm(cut.motion[:, part])) for part in (slice(0, 3), slice(3, 6))]
+    still = (speeds[0] < share * typical[0]) & (speeds[1] < share * typical[1])
     starts = runs.starts_of_runs(still.astype(np.intp))
     ends = np.append(starts[1:], cut.size)
     return [

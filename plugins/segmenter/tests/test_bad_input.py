@@ -1,0 +1,222 @@
+"""Whatever is wrong with demonstrations, settings or a policy file, one sentence says what, where and what to do."""
+
+import copy
+import json
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+import quasistatic as made
+
+from skillframe.cli import main
+from skillframe.demonstration.files import write_demonstration
+from skillframe.errors import InputError, SkillframeError
+from skillframe.records import LearnOptions
+from skillframe.registry import registry
+
+Z = np.array([0.0, 0.0, 1.0])
+X = np.array([1.0, 0.0, 0.0])
+
+
+def learn(demonstrations, **settings):
+    named = [replace(d, source=f"demo{i + 1}.npz") for i, d in enumerate(demonstrations)]
+    return registry().skill("policy").learn(named, LearnOptions(settings=settings))
+
+
+def legs(seed, *directions, length=0.04):
+    """A free motion leg by leg, 8 degrees of aim noise."""
+    hand = made.Hand(rng=np.random.default_rng([45, seed]))
+    for direction in directions:
+        hand.move_free(np.asarray(direction, dtype=float), length)
+    return hand.finish().demonstration
+
+
+def slides(count=3):
+    return [m.demonstration for m in made.demonstrations("ls", 2, count)]
+
+
+def test_a_demonstration_that_shares_no_phase_is_named():
+    with pytest.raises(InputError, match=r"demo3.npz: shares no phase with the other demonstrations"):
+        learn([legs(1, -Z), legs(2, -Z), legs(3, X)])
+
+
+def test_a_demonstration_that_stops_half_way_is_named_with_where_it_stops():
+    whole = slides()
+    half = whole[2].between(0.0, made.demonstrations("ls", 2)[2].changes[0] - 0.1)
+    with pytest.raises(InputError, match=r"demo3.npz: stops half-way: ends in phase 1, .* go on to phase 2"):
+        learn([*whole[:2], half])
+
+
+def test_a_demonstration_that_runs_the_other_way_round_is_named():
+    with pytest.raises(InputError, match=r"demo3.npz: goes through its phases the other way round \(2 - 1\)"):
+        learn([legs(1, -Z, X), legs(2, -Z, X), legs(3, X, -Z)])
+
+
+def test_two_demonstrations_that_run_opposite_ways_are_refused():
+    with pytest.raises(InputError, match="the other way round"):
+        learn([legs(1, -Z, X), legs(3, X, -Z)])
+
+
+@pytest.mark.parametrize("phases", [0, 40])
+def test_more_phases_than_samples_allow_names_the_shortest_demonstration(phases):
+    with pytest.raises(InputError, match=rf"demo\d.npz: is \d.\d\d s long, which allows 1 to \d+ phases, not {phases}"):
+        learn(slides(), phases=phases)
+
+
+def test_a_demonstration_too_short_to_have_phases_says_so():
+    with pytest.raises(InputError, match="too short to have phases"):
+        learn([slides(1)[0].between(0.0, 0.3)])
+
+
+def test_values_that_are_not_finite_are_refused():
+    one = slides(1)[0]
+    wrench = one.wrench.copy()
+    wrench[100, 2] = np.nan
+    with pytest.raises(InputError, match="not finite"):
+        learn([replace(one, wrench=wrench)])
+
+
+def test_no_demonstration_is_refused():
+    with pytest.raises(InputError, match="no demonstration"):
+        learn([])
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"temper": -1.0}, "temper"),
+        ({"switch_posterior": 0.3}, "switch_posterior"),
+        ({"phases_max": 50}, "phases_max"),
+        ({"merge_angl_rad": 0.3}, "merge_angl_rad"),
+        ({"segmenter": "wrench_hm"}, "wrench_hmm"),
+        ({"skill": "lcm"}, "lmc"),
+        ({"recoveries": -1}, "recoveries"),
+        ({"phases": 2.5}, "phases"),
+        ({"set_boundary": ["1:1"]}, "DEMONSTRATION:BOUNDARY=SECONDS"),
+        ({"set_boundary": ["4:1=1.0"]}, "demonstration"),
+        ({"set_boundary": ["1:9=1.0"]}, "has no boundary 9"),
+    ],
+)
+def test_settings_that_make_no_sense_are_named(settings, words):
+    with pytest.raises(SkillframeError, match=words):
+        learn(slides(), **settings)
+
+
+def test_a_boundary_moved_out_of_its_demonstration_is_refused():
+    for time in (-1.0, 99.0):
+        with pytest.raises(InputError, match="boundary 1 cannot be at"):
+            learn(slides(), set_boundary=[f"1:1={time}"])
+
+
+@pytest.fixture(scope="module")
+def policy():
+    body = learn(slides())
+    return {**body, "type": "policy", "type_version": 1}
+
+
+def check(document):
+    registry().skill("policy").check(document)
+
+
+def test_a_policy_whose_phase_model_does_not_match_its_phases_says_how_many_it_knows(policy):
+    fewer = copy.deepcopy(policy)
+    del fewer["phases"][1]
+    with pytest.raises(InputError, match="knows 2 phases, but the file holds 1"):
+        check(fewer)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda d: d.pop("phase_model"), "phase_model"),
+        (lambda d: d["phase_model"].pop("scales"), "scales"),
+        (lambda d: d["phase_model"]["scales"].pop("force"), "four"),
+        (lambda d: d["phase_model"].update(phase_of=[0, 0]), "phase_of"),
+        (lambda d: d["phase_model"]["direction"].pop(), "direction"),
+        (lambda d: d["phase_model"].update(covariance="wide"), "covariance"),
+        (lambda d: d["phase_model"].update(successors=[[1.0, 1.0]]), "phases"),
+        (lambda d: d["phase_model"].update(version=99), "version"),
+        (lambda d: d["phase_model"].update(type=3), "phase_model"),
+        (lambda d: d.update(recoveries=-1), "recoveries"),
+        (lambda d: d["phases"][1].pop("skill"), r"phases\[1\]"),
+        (lambda d: d["phases"][1]["translation"].pop("stiffness"), r"phases\[1\]"),
+    ],
+)
+def test_a_policy_file_that_was_edited_names_the_key(policy, change, words):
+    edited = copy.deepcopy(policy)
+    change(edited)
+    with pytest.raises(InputError, match=words):
+        check(edited)
+
+
+class Said(NamedTuple):
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def run(capsys):
+    def run(*words):
+        code = main.run([str(w) for w in words])
+        return Said(code, *capsys.readouterr())
+
+    return run
+
+
+@pytest.fixture
+def files(tmp_path):
+    for i, demonstration in enumerate(slides(2)):
+        write_demonstration(demonstration, tmp_path / f"d{i + 1}.npz")
+    return [tmp_path / "d1.npz", tmp_path / "d2.npz"]
+
+
+def test_segment_writes_a_policy_with_boundaries_and_labels_in_the_order_of_its_arguments(run, files, tmp_path):
+    out = tmp_path / "p.json"
+    result = run("segment", *files, "--out", out, "--json")
+    assert result.code == 0, result.err
+    document = json.loads(out.read_text())
+    assert json.loads(result.out)["phases"] == document["phases"]
+    assert document["format"] == "skillframe.skill" and document["type"] == "policy"
+    assert len(document["phases"]) == 2 and "phase_model" in document
+    for row, file in zip(document["demonstrations"], files, strict=True):
+        assert row["file"].endswith(file.name)
+        assert len(row["labels"]) == len(row["boundaries"]) + 1
+
+
+def test_a_boundary_that_a_person_moves_stays_where_it_was_put(run, files, tmp_path):
+    first, second = tmp_path / "a.json", tmp_path / "b.json"
+    assert run("segment", *files, "--out", first).code == 0
+    before = [row["boundaries"] for row in json.loads(first.read_text())["demonstrations"]]
+    wanted = before[1][0] + 0.2
+    assert run("segment", *files, "--out", second, "--set-boundary", f"d2.npz:1={wanted}").code == 0
+    after = [row["boundaries"] for row in json.loads(second.read_text())["demonstrations"]]
+    assert after[1] == [wanted]
+    assert after[0] == pytest.approx(before[0], abs=0.3)
+    document = json.loads(second.read_text())
+    assert document["phase_model"]["direction"] != json.loads(first.read_text())["phase_model"]["direction"]
+
+
+def test_segment_refuses_in_a_sentence_and_leaves_no_file(run, files, tmp_path):
+    out = tmp_path / "p.json"
+    result = run("segment", *files, "--out", out, "--phases", 99)
+    assert result.code == 2
+    assert "which allows 1 to" in result.err and "Traceback" not in result.err
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("name", ["pose_hmm", "zvc"])
+def test_the_baselines_write_policies_that_are_read_again(run, files, tmp_path, name):
+    out = tmp_path / "p.json"
+    assert run("segment", *files, "--out", out, "--segmenter", name).code == 0
+    shown = run("skill", "show", out)
+    assert shown.code == 0 and "phase 1" in shown.out
+
+
+def test_the_policy_s_tree_prints_as_text(run, files, tmp_path):
+    out = tmp_path / "p.json"
+    result = run("segment", *files, "--out", out)
+    assert "├─ phase 1: push along -z" in result.out
+    assert "└─ phase 2:" in result.out and "then the end" in result.out
+    assert run("skill", "show", out).out.count("phase 1") >= 2
