@@ -58,21 +58,21 @@ class Task:
             )
             raise InputError("task", f"{text} freedoms", f"choose joints among {', '.join(chain.independent)}")
         self._frame = chain.robot.tool_frames[0]
-        self._axes = list(axes)
+        self.axes = list(axes)
         self._joints = [chain.independent.index(name) for name in joints]
 
     def position(self, state: ChainState) -> Float:
         """(n,) where the rows are."""
         tool = np.array(state.data.oMf[self._frame].translation)
-        return np.concatenate([tool[self._axes], state.z[self._joints]])
+        return np.concatenate([tool[self.axes], state.z[self._joints]])
 
     def jacobian(self, state: ChainState) -> Float:
         """J_t (n, n)."""
-        return np.concatenate([state.jacobian(self._frame)[self._axes], np.eye(len(state.z))[self._joints]])
+        return np.concatenate([state.jacobian(self._frame)[self.axes], np.eye(len(state.z))[self._joints]])
 
     def drift(self, state: ChainState, rate: Float) -> Float:
         """Rate of J_t times a rate (n,)."""
-        return np.concatenate([state.jacobian_drift(self._frame, rate)[self._axes], np.zeros(len(self._joints))])
+        return np.concatenate([state.jacobian_drift(self._frame, rate)[self.axes], np.zeros(len(self._joints))])
 
     def solve(self, chain: ClosedChain, position: Float, start: Float) -> Float:
         """Minimal coordinates (n,) that put the rows at a position (n,), by Newton's rule from a start near them.
