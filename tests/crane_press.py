@@ -16,13 +16,14 @@ from skillframe.actuation.actuator import ActuatorSpec
 from skillframe.actuation.opening import open_actuators
 from skillframe.conditioning.momentum import ForceEstimator
 from skillframe.control import vdc_actuator as act
+from skillframe.control.hydraulic import Measured, Terms
 from skillframe.control.vdc_reference import Task
 from skillframe.cosim.master import CosimSettings, Master
 from skillframe.cosim.plant import Motion
 from skillframe.world.convert import SOLIMP, SOLREF, build_spec
 from skillframe.world.scene import Geom, Scene, Tool
 from skillframe.world.scene import Task as SceneTask
-from tests.crane_terms import Measured, Terms, terms
+from tests.crane_terms import terms
 from tests.laws.vdc_loop import crane, quintic
 
 DT, AIR, LANDED = 1e-3, 9.0, 14.0  # s: a row, end of the air phase, begin of sliding

@@ -1,33 +1,9 @@
-"""The crane's terms trial by trial from the loop-embedding model, and measurements of a state, for tests."""
-
-from typing import NamedTuple
+"""The crane's terms trial by trial from the loop-embedding model, Coriolis' part by another way than the law's."""
 
 import numpy as np
 import pinocchio as pin
 
-
-class Terms(NamedTuple):
-    """What `control.hydraulic.Terms` holds, from `ChainState`; moment arms not reduced to their diagonal."""
-
-    mass: np.ndarray
-    drift: np.ndarray
-    gravity: np.ndarray
-    jacobian: np.ndarray
-    arms: np.ndarray
-    piston: np.ndarray
-    piston_rate: np.ndarray
-    tip: np.ndarray
-    tip_rate: np.ndarray
-
-
-class Measured(NamedTuple):
-    """What `control.hydraulic.Measured` holds."""
-
-    z: np.ndarray
-    rate: np.ndarray
-    pressure_a: np.ndarray
-    pressure_b: np.ndarray
-    force: np.ndarray
+from skillframe.control.hydraulic import Terms
 
 
 def mass_rate_term(state):

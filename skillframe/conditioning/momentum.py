@@ -8,10 +8,10 @@ friction \(F_f\), a machine moves by \(\dot p = R^T (F_p - F_f) + C_z^T \dot z -
 
 The momentum's rate passes the filter L only as a difference of p, so that no acceleration is needed (De Luca and
 Mattone, ICRA 2003; for cylinders Koivumaki and Mattila, T-RO 31(4), 2015). What friction and payload are known wrongly
-by, theta, is found in air (`identification`), and its regressors phi pass the same filter: matched, so that nothing
-lags. Friction turns over \(\approx\) the sliding length of the seals (Dahl): `seals` follows them. W weighs a joint
-whose piston sticks by what friction may hide there (our choice; 4 kN of the crane's cylinders are some 400 N at the
-tool, whatever is done).
+by, theta, is found in air (`identification`). Its regressors phi, and J, pass the same filter: matched, so that nothing
+lags behind. Friction turns round over a length of the seals (Dahl), which `seals` follows. W weighs a joint whose
+piston sticks by what friction may hide there (our choice; 4 kN of the crane's cylinders are some 400 N at the tool,
+whatever is done).
 """
 
 from __future__ import annotations
@@ -179,7 +179,7 @@ class ForceEstimator:
         s = self.settings
         self.identification = Identification(count, len(cylinders.area_a), s.identify)
         self._observer = MomentumObserver(s.corner, dt)
-        self._matched = CriticallyDamped(s.corner, dt)
+        self._phi_filter, self._j_filter = CriticallyDamped(s.corner, dt), CriticallyDamped(s.corner, dt)
         self._seals = Seals(s.sliding_length, s.sliding_speed)
         self._rate_share = float(-np.expm1(-2.0 * np.pi * s.rate_corner * dt))
         self._filter = None if s.force_corner is None else force_filter(s.force_noise, s.force_corner, dt)
@@ -202,7 +202,8 @@ class ForceEstimator:
         """Begin at a measurement, the machine at rest."""
         count = len(measured.z)
         self._observer.start()
-        self._matched.start()
+        self._phi_filter.start()
+        self._j_filter.start()
         self._rate: Float = np.zeros((count, len(self._cylinders.area_a)))
         self._since: Float = np.zeros_like(self._rate)
         self._seals.start(count, len(self._cylinders.area_a))
@@ -222,13 +223,13 @@ class ForceEstimator:
         known = pull(terms.arms, push) + terms.drift - terms.gravity
         momentum = (terms.mass @ measured.rate[..., None])[..., 0]
         residual = self._observer.step(momentum, known)
-        self._phi = self._matched.step(self._regressors(terms, shape))
+        self._phi, jacobian = self._phi_filter.step(self._regressors(terms, shape)), self._j_filter.step(terms.jacobian)
         sliding = self._sliding(before)
         if self.calibrating and self._tick % self._every == 0:
             rows = pull(np.abs(terms.arms), np.where(sliding, 0.0, 1.0)) == 0.0
             self.identification.update(self._phi, residual, self._noise, rows)
         self.residual = residual - (self._phi @ self.identification.theta[..., None])[..., 0]
-        self.raw, sigma = force_from_residual(terms.jacobian, self.residual, self._variance(terms.arms, sliding))
+        self.raw, sigma = force_from_residual(jacobian, self.residual, self._variance(terms.arms, sliding))
         self._tick += 1
         return Estimate(self._smooth(self.raw), sigma, np.sum(sliding, axis=-1) >= 2)
 
