@@ -98,7 +98,7 @@ class HydraulicGains:
 
     Attributes:
         velocity, force: k_x and k_f of each cylinder (k,). Published for this crane: 5e-3, 5e-3, 1e-3 and 2e-8, 2e-8,
-            8e-9; a fifth of k_f tracks better where friction is not known exactly (our measurement), and is the default.
+            8e-9; the default k_f is a fifth of it, which tracks better where friction is not known (our measurement).
         body: part of the bodies' gain K that is the same for all [N s/m, N m s/rad]; published.
         adaptation: rho of the inertial parameters; 0 switches it off. share: bounds, +- of each parameter.
         joint: lambda of the joints that the tool's plane leaves open [1/s].
@@ -115,7 +115,7 @@ class HydraulicGains:
 
 
 class Demand(NamedTuple):
-    """What a step of the law came to: valve commands (N, k) in [-1, 1], required and present piston force (N, k) [N]."""
+    """What a step comes to: valve commands (N, k) in [-1, 1], required and present force of the pressures (N, k) [N]."""
 
     valve: Float
     required: Float
