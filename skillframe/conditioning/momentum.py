@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from skillframe.control.vdc_actuator import Cylinders
     from skillframe.robot.loops import ClosedChain
 
-__all__ = ["Estimate", "ForceEstimator", "ForceSettings", "MomentumObserver", "force_from_residual"]
+__all__ = ["Estimate", "ForceEstimator", "ForceSettings", "MomentumRate", "force_from_residual"]
 
 
 class Estimate(NamedTuple):
@@ -71,7 +71,7 @@ class ForceSettings:
     row_noise: tuple[float, ...] = (220.0, 160.0, 170.0)
     stiction_speed: float = 4e-3
     least_speed: float = 6e-3
-    settle: float = 0.3
+    settle: float = 0.4
     sliding_length: float = 5e-4
     sliding_speed: float = 2.5e-3
     force_noise: float = 60.0
@@ -103,41 +103,34 @@ class CriticallyDamped:
         self._middle = None
 
     def step(self, value: Float) -> Float:
-        """Filtered value."""
+        """Filtered value, to be read and not kept."""
         if self._middle is None:
-            self._middle = self._value = value
-        self._middle = self._middle + self._share * (value - self._middle)
-        self._value = self._value + self._share * (self._middle - self._value)
+            self._middle, self._value = value.copy(), value.copy()
+        left = value - self._middle
+        left *= self._share
+        self._middle += left
+        np.subtract(self._middle, self._value, out=left)
+        left *= self._share
+        self._value += left
         return self._value
 
 
-class MomentumObserver:
-    """Equation (1) for N machines in lock-step: L of whatever the known forces leave of p'.
+class MomentumRate:
+    """What known forces leave of p', for N machines in lock-step; p' is a difference over a sample of dt [s]."""
 
-    Args:
-        corner: [Hz].
-        dt: sample time [s].
-
-    Attributes:
-        residual: r (N, n).
-    """
-
-    def __init__(self, corner: float, dt: float) -> None:
-        self._filter, self._dt = CriticallyDamped(corner, dt), dt
-        self.residual: Float = np.zeros((0, 0))
+    def __init__(self, dt: float) -> None:
+        self._dt = dt
         self._momentum: Float | None = None
 
     def start(self) -> None:
-        """Forget the past; the next step settles the filter at once, for a machine at rest."""
+        """Forget the past; the next step takes the machine to be in balance."""
         self._momentum = None
-        self._filter.start()
 
     def step(self, momentum: Float, known: Float) -> Float:
-        """Take in p (N, n) and the rate of it that is accounted for; r (N, n)."""
+        """(N, n) p' less the rate of it that is accounted for, of p (N, n)."""
         before = momentum if self._momentum is None else self._momentum
-        self.residual = self._filter.step((momentum - before) / self._dt - known)
         self._momentum = momentum
-        return self.residual
+        return np.asarray((momentum - before) / self._dt - known)
 
 
 def force_from_residual(jacobian: Float, residual: Float, variance: Float) -> tuple[Float, Float]:
@@ -149,11 +142,14 @@ def force_from_residual(jacobian: Float, residual: Float, variance: Float) -> tu
         variance: diagonal of W^-1.
     """
     weighted = jacobian / variance[:, None, :]
-    a = (weighted @ np.swapaxes(jacobian, -1, -2)).reshape(-1, 4).T
-    b = (weighted @ residual[..., None])[..., 0].T
-    determinant = a[0] * a[3] - a[1] * a[2]
-    force = np.stack([a[3] * b[0] - a[1] * b[1], a[0] * b[1] - a[2] * b[0]], axis=-1) / determinant[:, None]
-    return force, np.sqrt(np.stack([a[3], a[0]], axis=-1) / determinant[:, None])
+    a = weighted @ np.swapaxes(jacobian, -1, -2)
+    determinant = a[:, 0, 0] * a[:, 1, 1] - a[:, 0, 1] * a[:, 1, 0]
+    covariance = a[:, ::-1, ::-1] * _COFACTORS / determinant[:, None, None]  # inverse of a symmetric 2 x 2 matrix
+    force = covariance @ (weighted @ residual[..., None])
+    return force[..., 0], np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
+
+
+_COFACTORS = np.array([[1.0, -1.0], [-1.0, 1.0]])
 
 
 class ForceEstimator:
@@ -170,6 +166,7 @@ class ForceEstimator:
         identification: theta, its standard deviation, and how many rows it has seen.
         raw: (N, 2) the force before its Kalman filter [N].
         residual: (N, n) what is left for J^T f [Nm or N].
+        regressors: (N, n, 2k + 1) phi, to be read and not kept.
     """
 
     def __init__(
@@ -178,14 +175,13 @@ class ForceEstimator:
         self.settings, self._chain, self._cylinders, self._dt = settings or ForceSettings(), chain, cylinders, dt
         s = self.settings
         self.identification = Identification(count, len(cylinders.area_a), s.identify)
-        self._observer = MomentumObserver(s.corner, dt)
-        self._phi_filter, self._j_filter = CriticallyDamped(s.corner, dt), CriticallyDamped(s.corner, dt)
+        self._left, self._filter = MomentumRate(dt), CriticallyDamped(s.corner, dt)
         self._seals = Seals(s.sliding_length, s.sliding_speed)
         self._rate_share = float(-np.expm1(-2.0 * np.pi * s.rate_corner * dt))
-        self._filter = None if s.force_corner is None else force_filter(s.force_noise, s.force_corner, dt)
+        self._wrench = None if s.force_corner is None else force_filter(s.force_noise, s.force_corner, dt)
         self._noise: Float = np.square(np.array(s.row_noise))
         self._every, self._tick, self.calibrating = max(1, round(s.identify.period / dt)), 0, False
-        self._phi: Float = np.zeros((count, len(s.row_noise), 2 * len(cylinders.area_a) + 1))
+        self._columns: Float = np.zeros((count, len(s.row_noise), 2 * len(cylinders.area_a) + 4))
         self.raw: Float = np.zeros((count, 2))
         self.residual: Float = np.zeros((count, len(s.row_noise)))
 
@@ -201,9 +197,8 @@ class ForceEstimator:
     def start(self, measured: Measured) -> None:
         """Begin at a measurement, the machine at rest."""
         count = len(measured.z)
-        self._observer.start()
-        self._phi_filter.start()
-        self._j_filter.start()
+        self._left.start()
+        self._filter.start()
         self._rate: Float = np.zeros((count, len(self._cylinders.area_a)))
         self._since: Float = np.zeros_like(self._rate)
         self._seals.start(count, len(self._cylinders.area_a))
@@ -219,25 +214,30 @@ class ForceEstimator:
         self._rate = before + self._rate_share * (terms.piston_rate - self._rate)
         shape = self._seals.step(self._rate, self._dt)
         push = c.area_a * measured.pressure_a - c.area_b * measured.pressure_b
-        push = push - c.coulomb_friction * shape - c.viscous_friction * terms.piston_rate
+        push -= c.coulomb_friction * shape + c.viscous_friction * terms.piston_rate
         known = pull(terms.arms, push) + terms.drift - terms.gravity
         momentum = (terms.mass @ measured.rate[..., None])[..., 0]
-        residual = self._observer.step(momentum, known)
-        self._phi, jacobian = self._phi_filter.step(self._regressors(terms, shape)), self._j_filter.step(terms.jacobian)
+        columns = self._filter.step(self._fill(self._left.step(momentum, known), terms, shape))
+        residual, jacobian, phi = columns[..., 0], np.swapaxes(columns[..., 1:3], -1, -2), columns[..., 3:]
         sliding = self._sliding(before)
         if self.calibrating and self._tick % self._every == 0:
             rows = pull(np.abs(terms.arms), np.where(sliding, 0.0, 1.0)) == 0.0
-            self.identification.update(self._phi, residual, self._noise, rows)
-        self.residual = residual - (self._phi @ self.identification.theta[..., None])[..., 0]
+            self.identification.update(phi, residual, self._noise, rows)
+        self.regressors = phi
+        self.residual = residual - (phi @ self.identification.theta[..., None])[..., 0]
         self.raw, sigma = force_from_residual(jacobian, self.residual, self._variance(terms.arms, sliding))
         self._tick += 1
         return Estimate(self._smooth(self.raw), sigma, np.sum(sliding, axis=-1) >= 2)
 
-    def _regressors(self, terms: Terms, shape: Float) -> Float:
-        """(N, n, 2k + 1) of dF_C, dF_v and dm."""
-        spread = -spread_of(terms.arms)
-        rate = terms.piston_rate[:, None, :]
-        return np.concatenate([spread * shape[:, None, :], spread * rate, -self._load[..., None]], axis=-1)
+    def _fill(self, left: Float, terms: Terms, shape: Float) -> Float:
+        """(N, n, 3 + 2k + 1) all that passes L: what is left of p', J^T, and the columns of phi."""
+        columns, k = self._columns, shape.shape[-1]
+        spread = spread_of(terms.arms)
+        columns[..., 0], columns[..., 1:3] = left, np.swapaxes(terms.jacobian, -1, -2)
+        np.multiply(spread, -shape[:, None, :], out=columns[..., 3 : 3 + k])
+        np.multiply(spread, -terms.piston_rate[:, None, :], out=columns[..., 3 + k : 3 + 2 * k])
+        np.negative(self._load, out=columns[..., -1])
+        return columns
 
     def _sliding(self, before: Float) -> NDArray[np.bool_]:
         """(N, k) has the piston been going one way for long enough?"""
@@ -254,11 +254,11 @@ class ForceEstimator:
         return self._noise + pull(np.square(arms), np.square(self._cylinders.coulomb_friction * share))
 
     def _smooth(self, force: Float) -> Float:
-        if self._filter is None:
+        if self._wrench is None:
             return force
         if self._tick == 1:
-            self._filter.start(force)
-        return self._filter.step(force)
+            self._wrench.start(force)
+        return self._wrench.step(force)
 
 
 def force_filter(noise: float, corner: float, dt: float) -> SteadyWrenchFilter:
