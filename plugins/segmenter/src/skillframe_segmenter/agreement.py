@@ -1,4 +1,8 @@
-"""Whether demonstrations show one task: they share phases, end in the same one, and do not run the other way round."""
+"""Whether demonstrations show one task: they share phases, do not stop half-way, and do not run the other way round.
+
+One stops half-way if it ends in a phase from which all others go on, and has not had the time that they took from there
+to their ends (three quarters of the shortest; ours): robots also differ in how they leave when the task is done.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,8 @@ from typing import Any
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
+
+HALF_WAY = 0.75
 
 
 def check_agreement(rows: Sequence[Mapping[str, Any]], demonstrations: Sequence[Demonstration]) -> None:
@@ -21,13 +27,12 @@ def check_agreement(rows: Sequence[Mapping[str, Any]], demonstrations: Sequence[
     """
     labels = [list(row["labels"]) for row in rows]
     names = [d.source or f"demonstration {i + 1}" for i, d in enumerate(demonstrations)]
-    for i, mine in enumerate(labels):
-        others = [theirs for j, theirs in enumerate(labels) if j != i]
-        if others and len(labels) > 1:
-            _check_one(names[i], mine, others)
+    for i, mine in enumerate(labels if len(labels) > 1 else []):
+        _check_order(names[i], mine, [theirs for j, theirs in enumerate(labels) if j != i])
+        _check_end(names[i], rows[i], [row for j, row in enumerate(rows) if j != i])
 
 
-def _check_one(name: str, mine: list[int], others: Sequence[list[int]]) -> None:
+def _check_order(name: str, mine: list[int], others: Sequence[list[int]]) -> None:
     if not any(set(mine) & set(theirs) for theirs in others):
         raise InputError(
             name, f"shares no phase with the other demonstrations (its phases: {_told(mine)})",
@@ -38,11 +43,24 @@ def _check_one(name: str, mine: list[int], others: Sequence[list[int]]) -> None:
             name, f"goes through its phases the other way round ({_told(mine)}) than the others ({_told(others[0])})",
             "leave it out, or record it again",
         )  # fmt: skip
-    if all(theirs[-1] not in mine and mine[-1] in theirs for theirs in others):
+
+
+def _check_end(name: str, mine: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) -> None:
+    last = mine["labels"][-1]
+    if any(row["labels"][-1] in mine["labels"] or last not in row["labels"] for row in others):
+        return
+    if _time_from(mine, last) < HALF_WAY * min(_time_from(row, last) for row in others):
         raise InputError(
-            name, f"stops half-way: ends in phase {mine[-1] + 1}, where the others go on to phase {others[0][-1] + 1}",
+            name, f"stops half-way: ends in phase {last + 1}, where the others go on to phase "
+            f"{others[0]['labels'][-1] + 1}",
             "leave it out, or record it to the end",
         )  # fmt: skip
+
+
+def _time_from(row: Mapping[str, Any], phase: int) -> float:
+    """Seconds from the first time in a phase to the end."""
+    first = row["labels"].index(phase)
+    return float(row["end"] - [row["start"], *row["boundaries"]][first])
 
 
 def _told(labels: Sequence[int]) -> str:
