@@ -217,8 +217,11 @@ class Press:
         ]
         self.master = Master(self.plant, open_actuators(spec, trials=count), CosimSettings())
         rub = [name for name in spec[0].parameters if name.endswith("_friction")]
-        start(self.master, [{k: f * s.parameters[k] for k in rub} for row in case.friction
-                            for f, s in zip(row, spec, strict=True)])  # fmt: skip
+        drawn = [
+            {name: factor * s.parameters[name] for name in rub}
+            for factors in case.friction for factor, s in zip(factors, spec, strict=True)
+        ]  # fmt: skip
+        self.master.start(parameters=drawn)
         self.sensors = Filter(self.truth(), SENSOR_CORNER)
         self.estimator = ForceEstimator(crane(), cylinders(), count, DT, settings)
         self.force = np.zeros((count, 2))
@@ -259,14 +262,6 @@ class Press:
 
 def parameters(actuation, hold):
     return {**actuation.parameters, "initial_force": float(hold)}
-
-
-def start(master, parameters):
-    """Start the bank with parameters of its own for every instance."""
-    bank, begin = master.bank, master.bank.start
-    bank.start = lambda time=0.0: begin(time, parameters)
-    master.start()
-    bank.start = begin
 
 
 def replay(log, estimator):

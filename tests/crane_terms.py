@@ -8,12 +8,10 @@ from skillframe.control.hydraulic import Terms
 
 def mass_rate_term(state):
     """C_z^T zd = G' C' v + (dG/dt)' M v (n,), Christoffel's C of the tree."""
-    chain, model = state.chain, state.chain.model
+    model = state.chain.model
     data = model.createData()
     coriolis = pin.computeCoriolisMatrix(model, data, state.q, state.v)
-    h = 1e-6
-    ahead, behind = (chain.at(state.z + s * h * state.zd, state.zd).embedding for s in (1.0, -1.0))
-    embedding_rate = (ahead - behind) / (2 * h)
+    embedding_rate = np.array([state.drift_of(unit) for unit in np.eye(len(state.z))]).T
     return state.embedding.T @ coriolis.T @ state.v + embedding_rate.T @ state.tree_mass @ state.v
 
 

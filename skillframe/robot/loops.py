@@ -168,7 +168,7 @@ class ClosedChain:
             raise OutOfReach(self._where, f"{name} cannot reach its eye in this configuration", "move the joints")
         stroke = np.sqrt(square) - along
         rod = rest + stroke * slide
-        return float(np.arctan2(c.axis @ np.cross(rod, eye), rod @ eye)), float(stroke)
+        return float(np.arctan2(_triple(c.axis, rod, eye), rod @ eye)), float(stroke)
 
 
 class ChainState:
@@ -299,6 +299,12 @@ def _across(vector: Float, axis: Float) -> Float:
     """Part of a vector across an axis."""
     result: Float = vector - (vector @ axis) * axis
     return result
+
+
+def _triple(a: Float, b: Float, c: Float) -> float:
+    """A . (b x c) in plain numbers: np.cross takes longer than all the rest."""
+    (a0, a1, a2), (b0, b1, b2), (c0, c1, c2) = a.tolist(), b.tolist(), c.tolist()
+    return float(a0 * (b1 * c2 - b2 * c1) + a1 * (b2 * c0 - b0 * c2) + a2 * (b0 * c1 - b1 * c0))
 
 
 def _advance(chain: ClosedChain, z: Float, zd: Float, force: Float, external: Float | None) -> Float:

@@ -1,0 +1,169 @@
+"""Force without a force sensor: the crane slides on a plate, friction and mass unlike the model's; parts of the filter.
+
+Twelve seeds; each draws +-20 % friction for every cylinder, +-2 % mass of all bodies, and sensor noise. Scored where
+both boom pistons truly go faster than 10 mm/s and the estimate calls itself valid, as a share of the mean true normal
+force there. Excitation in air comes first; the estimate is in the control loop all the time.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from skillframe.conditioning.augmented import AugmentedForceFilter, AugmentedSettings
+from skillframe.conditioning.identification import IdentificationSettings
+from skillframe.conditioning.momentum import ForceEstimator, ForceSettings, force_filter
+from tests.crane_press import AIR, DT, LANDED, Case, Press, crane, cylinders, replay
+from tests.figures.teaching import row
+
+pytestmark = pytest.mark.figures
+
+SEEDS = range(200, 212)
+SECONDS, SLIDING = 31.0, LANDED + 1.5
+FULL = ForceSettings()
+STATIC = "without the momentum: gravity alone"
+NOMINAL = "without either (nominal model)"
+PARTS = {
+    "full": FULL,
+    "without the wrench's Kalman filter": dataclasses.replace(FULL, force_corner=None),
+    "without weights": dataclasses.replace(FULL, weighted=False),
+    "without the payload identified": dataclasses.replace(FULL, identify=IdentificationSettings(load=False)),
+    "without friction identified": dataclasses.replace(FULL, identify=IdentificationSettings(friction=False)),
+    NOMINAL: dataclasses.replace(
+        FULL, identify=IdentificationSettings(load=False, friction=False)
+    ),
+    STATIC: FULL,
+}
+
+
+class Score(NamedTuple):
+    """Per seed: root mean square and maximum of the error, of the normal force and of both components, in % of load."""
+
+    rms: np.ndarray
+    largest: np.ndarray
+    normal_rms: np.ndarray
+    normal_largest: np.ndarray
+    load: np.ndarray
+
+    def __str__(self):
+        return (
+            f"rms {self.rms.mean():.2f} (worst seed {self.rms.max():.2f}) %, max {self.largest.max():.2f} (median seed"
+            f" {np.median(self.largest):.2f}) %; normal force rms {self.normal_rms.mean():.2f} max"
+            f" {self.normal_largest.max():.2f} % of {self.load.mean():.0f} N"
+        )
+
+
+def case(seeds, plate=1e6):
+    draws = [np.random.default_rng([seed, 7]) for seed in seeds]
+    friction = np.array([1.0 + 0.2 * rng.choice([-1.0, 1.0], 3) for rng in draws])
+    return Case(friction, np.array([1.0 + 0.02 * rng.choice([-1.0, 1.0]) for rng in draws]), plate)
+
+
+@cache
+def pressed(plate=1e6):
+    """Log, and the estimate of the full filter (replayed, the same as in the loop)."""
+    log = Press(case(SEEDS, plate), SEEDS).run(SECONDS)
+    return log, *replay(log, ForceEstimator(crane(), cylinders(), len(SEEDS), DT))
+
+
+def window(plate=1e6):
+    log, _, _, valid = pressed(plate)
+    fast = (np.abs(log.speed[..., :2]) > 0.010).all(axis=-1) & (np.arange(len(valid)) * DT > SLIDING)[:, None]
+    return fast & valid, fast
+
+
+def score(log, force, chosen):
+    error = force - log.force
+    size, normal = np.hypot(*np.moveaxis(error, -1, 0)), np.abs(error[..., 1])
+    rows = []
+    for i in range(size.shape[1]):
+        at = chosen[:, i]
+        load = log.force[at, i, 1].mean()
+        share = 100.0 / load
+        rows.append([share * f(e[at, i]) for e in (size, normal) for f in (root_mean_square, np.max)] + [load])
+    return Score(*np.array(rows).T)
+
+
+def root_mean_square(x):
+    return np.sqrt(np.mean(x**2))
+
+
+def augmented(log, told):
+    """The augmented filter over a log, at the rate of the rows, and the same Kalman filter of the wrench after it."""
+    count = log.force.shape[1]
+    estimator = ForceEstimator(crane(), cylinders(), count, DT, PARTS[NOMINAL])
+    filters = [AugmentedForceFilter(3, AugmentedSettings(told=told)) for _ in range(count)]
+    smooth, force, found = force_filter(FULL.force_noise, FULL.force_corner, DT), np.zeros((count, 2)), []
+
+    class Watched:
+        def __getattr__(self, name):
+            return getattr(estimator, name)
+
+        def step(self, measured, at):
+            nonlocal force
+            estimate, k = estimator.step(measured, at), len(found)
+            if k == 0:
+                smooth.start(force)
+            if k % 10 == 0:
+                force = np.array([
+                    f.step(at.jacobian[i], estimator.regressors[i], estimator.residual[i], k * DT < AIR)
+                    for i, f in enumerate(filters)
+                ])  # fmt: skip
+            found.append(smooth.step(force))
+            return estimate
+
+    replay(log, Watched())
+    return np.array(found)
+
+
+def still(terms):
+    """Terms of a machine without momentum."""
+    return terms._replace(mass=0.0 * terms.mass, drift=0.0 * terms.drift)
+
+
+def test_force_while_sliding_is_within_two_and_a_half_percent_rms_and_six_percent_at_most():
+    log, force, sigma, valid = pressed()
+    chosen, fast = window()
+    found = score(log, force, chosen)
+    standing = ~valid & (np.arange(len(valid)) * DT > LANDED)[:, None]
+    row(
+        "crane, force without a sensor, 12 seeds", str(found), f"valid in {100 * chosen.sum() / fast.sum():.0f} % of it"
+    )
+    row("the same, stiction included", str(score(log, force, fast)))
+    row(
+        "not valid (reversal, stiction)", f"rms {root_mean_square((force - log.force)[standing]):.0f} N, sigma stated",
+        f"{np.median(sigma[standing], axis=0).round()} N",
+    )  # fmt: skip
+    assert found.rms.max() < 2.5
+    assert found.largest.max() < 6.0
+    assert np.median(sigma[standing], axis=0).min() > 400.0
+
+
+def test_the_full_filter_is_the_best_row_in_rms_of_those_with_a_part_left_out():
+    log, _, _, _ = pressed()
+    chosen, _ = window()
+    found = {}
+    for name, settings in PARTS.items():
+        seen = log._replace(terms=still(log.terms)) if name == STATIC else log
+        force, _, _ = replay(seen, ForceEstimator(crane(), cylinders(), len(SEEDS), DT, settings))
+        found[name] = score(log, force, chosen)
+        row(name, str(found[name]))
+    for told in (False, True):
+        name = "augmented filter, " + ("told when it is in air" if told else "left to itself")
+        found[name] = score(log, augmented(log, told), chosen)
+        row(name, str(found[name]))
+    best = min(found, key=lambda name: found[name].rms.mean())
+    assert best == "full"
+
+
+def test_on_a_soft_surface_the_estimate_is_as_good_in_newtons():
+    """3e4 N/m: a third of the load, so the bar is 4 %."""
+    log, force, _, _ = pressed(3e4)
+    chosen, _ = window(3e4)
+    found = score(log, force, chosen)
+    row("crane, soft surface, 12 seeds", str(found))
+    assert found.rms.max() < 4.0
