@@ -123,6 +123,10 @@ def simulate(
         from skillframe.arms import simulate_arms
 
         return simulate_arms(skill, setup, draws, rngs, duration_s=duration_s, trace_hz=trace_hz, progress=progress)
+    if setup.robot.spec.actuation:
+        from skillframe.machine import simulate_machine
+
+        return simulate_machine(skill, setup, draws, rngs, duration_s=duration_s, trace_hz=trace_hz, progress=progress)
     check_quantities(draws)
     with np.errstate(invalid="ignore", over="ignore"):  # a diverging trial is the limits' business, not a warning
         loop = Loop(skill, setup, draws, rngs, trace_hz)
@@ -156,7 +160,7 @@ class Loop:
         self.plant = Plant(robot, scene, count, fixture, draws, timestep=self.dt)
         varied = any(key.startswith("grasp.") or key == "robot.mass_scale" for key in draws)
         self.nominal = Plant(robot, scene, count, fixture, {}, timestep=self.dt) if varied else self.plant
-        self.plant.reset(start_configurations(robot, scene, draws, count))
+        self.plant.reset(self._configurations(draws))
         self._prepare_rows()
         self.sensors = self._sensors([pair[0] for pair in children], draws)
         self.filter = WrenchFilter(dt=self.dt).steady()
@@ -169,6 +173,9 @@ class Loop:
         self.goal, self.errors, self.energy = np.zeros(count, dtype=bool), np.zeros((count, 2)), np.zeros(count)
         self.recorder = None if trace_hz is None else self._recorder(ratio(rate, trace_hz, "control", "the trace"))
         self.interrupted = False
+
+    def _configurations(self, draws: Draws) -> Float:
+        return start_configurations(self.setup.robot, self.setup.scene, draws, self.count)
 
     def _prepare_rows(self) -> None:
         self.coc, self.rows = np.asarray(self.setup.center_of_compliance, dtype=float), self.count

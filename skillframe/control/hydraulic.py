@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.conditioning.rates import RateFilter
 from skillframe.control.vdc import Bodies, bodies, net_forces, parameters, piston_forces
 from skillframe.control.vdc_actuator import (
     CylinderGains,
@@ -115,7 +116,7 @@ class HydraulicGains:
 
 
 class Demand(NamedTuple):
-    """What a step comes to: valve commands (N, k) in [-1, 1], required and present force of the pressures (N, k) [N]."""
+    """What a step comes to: valve commands (N, k) in [-1, 1], required and present pressure force (N, k) [N]."""
 
     valve: Float
     required: Float
@@ -167,32 +168,6 @@ def _kinetic_gradient(chain: ClosedChain, z: Float, rate: Float, h: float = 1e-5
 
     steps = h * np.eye(len(z))
     return np.array([(kinetic(z + s) - kinetic(z - s)) / (2 * h) for s in steps])
-
-
-class RateFilter:
-    """A critically damped filter of second order and its rate, element by element.
-
-    Args:
-        corner: [Hz]; dt: [s].
-
-    Attributes:
-        value, rate: of what was shown.
-    """
-
-    def __init__(self, corner: float, dt: float) -> None:
-        self._w, self._dt = 2.0 * np.pi * corner, dt
-        self.value: Float = np.zeros(0)
-        self.rate: Float = np.zeros(0)
-
-    def start(self, value: Float) -> None:
-        """Stand still at a value."""
-        self.value, self.rate = value.copy(), np.zeros_like(value)
-
-    def step(self, value: Float) -> Float:
-        """The rate after a sample."""
-        self.rate = self.rate + self._dt * (self._w**2 * (value - self.value) - 2.0 * self._w * self.rate)
-        self.value = self.value + self._dt * self.rate
-        return self.rate
 
 
 class HydraulicLaw:

@@ -15,7 +15,9 @@ energy as error measure after Sadjina et al., Engineering with Computers 33, 201
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,12 +86,22 @@ class Master:
         self.force = np.zeros(bank.count)
         self.difference, self.exchanged = np.zeros(bank.count), np.zeros(bank.count)
 
-    def start(self, time: float = 0.0, command: Float | float = 0.0) -> None:
-        """Start the bank at the plant's present motion; the plant feels the forces from then on."""
+    def start(
+        self,
+        time: float = 0.0,
+        command: Float | float = 0.0,
+        parameters: Sequence[Mapping[str, Any]] | None = None,
+    ) -> None:
+        """Start the bank at the plant's present motion; the plant feels the forces from then on.
+
+        Args:
+            time: [s]; command: (count,) first inputs.
+            parameters: of every actuator, on top of the bank's own.
+        """
         motion = self.plant.motion(np.zeros(self.bank.count))
         self._show(motion.position, motion.velocity, 0.0)
         self.bank.u[:, self._column["command"]] = command
-        self.bank.start(time)
+        self.bank.start(time, parameters)
         self.time, self.steps = time, 0
         self.force = self.bank.y[:, self._force].copy()
         self.difference[:], self.exchanged[:] = 0.0, 0.0

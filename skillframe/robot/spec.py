@@ -137,7 +137,7 @@ class RobotSpec:
         home: joint positions by joint name [rad or m]; joints not named stand at the neutral position.
         friction_share: part of the drawn `robot.joint_friction` that a joint gets, by name; 1 for joints not named.
         payload: what is carried, where it can be changed.
-        inertia: overlay by link name; loop, actuation: parsed and kept, not simulated yet.
+        inertia: overlay by link name; loop: closed chains; actuation: what drives joints.
     """
 
     name: str
@@ -161,12 +161,11 @@ class RobotSpec:
         """Refuse to be simulated where that would be wrong.
 
         Raises:
-            InputError: the robot has closed loops or actuators, which are not simulated yet, or names no arm.
+            InputError: the robot has closed loops and no actuators in them, or names no arm.
         """
         where = self.folder / "robot.toml"
-        for key in ("loop", "actuation"):
-            if getattr(self, key):
-                raise InputError(where, f"[[{key}]] is read but not simulated yet", "take a robot without it")
+        if self.loop and not self.actuation:
+            raise InputError(where, "has [[loop]] and no [[actuation]]", "say which joints of the loops are driven")
         if not self.arm:
             raise InputError(where, "names no arm", 'add [[arm]] with name = "arm" and tool_frame = "<a URDF link>"')
 

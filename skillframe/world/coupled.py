@@ -1,7 +1,7 @@
 """A batch of simulated machines as the mechanics of a co-simulation: one power bond per trial and piston joint.
 
-Bonds run trial by trial, as actuators do in their bank. MuJoCo holds generalised forces over a step, so a force that goes
-linearly from F0 to F1 acts as its mean, which leaves the coupling of second order (position error H^3 F'/12 m a step).
+Bonds run trial by trial, as actuators do in their bank. MuJoCo holds generalised forces over a step, so a force that
+goes linearly from F0 to F1 acts as its mean, which leaves the coupling of second order (position error H^3 F'/12 m a step).
 """
 
 from __future__ import annotations
@@ -16,7 +16,9 @@ from skillframe.errors import SkillframeError
 from skillframe.frames import Float
 from skillframe.world.plant import Plant
 
-PROBE_N = 1000.0  # force that finds the mass a piston feels: far above rounding, far below what moves the machine's pose
+PROBE_N = (
+    1000.0  # force that finds the mass a piston feels: far above rounding, far below what moves the machine's pose
+)
 
 
 class CoupledPlant:

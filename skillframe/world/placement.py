@@ -20,9 +20,10 @@ from skillframe.world.scene import Scene
 
 _VECTORS = [f"{p}.{k}_{a}" for p in ("start", "fixture", "grasp") for k in ("offset", "tilt") for a in "xyz"]
 _SENSOR = [f"sensor.{k}_bias_{a}" for k in ("force", "torque") for a in "xyz"]
+_ACTUATOR = [f"actuator.{k}" for k in ("supply_pressure", "deadband", "friction_scale", "delay")]
 QUANTITIES = frozenset(
     [*_VECTORS, *_SENSOR, "sensor.force_noise", "sensor.torque_noise", "robot.mass_scale", "robot.joint_friction",
-     "world.friction"]
+     "robot.payload", *_ACTUATOR, "world.friction"]
 )  # fmt: skip
 """What can differ between the trials of one batch; other `world.*` parameters need a scene of their own."""
 

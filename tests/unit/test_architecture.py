@@ -21,7 +21,7 @@ FLOORS = [
     {"sequence", "skillfile", "robot", "registry", "skillsource"},
     {"control", "actuation"},
     {"cosim", "world"},
-    {"executor", "arms", "recorder", "trace", "prepare"},
+    {"executor", "arms", "machine", "machine_bank", "recorder", "trace", "prepare"},
     {"teacher", "staged_teacher", "blind_teacher", "metrics", "campaign"},
     {"report", "demonstrate", "demonstrate_blind"},
     {"conformance", "testing", "quickstart", "reproduce"},
@@ -45,6 +45,8 @@ LOOP = {
     "cosim",
     "executor",
     "arms",
+    "machine",
+    "machine_bank",
 }
 SET_UP = {  # finds, builds and unpacks FMUs before a run, simulates one alone, holds a foreign one in its own process
     f"skillframe/actuation/{name}.py"

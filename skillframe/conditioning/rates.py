@@ -1,0 +1,33 @@
+"""A critically damped filter of second order whose state is the rate of what it is shown."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from skillframe.frames import Float
+
+
+class RateFilter:
+    """The filter w^2 / (s + w)^2, element by element; semi-implicit Euler, which is stable up to w dt = 2.
+
+    Args:
+        corner: w / 2 pi [Hz]; dt: [s].
+
+    Attributes:
+        value, rate: of what was shown.
+    """
+
+    def __init__(self, corner: float, dt: float) -> None:
+        self._w, self._dt = 2.0 * np.pi * corner, dt
+        self.value: Float = np.zeros(0)
+        self.rate: Float = np.zeros(0)
+
+    def start(self, value: Float) -> None:
+        """Stand still at a value."""
+        self.value, self.rate = value.copy(), np.zeros_like(value)
+
+    def step(self, value: Float) -> Float:
+        """The rate after a sample."""
+        self.rate = self.rate + self._dt * (self._w**2 * (value - self.value) - 2.0 * self._w * self.rate)
+        self.value = self.value + self._dt * self.rate
+        return self.rate

@@ -1,0 +1,282 @@
+"""Hydraulic machines in the one loop: the executor's tick, with cylinders as co-simulated FMUs between law and plant.
+
+    encoders, pressures -> filters -> force estimate -> Observation -> skill.step -> Command
+        -> hydraulic law -> valve commands -> FMUs and plant, coupled by `cosim`
+
+Before the skill starts the machine swings in the air for some seconds, an explicit step in which friction and payload
+are identified; from then on they are held. There is no force sensor: what the skill sees as wrench is the estimate from
+chamber pressures, and the pose is that of the filtered encoders. The machine moves its tool in a plane; the attitude of
+the tool follows from its joints and is not commanded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.conditioning.momentum import Estimate, ForceEstimator
+from skillframe.control.hydraulic import Demand, HydraulicGains, HydraulicLaw, Measured, Reference, plane_task
+from skillframe.control.vdc_actuator import cylinders
+from skillframe.cosim.coupling import coupling_numbers, require_stable
+from skillframe.cosim.master import CosimSettings, Master
+from skillframe.errors import InputError
+from skillframe.executor import RAMP_S, Loop, Result, Setup
+from skillframe.frames import Float, Pose
+from skillframe.machine_bank import banks, instance_parameters
+from skillframe.robot.feasibility import require_feasible
+from skillframe.robot.loops import ClosedChain
+from skillframe.skill import Command, Observation, Skill
+from skillframe.world.coupled import CoupledPlant
+from skillframe.world.machine_sensors import MachineSensors, MachineSensorSettings
+from skillframe.world.placement import check_quantities, start_poses
+from skillframe.world.plant import Draws, Kinematics
+
+__all__ = ["CALIBRATION_S", "MachineLoop", "simulate_machine"]
+
+CALIBRATION_S, SWING_M = 6.0, (0.10, 0.10, 0.05)
+"""Swing in the air before a run: long enough for three reversals of every cylinder (our choice)."""
+IMPEDANCE_RATE, LEAST_DAMPING = 2.0, 5e4  # 1/s and N s/m; D where a skill leaves it open, from teleoperation trials
+RESIDUAL_LIMIT, RESIDUAL_ENERGY, RESIDUAL_TICKS = 1e-2, 200.0, 100
+"""Relative bond residual that ends a trial, once so many joules were exchanged; looked at every 100 ticks."""
+
+
+def simulate_machine(
+    skill: Skill,
+    setup: Setup,
+    draws: Mapping[str, Float],
+    rngs: Sequence[np.random.Generator],
+    *,
+    duration_s: float = 20.0,
+    trace_hz: float | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Result:
+    """Run a skill on a hydraulic machine, len(rngs) trials; arguments as `skillframe.executor.simulate`.
+
+    Raises:
+        InputError: the machine cannot stand at a start, or a skill steers another point than the tool frame's origin.
+        StepTooLarge: the control rate is too low for the load on a cylinder.
+        UnknownName, SkillframeError: as `simulate`.
+    """
+    check_quantities(draws)
+    if np.any(np.abs(setup.center_of_compliance) > 1e-9):
+        raise InputError(
+            f"robot {setup.robot.spec.name}", "a hydraulic machine steers the origin of its tool frame",
+            "set the centre of compliance to 0 0 0",
+        )  # fmt: skip
+    with np.errstate(invalid="ignore", over="ignore"):  # as in `simulate`
+        loop = MachineLoop(skill, setup, draws, rngs, trace_hz)
+        loop.tare()
+        loop.run(duration_s, progress)
+        return loop.result()
+
+
+class MachineLoop(Loop):
+    """The executor's loop for N hydraulic machines in lock-step."""
+
+    def __init__(
+        self, skill: Skill, setup: Setup, draws: Draws, rngs: Sequence[np.random.Generator], trace_hz: float | None
+    ) -> None:
+        self.chain = ClosedChain(setup.robot)
+        self.task = plane_task(self.chain)
+        super().__init__(skill, setup, draws, rngs, trace_hz)
+        spec = setup.robot.spec
+        known = cylinders(spec.actuation, spec.folder / "robot.toml")
+        self.law = HydraulicLaw(self.chain, known, HydraulicGains(), self.count, self.dt)
+        self.estimator = ForceEstimator(self.chain, known, self.count, self.dt)
+        self.coupled = CoupledPlant(self.plant, self.chain.actuated)
+        self.bank = banks(spec, self.count)
+        self.master = Master(self.coupled, self.bank, CosimSettings(step=self.dt))
+        self._pressures = [self.bank.outputs.index(f"pressure_{side}") for side in "ab"]
+        self._z = [int(self.plant.model.joint(name).qposadr[0]) for name in self.chain.independent]
+        self._delay = _Delay(draws, self.count, len(known.area_a), self.dt)
+        self._start(draws)
+
+    def _configurations(self, draws: Draws) -> Float:
+        """Closed configurations (N, nq) with the tool's point at its start, the other joints as at home."""
+        robot, axes = self.setup.robot, self.task.axes
+        home = self.chain.minimal(robot.home)
+        points = start_poses(robot, self.setup.scene, draws, self.count).position[:, axes]
+        rows = []
+        for point in points:
+            z = self.task.solve(self.chain, np.concatenate([point, home[2:]]), home)
+            require_feasible(self.chain, z)
+            rows.append(self.chain.configuration(z))
+        return np.array(rows)
+
+    def _sensors(self, rngs: Sequence[np.random.Generator], draws: Draws) -> Any:
+        n, k = len(self.chain.independent), len(self.chain.actuated)
+        return MachineSensors(MachineSensorSettings(), rngs, n, k, 1.0 / self.setup.robot.spec.control.rate_hz)
+
+    def _start(self, draws: Draws) -> None:
+        """FMUs in equilibrium with the load, the step judged against it, sensors and law at rest."""
+        z = self._true_z()
+        hold = np.array([self.chain.at(row, np.zeros(len(row))).holding_force() for row in z])
+        self.master.start(0.0, 0.0, instance_parameters(self.setup.robot.spec, draws, hold))
+        if all(self.bank.capabilities(i).rollback for i in range(len(self.chain.actuated))):
+            numbers = coupling_numbers(self.bank, self.coupled.effective_mass(), self.dt)
+            require_stable(numbers, self.dt, self.chain.actuated)
+        self.sensors.start(z, *self._true_pressures())
+        self.law.start()
+        self.home = self.plant.tool_pose().position[:, self.task.axes].copy()
+        self.joint = z[:, 2:].copy()
+        self.estimate = Estimate(np.zeros((self.count, 2)), np.zeros((self.count, 2)), np.zeros(self.count, dtype=bool))
+        self.demand = Demand(*(np.zeros((self.count, len(self.chain.actuated))) for _ in range(3)))
+        self.estimator.start(self._measured())
+
+    def _true_z(self) -> Float:
+        return self.plant.state[0][:, self._z]
+
+    def _true_pressures(self) -> tuple[Float, Float]:
+        a, b = (self.bank.y[:, column].reshape(self.count, -1) for column in self._pressures)
+        return a, b
+
+    def _measured(self) -> Measured:
+        sensors = self.sensors
+        return Measured(sensors.z, sensors.rate, *sensors.pressures, self.estimate.force)
+
+    def tare(self) -> None:
+        """Swing in the air and identify friction and payload, then hold what was found."""
+        self.estimator.calibrate(True)
+        for tick in range(round(CALIBRATION_S / self.dt)):
+            position, velocity, joint, joint_rate = _swing(tick * self.dt)
+            stiff = LEAST_DAMPING * np.broadcast_to(np.eye(2), (self.count, 2, 2))
+            zero = np.zeros((self.count, 2))
+            self._sense(force_counts=False)
+            self._valve(
+                Reference(
+                    self.home + position, zero + velocity, 6.0 * stiff, stiff, zero, self.joint + joint,
+                    np.zeros_like(self.joint) + joint_rate,
+                )
+            )  # fmt: skip
+            self._drive(self.demand.valve)
+            if not len(self.active):
+                break
+        self.estimator.calibrate(False)
+
+    def _sense(self, force_counts: bool = True) -> None:
+        """Sample the sensors, and estimate the force from them; in the air it is known to be zero."""
+        self.sensors.sample(self._true_z(), *self._true_pressures())
+        measured = self._measured()
+        self.terms = self.law.terms(measured)
+        estimate = self.estimator.step(measured, self.terms)
+        self.estimate = estimate if force_counts else estimate._replace(force=np.zeros_like(estimate.force))
+
+    def _valve(self, reference: Reference) -> None:
+        self.demand = self.law.step(self._measured(), reference, self.active)
+
+    def _tick(self, tick: int) -> None:
+        time = tick * self.dt
+        self._sense()
+        observation = self._observe(time)
+        command = self._ask(tick, observation)
+        reference, law = self._reference(command, observation, min(1.0, time / RAMP_S))
+        self._valve(reference)
+        np.maximum(self.peak, self.plant.contact_force(), out=self.peak)
+        if self.recorder is not None:
+            self.recorder.record(tick, time, observation, command, law)
+        self._stop_where_due(tick, time, observation, command, observation.pose.position, law)
+        if tick % RESIDUAL_TICKS == 0:
+            self._watch_bonds(time)
+        if len(self.active):
+            self._drive(self.demand.valve, time)
+
+    def _observe(self, time: float) -> Observation:
+        """Pose and twist as the encoders say, wrench as the pressures say."""
+        tool, axes = self.plant.tool_pose(), self.task.axes
+        position = tool.position.copy()
+        position[:, axes] = self.terms.tip
+        twist, wrench = np.zeros((self.count, 6)), np.zeros((self.count, 6))
+        twist[:, axes], wrench[:, axes] = self.terms.tip_rate, self.estimate.force
+        return Observation(np.full(self.count, time), self.dt, Pose(position, tool.rotation.copy()), twist, wrench)
+
+    def _reference(self, command: Command, seen: Observation, ramp: float) -> tuple[Reference, Float]:
+        """What the law follows, and equation (1)'s wrench (N, 6) for limits and trace."""
+        axes, count = self.task.axes, self.count
+        grid = np.ix_(range(count), axes, axes)
+        stiffness = np.broadcast_to(command.impedance.stiffness, (count, 6, 6))[grid]
+        if command.impedance.damping is None:
+            largest = np.linalg.eigvalsh(stiffness)[:, -1]
+            damping = np.maximum(largest / IMPEDANCE_RATE, LEAST_DAMPING)[:, None, None] * np.eye(2)
+        else:
+            damping = np.broadcast_to(command.impedance.damping, (count, 6, 6))[grid]
+        velocity, push = ramp * command.twist[:, axes], ramp * command.feedforward[:, axes]
+        law = np.zeros((count, 6))
+        error = (command.pose.position - seen.pose.position)[:, axes]
+        law[:, axes] = push + _times(stiffness, error) + _times(damping, velocity - seen.twist[:, axes])
+        return Reference(
+            command.pose.position[:, axes], velocity, stiffness, damping, push, self.joint, np.zeros_like(self.joint)
+        ), law  # fmt: skip
+
+    def _drive(self, torque: Float, time: float = 0.0) -> None:
+        """One coupled step under valve commands (N, k); trials whose FMU failed end with its sentence."""
+        self.coupled.active = self.active
+        if self.master.step(self._delay.step(torque).ravel()):
+            return
+        k = len(self.chain.actuated)
+        for index in range(self.bank.count):
+            trial = index // k
+            if trial in self.active and (problem := self.bank.problem(index)):
+                self._end(np.array([trial]), time, problem, True)
+
+    def _end(self, rows: NDArray[np.int64], time: float, reason: str, limit: bool) -> None:
+        super()._end(rows, time, reason, limit)
+        self.bank.active[(rows[:, None] * len(self.chain.actuated) + np.arange(len(self.chain.actuated))).ravel()] = 0
+
+    def _watch_bonds(self, time: float) -> None:
+        enough = self.master.exchanged > RESIDUAL_ENERGY
+        bad = (enough & (self.master.residual > RESIDUAL_LIMIT)).reshape(self.count, -1)
+        for trial in [int(i) for i in self.active if bad[i].any()]:
+            bond = int(np.argmax(bad[trial]))
+            value = self.master.residual.reshape(self.count, -1)[trial, bond]
+            name = self.chain.actuated[bond]
+            text = f"co-simulation of {name}: bond residual {value:.2g} is above {RESIDUAL_LIMIT:g}; take a smaller step"
+            self._end(np.array([trial]), time, f"{text} (at {time:.3f} s)", True)
+
+    def _kinematics(self) -> Kinematics:
+        return self.plant.kinematics(self.coc)
+
+
+class _Delay:
+    """Valve commands (N, k) that arrive later, each trial by its own whole number of ticks."""
+
+    def __init__(self, draws: Draws, count: int, k: int, dt: float) -> None:
+        ticks = np.zeros(count, dtype=int)
+        if "actuator.delay" in draws:
+            ticks = np.round(np.asarray(draws["actuator.delay"]) / dt).astype(int)
+        self._ticks, self._now = ticks, 0
+        self._line: Float = np.zeros((int(ticks.max()) + 1, count, k))
+
+    def step(self, command: Float) -> Float:
+        """What arrives now."""
+        length = len(self._line)
+        self._line[self._now % length] = command
+        arrived = self._line[(self._now - self._ticks) % length, np.arange(len(self._ticks))]
+        self._now += 1
+        return arrived
+
+
+def _swing(time: float) -> tuple[Float, Float, float, float]:
+    """Displacement (2,) and velocity of the tool, and of the open joint, at a time of the calibration.
+
+    Up and back to the start, to and fro along the first axis, the joint out and in: every cylinder reverses.
+    """
+    h = 1e-4
+
+    def at(t: float) -> Float:
+        fade = min(1.0, max(0.0, t / 0.5), max(0.0, (CALIBRATION_S - t) / 0.5))
+        fade = fade * fade * (3.0 - 2.0 * fade)
+        turn = 2.0 * np.pi * t / CALIBRATION_S
+        return fade * np.array(
+            [SWING_M[0] * np.sin(3 * turn), SWING_M[1] * (1.0 - np.cos(2 * turn)), SWING_M[2] * np.sin(2 * turn)]
+        )
+
+    now, rate = at(time), (at(time + h) - at(time - h)) / (2 * h)
+    return now[:2], rate[:2], float(now[2]), float(rate[2])
+
+
+def _times(matrix: Float, vector: Float) -> Float:
+    result: Float = (matrix @ vector[..., None])[..., 0]
+    return result

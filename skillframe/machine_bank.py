@@ -1,0 +1,63 @@
+"""The actuators of a machine's trials: kept between runs, and the parameters that differ from trial to trial."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from skillframe.actuation.actuator import Actuators, ActuatorSpec
+from skillframe.actuation.opening import open_actuators
+from skillframe.frames import Float
+from skillframe.robot.spec import RobotSpec
+
+CYLINDER = "hydraulic_cylinder"
+_KEPT: dict[tuple[Any, ...], Actuators] = {}
+KEPT_AT_MOST = 2
+
+
+def banks(spec: RobotSpec, trials: int) -> Actuators:
+    """A bank of a robot's actuators for so many trials; the same one again if it was the last asked for.
+
+    Opening FMUs takes some tenths of a second, resetting them none to speak of, so a campaign's chunks share a bank.
+
+    Raises:
+        InputError, UnknownName, MissingDependency, InstanceFailed: an actuator cannot be opened.
+    """
+    specs = [
+        ActuatorSpec(
+            fmu=a.fmu, parameters=dict(a.parameters), inputs=dict(a.inputs), outputs=dict(a.outputs), name=a.joint
+        )
+        for a in spec.actuation
+    ]
+    key = (str(spec.folder), repr(specs), trials)
+    if key not in _KEPT:
+        while len(_KEPT) >= KEPT_AT_MOST:
+            _KEPT.pop(next(iter(_KEPT))).close()
+        _KEPT[key] = open_actuators(specs, trials, spec.folder)
+    return _KEPT[key]
+
+
+def instance_parameters(spec: RobotSpec, draws: Mapping[str, Float], hold: Float) -> list[dict[str, float]]:
+    """Parameters of every instance, trial by trial: `actuator.*` draws, and equilibrium with holding forces (N, k)."""
+    result = []
+    for trial, forces in enumerate(hold):
+        for actuation, force in zip(spec.actuation, forces, strict=True):
+            own = actuation.fmu == CYLINDER
+            result.append(_drawn(actuation.parameters, draws, trial) | ({"initial_force": float(force)} if own else {}))
+    return result
+
+
+def _drawn(parameters: Mapping[str, Any], draws: Mapping[str, Float], trial: int) -> dict[str, float]:
+    changed = {
+        name: float(np.asarray(draws[f"actuator.{name}"])[trial])
+        for name in ("supply_pressure", "deadband")
+        if f"actuator.{name}" in draws
+    }
+    if "actuator.friction_scale" in draws:
+        scale = float(np.asarray(draws["actuator.friction_scale"])[trial])
+        for name in ("coulomb_friction", "viscous_friction", "static_friction"):
+            if name in parameters:
+                changed[name] = scale * float(parameters[name])
+    return changed
