@@ -1,32 +1,28 @@
-"""Blind demonstrations, goals and runs of searches in the simulated world, shared by the tests.
-
-Everything is MuJoCo: demonstrations come from the blind teacher, a goal is found when the true tip is 2.5 mm below the
-true surface, whatever the skill believes.
-"""
+"""Short ways to the trials of `skillframe_search.trials`, shared by the tests; robots and scenes are loaded once."""
 
 from functools import cache
 
 import numpy as np
+from skillframe_search import trials
+from skillframe_search.trials import FILLET_M, FOUND_M, Task, starts
 
-from skillframe.blind_teacher import CUT, BlindSettings
-from skillframe.demonstrate_blind import record_blind
-from skillframe.executor import Setup, simulate
-from skillframe.prepare import load_robot_model, load_world, prepare
-from skillframe.records import LearnOptions
-from skillframe.registry import registry
-from skillframe.skillsource import learned
+from skillframe.prepare import load_robot_model
 
-FOUND_M = 0.0025
-PEG = {"fillet": 0.0008, "done_depth": FOUND_M}
-SOCKET = {"done_depth": FOUND_M}
-PARAMS = {"peg_in_hole": PEG, "socket": SOCKET}
+__all__ = ["FOUND_M", "PARAMS", "PEG", "demonstrations", "document", "goals", "robot", "scene", "search", "starts"]
+PEG = {"fillet": FILLET_M, "done_depth": FOUND_M}
+PARAMS = {"peg_in_hole": PEG, "socket": {"done_depth": FOUND_M}}
 SPEED = 0.015
-NEAR_M, NEAR_RAD = 0.0015, 0.06  # a part set down this near falls in by itself
+ZERO = (0.0, 0.0, 0.0)
+
+
+def task(world, believed=ZERO, centre=ZERO):
+    params = (("fillet", FILLET_M),) if world == "peg_in_hole" else ()
+    return Task(world, params, believed, centre)
 
 
 @cache
 def scene(world):
-    return load_world(world, PARAMS[world])
+    return task(world).scene
 
 
 @cache
@@ -34,44 +30,26 @@ def robot(name="free_tool"):
     return load_robot_model(name)
 
 
-@cache
-def demonstrations(world, believed, centre):
+def demonstrations(world, believed, centre=ZERO):
     """Five blind searches of a world by a person who believes in N(centre, believed^2)."""
-    settings = BlindSettings(believed=believed, centre=centre)
-    return tuple(record_blind(robot(), scene(world), settings, count=5, seed=1).demonstrations)
+    return trials.demonstrations(task(world, believed, centre))
 
 
-def document(kind, world, believed, centre=(0.0, 0.0, 0.0), **settings):
+def document(kind, world, believed, centre=ZERO, **settings):
     """A search learned at the tip, at 15 mm/s like all its rivals."""
     given = demonstrations(world, believed, centre)
-    options = LearnOptions(at="tip", settings={"speed": SPEED, "push": 10.0, **settings})
-    return learned(registry().skill(kind), given, options)
+    return trials.document(kind, task(world), given, **{"speed": SPEED, "push": 10.0, **settings})
 
 
-def goals(count, believed, centre=(0.0, 0.0, 0.0), seed=100):
-    """(count, 3) where the goal is against the start [m, m, rad].
-
-    Draws of the belief, cut at 2.5 deviations each, without those so near that there is nothing to search for.
-    """
-    rng = np.random.default_rng(seed)
-    normal = rng.standard_normal((20 * count, 3))
-    where = np.array(centre) + normal[np.abs(normal).max(axis=1) < CUT] * np.array(believed)
-    trivial = (np.hypot(where[:, 0], where[:, 1]) < NEAR_M) & (np.abs(where[:, 2]) < NEAR_RAD)
-    return where[~trivial][:count]
-
-
-def starts(where):
-    """Quantities of the executor that put the start at minus the goal."""
-    return {"start.offset_x": -where[:, 0], "start.offset_y": -where[:, 1], "start.tilt_z": -where[:, 2]}
+def goals(count, believed, centre=ZERO, seed=100):
+    """(count, 3) where the goal is against the start [m, m, rad]."""
+    return trials.goals(count, task("peg_in_hole", believed, centre), seed)
 
 
 def search(found, world, where, duration=22.0, seed=5, machine="free_tool", draws=None):
     """Result of one batch, and seconds to the find per trial (inf where it was not found)."""
-    skill, setup = prepare(robot(machine), scene(world), found)
-    assert isinstance(setup, Setup)
-    rngs = [np.random.default_rng([seed, i]) for i in range(len(where))]
-    result = simulate(skill, setup, {**starts(where), **(draws or {})}, rngs, duration_s=duration)
-    return result, np.where(result.success, result.duration_s, np.inf)
+    given = robot(machine)
+    return trials.search(found, scene(world), where, duration_s=duration, seed=seed, robot=given, draws=draws)
 
 
 def shares(times, budgets):
