@@ -9,9 +9,8 @@ friction \(F_f\), a machine moves by \(\dot p = R^T (F_p - F_f) + C_z^T \dot z -
 The momentum's rate passes the filter L only as a difference of p, so that no acceleration is needed (De Luca and
 Mattone, ICRA 2003; for cylinders Koivumaki and Mattila, T-RO 31(4), 2015). What friction and payload are known wrongly
 by, theta, is found in air (`identification`). Its regressors phi, and J, pass the same filter: matched, so that nothing
-lags behind. Friction turns round over a length of the seals (Dahl), which `seals` follows. W weighs a joint whose
-piston sticks by what friction may hide there (our choice; 4 kN of the crane's cylinders are some 400 N at the tool,
-whatever is done).
+lags behind. W weighs a joint whose piston sticks, or has just turned, by what friction may hide there (our choice; 4 kN
+of the crane's cylinders are some 400 N at the tool, whatever is done).
 """
 
 from __future__ import annotations
@@ -24,7 +23,6 @@ from numpy.typing import NDArray
 
 from skillframe.conditioning.identification import Identification, IdentificationSettings
 from skillframe.conditioning.kalman import SteadyWrenchFilter, steady_gain
-from skillframe.conditioning.seals import Seals
 from skillframe.errors import SkillframeError
 from skillframe.frames import Float
 
@@ -60,7 +58,7 @@ class ForceSettings:
             measured in air with encoders of 1e-4 rad (m) and pressure sensors of 0.22 bar at 1 kHz.
         stiction_speed: a piston below it hides friction exp(-(v / stiction_speed)^2) of its Coulomb friction [m/s].
         least_speed, settle: a piston slides once it has gone one way faster than this [m/s] for this long [s].
-        sliding_length: deflection of the seals [m]; 0 takes the tanh law with `sliding_speed` [m/s] instead.
+        sliding_speed: friction is F_C tanh(v / sliding_speed) + F_v v [m/s].
         force_noise, force_corner: of the wrench's Kalman filter [N, Hz]; the corner None leaves it out.
         weighted: False gives every joint the same weight.
         identify: of friction and payload in air.
@@ -72,7 +70,6 @@ class ForceSettings:
     stiction_speed: float = 4e-3
     least_speed: float = 6e-3
     settle: float = 0.4
-    sliding_length: float = 5e-4
     sliding_speed: float = 2.5e-3
     force_noise: float = 60.0
     force_corner: float | None = 2.5
@@ -176,7 +173,6 @@ class ForceEstimator:
         s = self.settings
         self.identification = Identification(count, len(cylinders.area_a), s.identify)
         self._left, self._filter = MomentumRate(dt), CriticallyDamped(s.corner, dt)
-        self._seals = Seals(s.sliding_length, s.sliding_speed)
         self._rate_share = float(-np.expm1(-2.0 * np.pi * s.rate_corner * dt))
         self._wrench = None if s.force_corner is None else force_filter(s.force_noise, s.force_corner, dt)
         self._noise: Float = np.square(np.array(s.row_noise))
@@ -201,7 +197,6 @@ class ForceEstimator:
         self._filter.start()
         self._rate: Float = np.zeros((count, len(self._cylinders.area_a)))
         self._since: Float = np.zeros_like(self._rate)
-        self._seals.start(count, len(self._cylinders.area_a))
         self._load = self._chain.load_gravity(measured.z)
         self._tick = 0
 
@@ -212,7 +207,7 @@ class ForceEstimator:
             self._load = self._chain.load_gravity(measured.z)
         before = self._rate
         self._rate = before + self._rate_share * (terms.piston_rate - self._rate)
-        shape = self._seals.step(self._rate, self._dt)
+        shape = np.tanh(self._rate / self.settings.sliding_speed)
         push = c.area_a * measured.pressure_a - c.area_b * measured.pressure_b
         push -= c.coulomb_friction * shape + c.viscous_friction * terms.piston_rate
         known = pull(terms.arms, push) + terms.drift - terms.gravity

@@ -22,7 +22,7 @@ from tests.figures.teaching import row
 
 pytestmark = pytest.mark.figures
 
-SEEDS = range(200, 212)
+SEEDS, SOFT_SEEDS = range(200, 212), range(200, 204)
 SECONDS, SLIDING = 31.0, LANDED + 1.5
 FULL = ForceSettings()
 STATIC = "without the momentum: gravity alone"
@@ -33,9 +33,7 @@ PARTS = {
     "without weights": dataclasses.replace(FULL, weighted=False),
     "without the payload identified": dataclasses.replace(FULL, identify=IdentificationSettings(load=False)),
     "without friction identified": dataclasses.replace(FULL, identify=IdentificationSettings(friction=False)),
-    NOMINAL: dataclasses.replace(
-        FULL, identify=IdentificationSettings(load=False, friction=False)
-    ),
+    NOMINAL: dataclasses.replace(FULL, identify=IdentificationSettings(load=False, friction=False)),
     STATIC: FULL,
 }
 
@@ -57,21 +55,21 @@ class Score(NamedTuple):
         )
 
 
-def case(seeds, plate=1e6):
+def case(seeds, plate):
     draws = [np.random.default_rng([seed, 7]) for seed in seeds]
     friction = np.array([1.0 + 0.2 * rng.choice([-1.0, 1.0], 3) for rng in draws])
     return Case(friction, np.array([1.0 + 0.02 * rng.choice([-1.0, 1.0]) for rng in draws]), plate)
 
 
 @cache
-def pressed(plate=1e6):
+def pressed(seeds=SEEDS, plate=1e6):
     """Log, and the estimate of the full filter (replayed, the same as in the loop)."""
-    log = Press(case(SEEDS, plate), SEEDS).run(SECONDS)
-    return log, *replay(log, ForceEstimator(crane(), cylinders(), len(SEEDS), DT))
+    log = Press(case(seeds, plate), seeds).run(SECONDS)
+    return log, *replay(log, ForceEstimator(crane(), cylinders(), len(seeds), DT))
 
 
-def window(plate=1e6):
-    log, _, _, valid = pressed(plate)
+def window(log, valid):
+    """Where it is scored, and the same whether valid or not."""
     fast = (np.abs(log.speed[..., :2]) > 0.010).all(axis=-1) & (np.arange(len(valid)) * DT > SLIDING)[:, None]
     return fast & valid, fast
 
@@ -127,7 +125,7 @@ def still(terms):
 
 def test_force_while_sliding_is_within_two_and_a_half_percent_rms_and_six_percent_at_most():
     log, force, sigma, valid = pressed()
-    chosen, fast = window()
+    chosen, fast = window(log, valid)
     found = score(log, force, chosen)
     standing = ~valid & (np.arange(len(valid)) * DT > LANDED)[:, None]
     row(
@@ -144,8 +142,8 @@ def test_force_while_sliding_is_within_two_and_a_half_percent_rms_and_six_percen
 
 
 def test_the_full_filter_is_the_best_row_in_rms_of_those_with_a_part_left_out():
-    log, _, _, _ = pressed()
-    chosen, _ = window()
+    log, _, _, valid = pressed()
+    chosen, _ = window(log, valid)
     found = {}
     for name, settings in PARTS.items():
         seen = log._replace(terms=still(log.terms)) if name == STATIC else log
@@ -162,8 +160,7 @@ def test_the_full_filter_is_the_best_row_in_rms_of_those_with_a_part_left_out():
 
 def test_on_a_soft_surface_the_estimate_is_as_good_in_newtons():
     """3e4 N/m: a third of the load, so the bar is 4 %."""
-    log, force, _, _ = pressed(3e4)
-    chosen, _ = window(3e4)
-    found = score(log, force, chosen)
-    row("crane, soft surface, 12 seeds", str(found))
+    log, force, _, valid = pressed(SOFT_SEEDS, 3e4)
+    found = score(log, force, window(log, valid)[0])
+    row("crane, soft surface, 4 seeds", str(found))
     assert found.rms.max() < 4.0

@@ -15,7 +15,6 @@ from skillframe.conditioning.momentum import (
     MomentumRate,
     force_from_residual,
 )  # fmt: skip
-from skillframe.conditioning.seals import Seals
 from skillframe.control.hydraulic import Measured
 from skillframe.control.vdc_actuator import cylinders
 from skillframe.errors import SkillframeError
@@ -168,13 +167,3 @@ def test_rows_of_a_batch_do_not_know_of_each_other():
 def test_a_corner_that_is_no_frequency_is_refused():
     with pytest.raises(SkillframeError, match="corner must be positive, got -1"):
         ForceSettings(corner=-1.0)
-
-
-@given(st.floats(1e-3, 0.1), st.integers(1, 50))
-def test_seals_turn_over_a_length_and_not_over_a_time(speed, count):
-    """Half a millimetre, gone in any number of steps, leaves 1 - 1/e of the way to sliding."""
-    seals = Seals(5e-4, 1.0)
-    seals.start(1, 1)
-    for _ in range(count):
-        shape = seals.step(np.array([[speed]]), 5e-4 / speed / count)
-    assert shape[0, 0] == pytest.approx(1.0 - np.exp(-1.0), rel=1e-12)
