@@ -36,8 +36,8 @@ from skillframe.world.plant import Draws, Kinematics
 
 __all__ = ["CALIBRATION_S", "MachineLoop", "simulate_machine"]
 
-CALIBRATION_S, SWING_M = 6.0, (0.10, 0.10, 0.05)
-"""Swing in the air before a run: long enough for three reversals of every cylinder (our choice)."""
+CALIBRATION_S, SETTLE_S, SWING_M = 6.0, 1.0, (0.10, 0.10, 0.05)
+"""Swing in the air before a run, two or three reversals of every cylinder, and a moment to come to rest (ours)."""
 IMPEDANCE_RATE, LEAST_DAMPING = 2.0, 5e4  # 1/s and N s/m; D where a skill leaves it open, from teleoperation trials
 RESIDUAL_LIMIT, RESIDUAL_ENERGY, RESIDUAL_TICKS = 1e-2, 200.0, 100
 """Relative bond residual that ends a trial, once so many joules were exchanged; looked at every 100 ticks."""
@@ -140,7 +140,7 @@ class MachineLoop(Loop):
     def tare(self) -> None:
         """Swing in the air and identify friction and payload, then hold what was found."""
         self.estimator.calibrate(True)
-        for tick in range(round(CALIBRATION_S / self.dt)):
+        for tick in range(round((CALIBRATION_S + SETTLE_S) / self.dt)):
             position, velocity, joint, joint_rate = _swing(tick * self.dt)
             stiff = LEAST_DAMPING * np.broadcast_to(np.eye(2), (self.count, 2, 2))
             zero = np.zeros((self.count, 2))
@@ -266,7 +266,7 @@ def _swing(time: float) -> tuple[Float, Float, float, float]:
     h = 1e-4
 
     def at(t: float) -> Float:
-        fade = min(1.0, max(0.0, t / 0.5), max(0.0, (CALIBRATION_S - t) / 0.5))
+        fade = min(1.0, max(0.0, t / 0.5), max(0.0, (CALIBRATION_S - t) / 1.0))
         fade = fade * fade * (3.0 - 2.0 * fade)
         turn = 2.0 * np.pi * t / CALIBRATION_S
         return fade * np.array(
