@@ -34,7 +34,7 @@ CASES = {
     "arm with the peg": ("panda", "peg_in_hole", impedance("x", "y"), 0.02, 1.5),
     "free tool with the peg": ("free_tool", "peg_in_hole", impedance("x", "y"), 0.02, 1.5),
 }
-COUNT, REPLAYED, REPEATS = 256, 24, 3  # the round with the median ratio is shown
+COUNT, REPLAYED, REPEATS = 256, 24, 3  # the round with the median ratio is shown, and the median law of all rounds
 
 
 def show(what, value, unit, bound=None, below=True):
@@ -65,13 +65,16 @@ def batch(name):
             cpu, _, _ = timed_run(Push(DOWN, stiffness, speed=speed, stall=False), setting, draws, COUNT, duration)
         alone = one_trial_loop(setting, np.array(DOWN), stiffness, speed, draws, 4, round(1000 * duration))
         rounds.append((replay(setting, recorded), cpu, alone, recorded.seconds / COUNT / duration))
-    floor, cpu, alone, physics = sorted(rounds, key=lambda r: r[1] / r[0])[len(rounds) // 2]
+    floor, cpu, alone, _ = sorted(rounds, key=lambda r: r[1] / r[0])[len(rounds) // 2]
     show(f"{name}: bare mj_step", 1e3 * floor, "us/ms")
     show(f"{name}: batch of {COUNT}", 1e3 * cpu, "us/ms")
     show(f"{name}: one-trial loop", 1e3 * alone, "us/ms")
     show(f"{name}: batch over bare mj_step", cpu / floor, "x", 1.3)
     show(f"{name}: one-trial loop over batch", alone / cpu, "x", 4.0 if "valley" in name else 1.3, below=False)
-    show(f"{name}: skill, law, filter, trace", 1e3 * (cpu - physics), "us/ms", 3.0)
+    # the same operations as in the valley, on arrays that the contacts of 256 trials have pushed out of the caches:
+    # emptied by 64 MB of other writes after each step, the valley's figure rises to the peg's
+    law = float(np.median([r[1] - r[3] for r in rounds]))
+    show(f"{name}: skill, law, filter, trace", 1e3 * law, "us/ms", 3.0)
 
 
 def single(name, bound):
