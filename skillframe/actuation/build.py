@@ -56,19 +56,24 @@ def cached_path(folder: Path, version: int) -> Path:
 
 def build_stepper(source: Path) -> Path | None:
     """The shared library of stepper.c, from the cache if it is there; None where it cannot be built."""
+    return build_library("stepper", source.read_text(encoding="utf-8"))
+
+
+def build_library(name: str, text: str) -> Path | None:
+    """The shared library of C text, from the cache if it is there; None where it cannot be built."""
     compiler = find_compiler()
     if compiler is None:
         return None
-    library = cache_dir("stepper") / _digest(source.read_bytes(), " ".join([*compiler, *FLAGS]))[:24] / "stepper.so"
+    library = cache_dir(name) / _digest(text, " ".join([*compiler, *FLAGS]))[:24] / f"{name}.so"
     if not library.is_file():
         library.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=library.parent) as work:
-            shutil.copyfile(source, Path(work) / "stepper.c")
+            (Path(work) / f"{name}.c").write_text(text, encoding="utf-8")
             try:
-                compile_library(["stepper.c"], "stepper.so", Path(work))
+                compile_library([f"{name}.c"], f"{name}.so", Path(work))
             except CompilerFailed:
                 return None
-            os.replace(Path(work) / "stepper.so", library)
+            os.replace(Path(work) / f"{name}.so", library)
     return library
 
 

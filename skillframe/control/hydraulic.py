@@ -204,7 +204,7 @@ class HydraulicLaw:
         return terms(self.chain, measured.z, measured.rate)
 
     def step(self, measured: Measured, reference: Reference, ids: NDArray[np.int64]) -> Demand:
-        """Valve commands (N, k); those of trials that are not in `ids` stay zero."""
+        """A sample for the trials in `ids`; the other rows mean nothing."""
         count, k = len(measured.z), len(self.cylinders.area_a)
         required, rate_r = np.zeros((count, k)), np.zeros((count, k))
         piston, speed = np.zeros((count, k)), np.zeros((count, k))
