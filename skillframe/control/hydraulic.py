@@ -62,6 +62,7 @@ class Reference(NamedTuple):
         stiffness, damping: K, D (N, 2, 2) [N/m, Ns/m]; D is positive definite.
         push: f_ff (N, 2) [N].
         joint, joint_rate: (N, n - 2).
+        acceleration: X_d'' and the open joints' (N, n), where it is known.
     """
 
     position: Float
@@ -71,6 +72,7 @@ class Reference(NamedTuple):
     push: Float
     joint: Float
     joint_rate: Float
+    acceleration: Float | None = None
 
 
 class Terms(NamedTuple):
@@ -222,7 +224,8 @@ class HydraulicLaw:
         n = len(self.chain.independent)
         wanted = Path(
             np.concatenate([reference.position[i], reference.joint[i]]),
-            np.concatenate([reference.velocity[i], reference.joint_rate[i]]), np.zeros(n),
+            np.concatenate([reference.velocity[i], reference.joint_rate[i]]),
+            np.zeros(n) if reference.acceleration is None else reference.acceleration[i],
         )  # fmt: skip
         gain, push = self.gains.joint * np.eye(n), np.zeros(n)
         gain[:2, :2] = np.linalg.solve(reference.damping[i], reference.stiffness[i])

@@ -18,7 +18,7 @@ from skillframe.control.vdc_adaptation import relative_bounds
 from skillframe.frames import Float
 from skillframe.robot.loops import ClosedChain
 
-_SHARED = tuple(range(14, 20))  # inputs of the law that are one for all trials: bounds, cylinders, gains, scalars
+_SHARED = tuple(range(15, 21))  # inputs of the law that are one for all trials: bounds, cylinders, gains, scalars
 
 
 class CompiledLaw:
@@ -47,7 +47,7 @@ class CompiledLaw:
         self._measured = Measured(zeros((count, n)), zeros((count, n)), *(zeros((count, m)) for m in (k, k, 2)))
         self._reference = Reference(
             zeros((count, 2)), zeros((count, 2)), zeros((count, 2, 2)), zeros((count, 2, 2)), zeros((count, 2)),
-            zeros((count, n - 2)), zeros((count, n - 2)),
+            zeros((count, n - 2)), zeros((count, n - 2)), zeros((count, n)),
         )  # fmt: skip
         self.theta, self._learned = (np.tile(nominal, (count, 1, 1)) for _ in range(2))
         self._memory, self._next = zeros((count, 2, k)), zeros((count, 2, k))
@@ -91,7 +91,7 @@ class CompiledLaw:
     def step(self, measured: Measured, reference: Reference, ids: NDArray[np.int64]) -> Demand:
         """A sample for the trials in `ids`, the other rows mean nothing; the call after next uses the arrays again."""
         for own, given in zip((*self._measured, *self._reference), (*measured, *reference), strict=True):
-            np.copyto(own, given)
+            np.copyto(own, 0.0 if given is None else given)
         self._turn ^= 1
         self._steps[self._turn](ids)
         self.theta[ids], self._memory[ids] = self._learned[ids], self._next[ids]

@@ -44,14 +44,14 @@ def terms_function(chain: ClosedChain, axes: tuple[int, int]) -> ca.Function:
 def law_function(chain: ClosedChain, axes: tuple[int, int]) -> ca.Function:
     """One sample of the law for one trial.
 
-    Inputs: z, zd, pressure_a, pressure_b, force; position, velocity, stiffness, damping, push, joint, joint_rate;
-    theta, filter (2, k), theta's lower and upper bounds, cylinders (13, k), k_x, k_f, the scalars of `SCALARS`.
+    Inputs: z, zd, pressure_a, pressure_b, force; position, velocity, stiffness, damping, push, joint, joint_rate,
+    acceleration; theta, filter (2, k), theta's lower and upper bounds, cylinders (13, k), k_x, k_f, the scalars of `SCALARS`.
     Outputs: valve, required and present force, theta, filter.
     """
     s = SymbolicChain(chain)
     n, k, count = len(chain.independent), len(chain.driven), chain.model.njoints - 1
     p_a, p_b, force = (ca.SX.sym(name, size) for name, size in (("p_a", k), ("p_b", k), ("force", 2)))
-    reference = [ca.SX.sym(f"reference{i}", size) for i, size in enumerate((2, 2, 4, 4, 2, n - 2, n - 2))]
+    reference = [ca.SX.sym(f"reference{i}", size) for i, size in enumerate((2, 2, 4, 4, 2, n - 2, n - 2, n))]
     scalars = ca.SX.sym("scalars", len(SCALARS))
     gain = dict(zip(SCALARS, ca.vertsplit(scalars), strict=True))
     theta, rows = _rows("theta", count, PARAMETERS)
@@ -121,7 +121,7 @@ def _required(
     s: SymbolicChain, tip: Expression, reference: list[Expression], force: Expression, joint_gain: Expression
 ) -> tuple[Expression, Expression]:
     """zd_r and zdd_r, equation (1) of `hydraulic` and `vdc_reference.required_motion`."""
-    position, velocity, stiffness, damping, push, joint, joint_rate = reference
+    position, velocity, stiffness, damping, push, joint, joint_rate, given = reference
     n = s.z.shape[0]
     k, d = (ca.reshape(x, 2, 2).T for x in (stiffness, damping))
     inverse = ca.inv(d)
@@ -130,7 +130,7 @@ def _required(
     ahead, pushed = ca.vertcat(velocity, joint_rate), ca.vertcat(inverse @ (force + push), ca.SX(n - 2, 1))
     jacobian = ca.jacobian(at, s.z)
     rate = ca.solve(jacobian, ahead + lead @ (wanted - at) + pushed)
-    acceleration = lead @ (ahead - jacobian @ s.zd) - s.drift_of(jacobian, rate)
+    acceleration = given + lead @ (ahead - jacobian @ s.zd) - s.drift_of(jacobian, rate)
     return rate, ca.solve(jacobian, acceleration)
 
 

@@ -32,8 +32,16 @@ def draw(rng, count):
     reference = Reference(
         around([3.0, 1.0], 0.3, 2), around(0.0, 0.3, 2), 3e4 * rising @ np.swapaxes(rising, -1, -2),
         5e4 * np.eye(2) + 1e4 * rising, around(0.0, 1e3, 2), around(0.5, 0.1, 1), around(0.0, 0.1, 1),
+        around(0.0, 0.5, 3),
     )  # fmt: skip
     return measured, reference
+
+
+def test_an_acceleration_that_is_not_given_is_zero():
+    measured, reference = draw(np.random.default_rng(8), 2)
+    laws = [CompiledLaw(*machine(), 2, DT) for _ in range(2)]
+    given = [reference._replace(acceleration=a) for a in (None, np.zeros((2, 3)))]
+    close(*(law.step(measured, r, np.arange(2)) for law, r in zip(laws, given, strict=True)))
 
 
 def close(found, expected):
