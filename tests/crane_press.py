@@ -29,17 +29,18 @@ from tests.laws.vdc_loop import crane, quintic
 DT, AIR, LANDED = 1e-3, 9.0, 14.0  # s: a row, end of the air phase, begin of sliding
 START, SURFACE, RADIUS = np.array([3.0, 0.95, 0.5]), 0.45, 0.05
 ENCODER, PRESSURE, SENSOR_CORNER = 1e-4, 0.22e5, 2 * np.pi * 24.0
-STIFFNESS, DAMPING, PRESS = 1e5, 2.5e4, 0.09  # N/m, N s/m, m below the surface
+STIFFNESS, DAMPING, PRESS = 1e5, 5e4, 0.09  # N/m, N s/m, m below the surface
 STROKE, SPEED = 0.5, 0.19  # m and m/s along the surface
 PLATE = 40.0  # kg
 
 
 class Case(NamedTuple):
-    """What the controller does not know: friction (N, 3) and mass (N,) of the plant over the model's, plate [N/m]."""
+    """Friction (N, 3) and mass (N,) of the plant over the model's, plate [N/m], impedance's damping [N s/m]."""
 
     friction: np.ndarray
     mass: np.ndarray
     plate: float = 1e6
+    damping: float = DAMPING
 
 
 class Log(NamedTuple):
@@ -171,8 +172,8 @@ def reference(t):
 class Law:
     """First-order impedance, required piston forces without Coriolis terms, the published inner loop."""
 
-    def __init__(self, count):
-        self.rate, self.needed, self.count = None, None, count
+    def __init__(self, count, damping):
+        self.rate, self.needed, self.count, self.damping = None, None, count, damping
 
     def step(self, t, measured, at):
         """Valve commands (N, 3)."""
@@ -192,7 +193,10 @@ class Law:
     def required(self, t, measured, at):
         """Rates and accelerations (N, 3) of the minimal coordinates."""
         to, soon = reference(t), reference(t + 1e-4)
-        ahead, (lead, push) = (soon - to) / 1e-4, (6.0, 0.0) if t < AIR else (STIFFNESS / DAMPING, 1.0 / DAMPING)
+        ahead, (lead, push) = (
+            (soon - to) / 1e-4,
+            (6.0, 0.0) if t < AIR else (STIFFNESS / self.damping, 1.0 / self.damping),
+        )
         tool = ahead[:2] + lead * (to[:2] - at.tip) + push * measured.force
         wanted = np.concatenate([tool, ahead[2] + 3.0 * (to[2] - measured.z[:, 2:])], axis=-1)
         jacobian = np.concatenate([at.jacobian, np.tile([[[0.0, 0.0, 1.0]]], (self.count, 1, 1))], axis=1)
@@ -206,7 +210,7 @@ class Press:
 
     def __init__(self, case, seeds, settings=None):
         self.rngs, count = [np.random.default_rng(seed) for seed in seeds], len(seeds)
-        self.plant, self.law = Cranes(case), Law(count)
+        self.plant, self.law = Cranes(case), Law(count, case.damping)
         z = Task(crane(), (0, 2), ("extension",)).solve(crane(), START, np.array([0.8, -1.6, 0.5]))
         self.plant.reset(z)
         spec = [

@@ -69,7 +69,7 @@ class ForceSettings:
     row_noise: tuple[float, ...] = (220.0, 160.0, 170.0)
     stiction_speed: float = 4e-3
     least_speed: float = 6e-3
-    settle: float = 0.4
+    settle: float = 0.5
     sliding_speed: float = 2.5e-3
     force_noise: float = 60.0
     force_corner: float | None = 2.5
