@@ -1,6 +1,11 @@
-"""FMUs of other makers: what pythonfmu (FMI 2) and pythonfmu3 (FMI 3) build from the models that they ship and ours."""
+"""FMUs of other makers, FMI 2 and 3.
+
+What pythonfmu and pythonfmu3 build from models that they ship and from ours; containers of FMU Manipulation Toolbox,
+a compiled master of its own around one of our cylinders.
+"""
 
 import json
+import shutil
 import subprocess
 import sys
 from importlib import import_module
@@ -75,3 +80,25 @@ def by_fmpy(path, start=None, table=None, stop=0.1, step=0.01):
     done = subprocess.run([sys.executable, "-c", FMPY, request], capture_output=True, text=True, timeout=120)
     found = [line for line in done.stdout.splitlines() if line.startswith("result ")]
     return json.loads(found[0][7:]) if found else done.stderr.strip().splitlines()[-1]
+
+
+CONTAINER = """rule;from_fmu;from_port;to_fmu;to_port
+FMU;cylinder.fmu;;;
+INPUT;;u;cylinder.fmu;command
+INPUT;;x;cylinder.fmu;position
+INPUT;;v;cylinder.fmu;velocity
+INPUT;;a;cylinder.fmu;acceleration
+OUTPUT;cylinder.fmu;force;;F
+OUTPUT;cylinder.fmu;work;;W
+OUTPUT;cylinder.fmu;pressure_a;;pa
+"""
+
+
+def container(version, cylinder: Path, folder: Path) -> Path:
+    """An FMU around a cylinder's, made by the toolbox with its own compiled master."""
+    shutil.copy(cylinder, folder / "cylinder.fmu")
+    (folder / "held.csv").write_text(CONTAINER)
+    code = "from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer; fmucontainer()"
+    options = ["-fmu-directory", folder, "-container", "held.csv:0.001", "-fmi", version, "-no-auto-output"]
+    subprocess.run([sys.executable, "-c", code, *map(str, options)], check=True, capture_output=True, timeout=60)
+    return folder / "held.fmu"
