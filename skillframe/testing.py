@@ -31,6 +31,7 @@ from skillframe.registry import registry
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 
 __all__ = [
+    "CoordinatorConformance",
     "HoldSkill",
     "ReaderConformance",
     "ScriptedSkill",
@@ -122,6 +123,18 @@ class SkillConformance:
     def test_says_what_it_does(self) -> None:
         """The skill can be told in words, and its pictures are pictures."""
         self._check(skills.says_what_it_does)
+
+
+class CoordinatorConformance(SkillConformance):
+    """Inherit, set `skill_type` to the coordinator's name, and pytest checks it as a skill of several arms."""
+
+    def _type(self) -> SkillType:
+        return registry().coordinator(self.skill_type)
+
+    def test_is_discovered(self) -> None:
+        """The registry knows the coordinator, from a plug-in that loaded without error."""
+        assert registry().provider("coordinator", self.skill_type).error is None
+        assert self._type().summary
 
 
 class WorldConformance:

@@ -14,6 +14,7 @@ from skillframe.registry import Plugin, Registry
 
 CHECKS: Mapping[str, Callable[[Any], list[str]]] = {
     "skill": check_skill,
+    "coordinator": check_skill,
     "segmenter": check_segmenter,
     "world": check_world,
     "reader": check_reader,

@@ -2,6 +2,7 @@
 
 Batched rows must equal the same trials run one by one to 1e-9 (metres, radians, newtons): a skill that is written over
 arrays differs from its own scalar run by rounding only, and 1e-9 lies far above rounding and far below a micrometre.
+A coordinator of several arms is a skill whose arrays are (N, arms, ...), and obeys the same laws.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from skillframe.conformance.examples import example_demonstrations, random_observations
 from skillframe.conformance.problems import attempt, json_problems
 from skillframe.frames import Float, norm, rotation_vector
-from skillframe.records import Document, SkillType
+from skillframe.records import CoordinatorType, Document, SkillType
 from skillframe.skill import Command, Observation, Skill, Status, row
 
 TRIALS, TICKS, DT = 8, 25, 0.05  # 200 observations over 1.25 s
@@ -55,8 +56,29 @@ def _kept(command: Command) -> Command:
     return copy.deepcopy(command)
 
 
-def _observations(seed: int = 1, ticks: int = TICKS, dt: float = DT) -> list[Observation]:
-    return random_observations(np.random.default_rng([8, seed]), TRIALS, ticks, dt)
+def _arms(skill: SkillType, document: Document) -> tuple[int, ...]:
+    """The dimension of arms, (arms,) for a coordinator and () for a skill."""
+    if not isinstance(skill, CoordinatorType):
+        return ()
+    return (2 if skill.centers is None else len(skill.centers(document)),)
+
+
+def _observations(
+    skill: SkillType, document: Document, seed: int = 1, ticks: int = TICKS, dt: float = DT
+) -> list[Observation]:
+    lead = (TRIALS, *_arms(skill, document))
+    flat = random_observations(np.random.default_rng([8, seed]), int(np.prod(lead)), ticks, dt)
+    return [_shaped(observation, lead) for observation in flat]
+
+
+def _shaped(flat: Observation, lead: tuple[int, ...]) -> Observation:
+    """An observation of trials as one of shape (N, arms, ...)."""
+
+    def of(values: Float) -> Float:
+        return values.reshape(*lead, *values.shape[1:])
+
+    pose = type(flat.pose)(of(flat.pose.position), of(flat.pose.rotation))
+    return Observation(of(flat.time), flat.dt, pose, of(flat.twist), of(flat.wrench))
 
 
 def builds(skill: SkillType, document: Document) -> Iterator[str]:
@@ -71,18 +93,18 @@ def builds(skill: SkillType, document: Document) -> Iterator[str]:
 
 def answers_in_shape(skill: SkillType, document: Document) -> Iterator[str]:
     """Commands have the contract's shapes, finite values, rotations and symmetric gains."""
-    for command in play(skill.build(document), _observations(), range(TRIALS)):
-        problems = list(_command_problems(command, TRIALS))
+    for command in play(skill.build(document), _observations(skill, document), range(TRIALS)):
+        problems = list(_command_problems(command, (TRIALS, *_arms(skill, document))))
         if problems:
             yield from problems
             return
 
 
-def _command_problems(command: Command, n: int) -> Iterator[str]:
+def _command_problems(command: Command, lead: tuple[int, ...]) -> Iterator[str]:
     shapes = {
-        "pose.position": (command.pose.position, (n, 3)), "pose.rotation": (command.pose.rotation, (n, 3, 3)),
-        "twist": (command.twist, (n, 6)), "feedforward": (command.feedforward, (n, 6)),
-        "status": (command.status, (n,)), "reason": (command.reason, (n,)),
+        "pose.position": (command.pose.position, (*lead, 3)), "pose.rotation": (command.pose.rotation, (*lead, 3, 3)),
+        "twist": (command.twist, (*lead, 6)), "feedforward": (command.feedforward, (*lead, 6)),
+        "status": (command.status, lead[:1]), "reason": (command.reason, lead[:1]),
     }  # fmt: skip
     wrong = [f"{k} has shape {np.shape(v)}, expected {s}" for k, (v, s) in shapes.items() if np.shape(v) != s]
     if wrong:
@@ -94,14 +116,14 @@ def _command_problems(command: Command, n: int) -> Iterator[str]:
     rotation = command.pose.rotation
     if np.abs(np.swapaxes(rotation, -1, -2) @ rotation - np.eye(3)).max() > 1e-6:
         yield "pose.rotation is not orthonormal"
-    yield from _gain_problems("stiffness", command.impedance.stiffness, n)
+    yield from _gain_problems("stiffness", command.impedance.stiffness, lead)
     if command.impedance.damping is not None:
-        yield from _gain_problems("damping", command.impedance.damping, n)
+        yield from _gain_problems("damping", command.impedance.damping, lead)
 
 
-def _gain_problems(name: str, gain: Float, n: int) -> Iterator[str]:
-    if np.shape(gain) not in ((6, 6), (n, 6, 6)):
-        yield f"{name} has shape {np.shape(gain)}, expected (6, 6) or ({n}, 6, 6)"
+def _gain_problems(name: str, gain: Float, lead: tuple[int, ...]) -> Iterator[str]:
+    if np.shape(gain) not in ((6, 6), (*lead, 6, 6)):
+        yield f"{name} has shape {np.shape(gain)}, expected (6, 6) or {(*lead, 6, 6)}"
         return
     scale = max(float(np.abs(gain).max()), 1.0)
     if np.abs(gain - np.swapaxes(gain, -1, -2)).max() > 1e-9 * scale:
@@ -112,12 +134,12 @@ def _gain_problems(name: str, gain: Float, n: int) -> Iterator[str]:
 
 def starts_without_a_bump(skill: SkillType, document: Document) -> Iterator[str]:
     """The first command asks for the pose where the tool is, and for next to no force."""
-    observations = _observations(ticks=1, dt=1e-3)
+    observations = _observations(skill, document, ticks=1, dt=1e-3)
     command = play(skill.build(document), observations, range(TRIALS))[0]
     measured = observations[0].pose
     step = norm(command.pose.position - measured.position).max()
     turn = norm(rotation_vector(command.pose.rotation @ np.swapaxes(measured.rotation, -1, -2))).max()
-    force, torque = norm(command.feedforward[:, :3]).max(), norm(command.feedforward[:, 3:]).max()
+    force, torque = norm(command.feedforward[..., :3]).max(), norm(command.feedforward[..., 3:]).max()
     if step > LARGEST_STEP[0] or turn > LARGEST_STEP[1]:
         yield f"the first desired pose is {1e3 * step:.3g} mm and {turn:.3g} rad away from where the tool is"
     if force > LARGEST_FEEDFORWARD[0] or torque > LARGEST_FEEDFORWARD[1]:
@@ -126,7 +148,7 @@ def starts_without_a_bump(skill: SkillType, document: Document) -> Iterator[str]
 
 def rows_equal_single_trials(skill: SkillType, document: Document) -> Iterator[str]:
     """Each row of a batch is commanded as the same trial would be alone."""
-    observations = _observations()
+    observations = _observations(skill, document)
     together = play(skill.build(document), observations, range(TRIALS))
     for i in range(TRIALS):
         alone = play(skill.build(document), [row(o, i) for o in observations], [i])
@@ -137,7 +159,7 @@ def rows_equal_single_trials(skill: SkillType, document: Document) -> Iterator[s
 
 def rows_are_independent(skill: SkillType, document: Document) -> Iterator[str]:
     """What happens in other trials does not reach a trial."""
-    observations, others = _observations(1), _observations(2)
+    observations, others = _observations(skill, document, 1), _observations(skill, document, 2)
     mixed = [_with_row(other, own, 0) for other, own in zip(others, observations, strict=True)]
     first = play(skill.build(document), observations, range(TRIALS))
     second = play(skill.build(document), mixed, [0, *range(100, 99 + TRIALS)])
@@ -163,8 +185,8 @@ def _with_row(base: Observation, other: Observation, i: int) -> Observation:
 def repeats_with_its_seed(skill: SkillType, document: Document) -> Iterator[str]:
     """The same seeds give exactly the same commands, and numpy's global generator is left alone."""
     state = np.random.get_state(legacy=False)  # noqa: NPY002 - watched, not used
-    first = play(skill.build(document), _observations(), range(TRIALS))
-    again = play(skill.build(document), _observations(), range(TRIALS))
+    first = play(skill.build(document), _observations(skill, document), range(TRIALS))
+    again = play(skill.build(document), _observations(skill, document), range(TRIALS))
     yield from _first_difference(first, again, slice(None), 0.0, "the same seeds run twice")
     if str(np.random.get_state(legacy=False)) != str(state):  # noqa: NPY002
         yield "draws from numpy's global generator; use the generators handed to start"
@@ -172,7 +194,7 @@ def repeats_with_its_seed(skill: SkillType, document: Document) -> Iterator[str]
 
 def ends_with_a_reason(skill: SkillType, document: Document) -> Iterator[str]:
     """Status is RUNNING, SUCCESS or FAILURE; what has ended says why, what runs says nothing."""
-    for command in play(skill.build(document), _observations(ticks=200, dt=0.1), range(TRIALS)):
+    for command in play(skill.build(document), _observations(skill, document, ticks=200, dt=0.1), range(TRIALS)):
         status = np.asarray(command.status)
         if not np.issubdtype(status.dtype, np.integer) or not set(status.tolist()) <= {int(s) for s in Status}:
             yield f"status holds {sorted(set(status.tolist()))} ({status.dtype}), expected the integers of Status"
@@ -189,8 +211,8 @@ def survives_json(skill: SkillType, document: Document) -> Iterator[str]:
 
     yield from json_problems(document)
     back = json.loads(json.dumps(document))
-    first = play(skill.build(document), _observations(), range(TRIALS))
-    second = play(skill.build(back), _observations(), range(TRIALS))
+    first = play(skill.build(document), _observations(skill, document), range(TRIALS))
+    second = play(skill.build(back), _observations(skill, document), range(TRIALS))
     yield from _first_difference(first, second, slice(None), 0.0, "built from the document read back")
 
 
@@ -222,8 +244,8 @@ NAMES = ("position", "rotation", "twist", "stiffness", "damping", "feedforward",
 
 def _rows(command: Command, rows: slice) -> Command:
     """Some rows of a command; gains that all rows share are spread first."""
-    n = len(command.status)
-    gains = [None if g is None else np.broadcast_to(g, (n, 6, 6))[rows] for g in command.impedance]
+    lead = command.pose.position.shape[:-1]
+    gains = [None if g is None else np.broadcast_to(g, (*lead, 6, 6))[rows] for g in command.impedance]
     assert gains[0] is not None
     return Command(
         type(command.pose)(*(v[rows] for v in command.pose)), command.twist[rows],

@@ -48,7 +48,8 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     theirs = {key: value for key, value in options.settings.items() if key not in ours}
     settings = build(Settings, ours, "--set")
     frames = _frames(demonstrations)
-    at = options.at or ("tip" if "tip" in frames else None)
+    known = demonstrations[0].meta.get("frames", {})  # without a tip of its own, it is the recorded tool point
+    at = options.at or ("tip" if "tip" in known else None)
     wanted = replace(options, at=at, axes="phase_start", settings=theirs)
     learner = registry().skill(PRIMITIVE).learn
     assert learner is not None
