@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -17,13 +16,14 @@ import pytest
 from skillframe.conditioning.augmented import AugmentedForceFilter, AugmentedSettings
 from skillframe.conditioning.identification import IdentificationSettings
 from skillframe.conditioning.momentum import ForceEstimator, ForceSettings, force_filter
-from tests.crane_press import AIR, DAMPING, DT, LANDED, Case, Press, crane, cylinders, replay
+from tests.crane_press import AIR, DAMPING, DT, LANDED, Press, crane, cylinders, replay
+from tests.crane_scores import case, root_mean_square, score, window
 from tests.figures.teaching import row
 
 pytestmark = pytest.mark.figures
 
 SEEDS, FEW = range(300, 312), range(300, 304)
-SECONDS, SLIDING = 31.0, LANDED + 1.5
+SECONDS = 31.0
 FULL = ForceSettings()
 STATIC = "without the momentum: gravity alone"
 NOMINAL = "without either (nominal model)"
@@ -38,56 +38,11 @@ PARTS = {
 }
 
 
-class Score(NamedTuple):
-    """Per seed: root mean square and maximum of the error, of the normal force and of both components, in % of load."""
-
-    rms: np.ndarray
-    largest: np.ndarray
-    normal_rms: np.ndarray
-    normal_largest: np.ndarray
-    load: np.ndarray
-
-    def __str__(self):
-        return (
-            f"rms {self.rms.mean():.2f} (worst seed {self.rms.max():.2f}) %, max {self.largest.max():.2f} (median seed"
-            f" {np.median(self.largest):.2f}) %; normal force rms {self.normal_rms.mean():.2f} max"
-            f" {self.normal_largest.max():.2f} % of {self.load.mean():.0f} N"
-        )
-
-
-def case(seeds, plate):
-    draws = [np.random.default_rng([seed, 7]) for seed in seeds]
-    friction = np.array([1.0 + 0.2 * rng.choice([-1.0, 1.0], 3) for rng in draws])
-    return Case(friction, np.array([1.0 + 0.02 * rng.choice([-1.0, 1.0]) for rng in draws]), plate)
-
-
 @cache
 def pressed(seeds=SEEDS, plate=1e6, damping=DAMPING):
     """Log, and the estimate of the full filter (replayed, the same as in the loop)."""
     log = Press(case(seeds, plate)._replace(damping=damping), seeds).run(SECONDS)
     return log, *replay(log, ForceEstimator(crane(), cylinders(), len(seeds), DT))
-
-
-def window(log, valid):
-    """Where it is scored, and the same whether valid or not."""
-    fast = (np.abs(log.speed[..., :2]) > 0.010).all(axis=-1) & (np.arange(len(valid)) * DT > SLIDING)[:, None]
-    return fast & valid, fast
-
-
-def score(log, force, chosen):
-    error = force - log.force
-    size, normal = np.hypot(*np.moveaxis(error, -1, 0)), np.abs(error[..., 1])
-    rows = []
-    for i in range(size.shape[1]):
-        at = chosen[:, i]
-        load = log.force[at, i, 1].mean()
-        share = 100.0 / load
-        rows.append([share * f(e[at, i]) for e in (size, normal) for f in (root_mean_square, np.max)] + [load])
-    return Score(*np.array(rows).T)
-
-
-def root_mean_square(x):
-    return np.sqrt(np.mean(x**2))
 
 
 def augmented(log, told):
