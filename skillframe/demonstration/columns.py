@@ -9,6 +9,7 @@ scipy's convention; the columns are taken by axis.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -145,9 +146,10 @@ def select_arm(columns: Columns, arm: str | None) -> Columns:
     """One arm's columns without their prefix; everything else stays as it is.
 
     Raises:
-        InputError: several arms and none chosen, or no such arm.
+        InputError: several arms and none chosen, no such arm, or arms whose clocks differ.
     """
     arms = sorted({name[: -len("_px")] for name in columns if name.endswith("_px")})
+    _refuse_different_clocks(columns, arms)
     if arm is None:
         if arms and "px" not in columns:
             raise InputError(columns.source, f"holds the arms {', '.join(arms)}", f"choose one with --arm {arms[0]}")
@@ -158,6 +160,21 @@ def select_arm(columns: Columns, arm: str | None) -> Columns:
     own = {name.removeprefix(prefix) for name in columns if name.startswith(prefix)}
     kept = {n: v for n, v in columns.items() if not n.startswith(prefix) and n not in own}
     return columns.with_values({**kept, **{n: columns[prefix + n] for n in own}})
+
+
+def _refuse_different_clocks(columns: Columns, arms: Sequence[str]) -> None:
+    """A row of a file holds one moment of all its arms: their own clocks, ARM_t, must agree with each other."""
+    found = {arm: columns.get(f"{arm}_t", columns.get("t")) for arm in arms}
+    clocks = {arm: clock for arm, clock in found.items() if clock is not None}
+    for (one, first), (other, second) in pairwise(clocks.items()):
+        apart = np.abs(first - second)
+        # a tenth of a sample: stamps of one moment taken one after the other differ by less
+        if len(first) > 1 and apart.max() > 0.1 * abs(float(np.median(np.diff(first)))):
+            raise InputError(
+                columns.place(int(np.argmax(apart))),
+                f"the clocks of the arms {one} and {other} differ by {1e3 * apart.max():.3g} ms",
+                "resample the arms onto one clock, or write a file for each",
+            )
 
 
 def with_quaternion(columns: Columns, euler: str | None) -> Columns:

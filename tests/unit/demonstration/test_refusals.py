@@ -244,3 +244,24 @@ def test_a_pickled_array_is_never_loaded(tmp_path: Path) -> None:
 def test_wrong_reading_options_are_refused(rows: Cells, write: Write, options: dict[str, Any], message: str) -> None:
     with pytest.raises(SkillframeError, match=message):
         read_demonstration(write(rows), **options)
+
+
+def of_two_arms(rows: Cells, shift: float, drift: float = 0.0) -> Cells:
+    """The recording twice, each arm with its own clock; the second's shifted and running fast."""
+    names = [f"{arm}_{name}" for arm in ("left", "right") for name in rows[0]]
+    late = [repr(float(row[0]) * (1.0 + drift) + shift) for row in rows[1:]]
+    return [names, *([*row, t, *row[1:]] for row, t in zip(rows[1:], late, strict=True))]
+
+
+@pytest.mark.parametrize("arm", [None, "left", "right"])
+@pytest.mark.parametrize(("shift", "drift", "size"), [(0.02, 0.0, "20 ms"), (0.0, 0.01, "19.9 ms")])
+def test_arms_whose_clocks_differ_are_refused_whichever_is_asked_for(
+    rows: Cells, write: Write, arm: str | None, shift: float, drift: float, size: str
+) -> None:
+    with pytest.raises(InputError, match=f"row .*clocks of the arms left and right differ by {size}.*one clock"):
+        read_demonstration(write(of_two_arms(rows, shift, drift)), arm=arm)
+
+
+def test_arms_whose_stamps_differ_by_less_than_a_tenth_of_a_sample_are_read(rows: Cells, write: Write) -> None:
+    demo = read_demonstration(write(of_two_arms(rows, 5e-4)), arm="right")
+    assert demo.time[0] == 5e-4
