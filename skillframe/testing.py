@@ -182,7 +182,7 @@ class SegmenterConformance:
 
 
 class HoldSkill(Skill):
-    """Holds the pose it started in, for a while or for ever.
+    """Holds the pose it started in, for a while or for ever; as a coordinator, the poses of all arms.
 
     Args:
         stiffness: of translation [N/m] and of rotation [Nm/rad].
@@ -199,12 +199,12 @@ class HoldSkill(Skill):
 
     def step(self, observation: Observation) -> Command:
         """Ask for the pose of the start."""
-        n = len(observation.time)
-        ended = observation.time >= self._duration
+        shape = observation.time.shape
+        ended = observation.time.reshape(shape[0], -1)[:, 0] >= self._duration
         status = np.where(ended, Status.SUCCESS, Status.RUNNING).astype(np.int64)
-        reason = no_reasons(n)
+        reason = no_reasons(shape[0])
         reason[ended] = f"held for {self._duration:g} s"
-        return Command(self._home, np.zeros((n, 6)), self._impedance, np.zeros((n, 6)), status, reason)
+        return Command(self._home, np.zeros((*shape, 6)), self._impedance, np.zeros((*shape, 6)), status, reason)
 
 
 class ScriptedSkill(HoldSkill):

@@ -64,15 +64,19 @@ def test_a_missing_urdf_and_a_missing_file_are_named(save, urdf, tmp_path):
         load_robot(tmp_path / "nowhere" / "robot.urdf")
 
 
-@pytest.mark.parametrize("key", ["loop", "actuation"])
-def test_loops_and_actuators_are_kept_and_refused_when_a_plant_is_asked_for(save, urdf, key):
-    entries = {
-        "loop": 'frame_a = "a"\nframe_b = "b"',
-        "actuation": 'joint = "j"\nfmu = "x"\nparameters = { bore = 0.08 }',
-    }
-    spec = load_robot(save(urdf.tree(0, 2), f"[[{key}]]\n{entries[key]}"))
-    assert len(getattr(spec, key)) == 1
-    with pytest.raises(InputError, match="not simulated yet"):
+@pytest.mark.parametrize(
+    ("entry", "problem"),
+    [
+        ('[[loop]]\nframe_a = "a"\nframe_b = "b"', r"\[\[loop\]\] and no \[\[actuation\]\]; say which joints"),
+        ('[[actuation]]\njoint = "j"\nfmu = "x"\nparameters = { bore = 0.08 }', "names no arm; add"),
+    ],
+)
+def test_loops_nobody_drives_and_a_machine_without_an_arm_are_refused_when_a_plant_is_asked_for(
+    save, urdf, entry, problem
+):
+    spec = load_robot(save(urdf.tree(0, 2), entry))
+    assert len(spec.loop) + len(spec.actuation) == 1
+    with pytest.raises(InputError, match=problem):
         spec.require_simulated()
 
 
