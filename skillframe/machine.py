@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.conditioning.momentum import Estimate, ForceEstimator
-from skillframe.control.hydraulic import Demand, HydraulicGains, HydraulicLaw, Measured, Reference, plane_task
+from skillframe.control.hydraulic import Demand, HydraulicGains, Measured, Reference, plane_task
+from skillframe.control.hydraulic_compiled import CompiledLaw
 from skillframe.control.vdc_actuator import cylinders
 from skillframe.cosim.coupling import coupling_numbers, require_stable
 from skillframe.cosim.master import CosimSettings, Master
@@ -84,7 +85,7 @@ class MachineLoop(Loop):
         super().__init__(skill, setup, draws, rngs, trace_hz)
         spec = setup.robot.spec
         known = cylinders(spec.actuation, spec.folder / "robot.toml")
-        self.law = HydraulicLaw(self.chain, known, HydraulicGains(), self.count, self.dt)
+        self.law = CompiledLaw(self.chain, known, HydraulicGains(), self.count, self.dt)
         self.estimator = ForceEstimator(self.chain, known, self.count, self.dt)
         self.coupled = CoupledPlant(self.plant, self.chain.actuated)
         self.bank = banks(spec, self.count)
