@@ -148,6 +148,22 @@ def test_while_two_pistons_slide_the_estimate_is_valid_and_its_sigma_is_small():
     assert found[-1].sigma.max() < 0.2 * found[0].sigma.max()
 
 
+def test_friction_is_what_was_known_before_and_what_was_found():
+    """At full speed tanh is 1 to 1e-6: (F_C + dF_C) + (F_v + dF_v) v."""
+    z, zd = np.array([0.8, -1.6, 0.5]), np.array([0.2, -0.2, 0.1])
+    known = cylinders(crane().robot.spec.actuation)
+    estimator = ForceEstimator(crane(), known, 1, DT)
+    moving = measured(z, zd, crane().at(z, zd).holding_force())
+    at = terms(crane(), moving.z, moving.rate)
+    estimator.start(moving)
+    for _ in range(300):
+        estimator.step(moving, at)
+    estimator.identification.theta[0, :6] = 800.0, -800.0, 500.0, 3000.0, -2000.0, 0.0
+    coulomb, viscous = known.coulomb_friction + [800.0, -800.0, 500.0], known.viscous_friction + [3000.0, -2000.0, 0.0]
+    expected = coulomb * np.sign(at.piston_rate[0]) + viscous * at.piston_rate[0]
+    np.testing.assert_allclose(estimator.friction(at)[0], expected, rtol=1e-6)
+
+
 def test_rows_of_a_batch_do_not_know_of_each_other():
     z, zd = np.array([[0.8, -1.6, 0.5], [0.6, -1.2, 0.3]]), np.array([[0.2, -0.2, 0.1], [-0.1, 0.2, 0.0]])
     push = np.full(3, 3e4)
