@@ -231,13 +231,6 @@ class ForceEstimator:
         coulomb: Float = (c.coulomb_friction + found.coulomb) * shape
         return coulomb + (c.viscous_friction + found.viscous) * terms.piston_rate
 
-    def friction(self, terms: Terms) -> Float:
-        """(N, k) friction of the pistons [N] as it is believed to be at the last step."""
-        c, theta, k = self._cylinders, self.identification.theta, self._rate.shape[-1]
-        shape = np.tanh(self._rate / self.settings.sliding_speed)
-        coulomb, viscous = c.coulomb_friction + theta[:, :k], c.viscous_friction + theta[:, k : 2 * k]
-        return np.asarray(coulomb * shape + viscous * terms.piston_rate)
-
     def _fill(self, left: Float, terms: Terms, shape: Float) -> Float:
         """(N, n, 3 + 2k + 1) all that passes L: what is left of p', J^T, and the columns of phi."""
         columns, k = self._columns, shape.shape[-1]

@@ -159,7 +159,8 @@ def test_friction_is_what_was_known_before_and_what_was_found():
     for _ in range(300):
         estimator.step(moving, at)
     estimator.identification.theta[0, :6] = 800.0, -800.0, 500.0, 3000.0, -2000.0, 0.0
-    coulomb, viscous = known.coulomb_friction + [800.0, -800.0, 500.0], known.viscous_friction + [3000.0, -2000.0, 0.0]
+    coulomb = known.coulomb_friction + np.array([800.0, -800.0, 500.0])
+    viscous = known.viscous_friction + np.array([3000.0, -2000.0, 0.0])
     expected = coulomb * np.sign(at.piston_rate[0]) + viscous * at.piston_rate[0]
     np.testing.assert_allclose(estimator.friction(at)[0], expected, rtol=1e-6)
 
