@@ -158,7 +158,7 @@ class Loop:
         self.skill_rngs = [pair[1] for pair in children]
         fixture = fixture_poses(robot, draws, count)
         self.plant = Plant(robot, scene, count, fixture, draws, timestep=self.dt)
-        varied = any(key.startswith("grasp.") or key == "robot.mass_scale" for key in draws)
+        varied = any(key.startswith("grasp.") or key in ("robot.mass_scale", "robot.payload") for key in draws)
         self.nominal = Plant(robot, scene, count, fixture, {}, timestep=self.dt) if varied else self.plant
         self.plant.reset(self._configurations(draws))
         self._prepare_rows()

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.actuation.delay import CommandDelay
 from skillframe.conditioning.momentum import Estimate, ForceEstimator
 from skillframe.control.hydraulic import Demand, HydraulicGains, Measured, Reference, plane_task
 from skillframe.control.hydraulic_compiled import CompiledLaw
@@ -27,6 +28,8 @@ from skillframe.errors import InputError
 from skillframe.executor import RAMP_S, Loop, Result, Setup
 from skillframe.frames import Float, Pose
 from skillframe.machine_bank import banks, instance_parameters
+from skillframe.machine_columns import EnergyBill, columns, supply_pressures
+from skillframe.recorder import Recorder
 from skillframe.robot.feasibility import require_feasible
 from skillframe.robot.loops import ClosedChain
 from skillframe.skill import Command, Observation, Skill
@@ -92,7 +95,8 @@ class MachineLoop(Loop):
         self.master = Master(self.coupled, self.bank, CosimSettings(step=self.dt))
         self._pressures = [self.bank.outputs.index(f"pressure_{side}") for side in "ab"]
         self._z = [int(self.plant.model.joint(name).qposadr[0]) for name in self.chain.independent]
-        self._delay = _Delay(draws, self.count, len(known.area_a), self.dt)
+        late = np.asarray(draws.get("actuator.delay", np.zeros(self.count)))
+        self._delay = CommandDelay(np.round(late / self.dt).astype(np.int64), len(known.area_a))
         self._start(draws)
 
     def _configurations(self, draws: Draws) -> Float:
@@ -109,17 +113,21 @@ class MachineLoop(Loop):
 
     def _sensors(self, rngs: Sequence[np.random.Generator], draws: Draws) -> Any:
         n, k = len(self.chain.independent), len(self.chain.actuated)
-        return MachineSensors(MachineSensorSettings(), rngs, n, k, 1.0 / self.setup.robot.spec.control.rate_hz)
+        self.gauges = MachineSensors(MachineSensorSettings(), rngs, n, k, self.dt)
+        return self.gauges
 
     def _start(self, draws: Draws) -> None:
         """FMUs in equilibrium with the load, the step judged against it, sensors and law at rest."""
         z = self._true_z()
-        hold = np.array([self.chain.at(row, np.zeros(len(row))).holding_force() for row in z])
-        self.master.start(0.0, 0.0, instance_parameters(self.setup.robot.spec, draws, hold))
+        hold = self._holding_force(z, draws)
+        own = instance_parameters(self.setup.robot.spec, draws, hold)
+        self.master.start(0.0, 0.0, own)
+        supply = supply_pressures(own, self.law.cylinders.supply_pressure, self.count)
+        self.bill = EnergyBill(self.bank, supply, self.dt)
         if all(self.bank.capabilities(i).rollback for i in range(len(self.chain.actuated))):
             numbers = coupling_numbers(self.bank, self.coupled.effective_mass(), self.dt)
             require_stable(numbers, self.dt, self.chain.actuated)
-        self.sensors.start(z, *self._true_pressures())
+        self.gauges.start(z, *self._true_pressures())
         self.law.start()
         self.home = self.plant.tool_pose().position[:, self.task.axes].copy()
         self.joint = z[:, 2:].copy()
@@ -127,16 +135,28 @@ class MachineLoop(Loop):
         self.demand = Demand(*(np.zeros((self.count, len(self.chain.actuated))) for _ in range(3)))
         self.estimator.start(self._measured())
 
+    def _holding_force(self, z: Float, draws: Draws) -> Float:
+        """(N, k) piston forces that balance the gravity of each trial's own masses at rest."""
+        scale = np.asarray(draws.get("robot.mass_scale", np.ones(self.count)))
+        states = [self.chain.at(row, np.zeros(len(row))) for row in z]
+        hold = np.array([state.holding_force() for state in states])
+        payload = self.setup.robot.spec.payload
+        if payload is not None and "robot.payload" in draws:
+            more = (draws["robot.payload"] - payload.mass)[:, None] * self.chain.load_gravity(z)
+            hold += [np.linalg.solve(state.arms.T, row) for state, row in zip(states, more, strict=True)]
+        return np.asarray(scale[:, None] * hold)
+
     def _true_z(self) -> Float:
-        return self.plant.state[0][:, self._z]
+        z: Float = self.plant.state[0][:, self._z]
+        return z
 
     def _true_pressures(self) -> tuple[Float, Float]:
         a, b = (self.bank.y[:, column].reshape(self.count, -1) for column in self._pressures)
         return a, b
 
     def _measured(self) -> Measured:
-        sensors = self.sensors
-        return Measured(sensors.z, sensors.rate, *sensors.pressures, self.estimate.force)
+        gauges = self.gauges
+        return Measured(gauges.z, gauges.rate, *gauges.pressures, self.estimate.force)
 
     def tare(self) -> None:
         """Swing in the air and identify friction and payload, then hold what was found."""
@@ -156,10 +176,11 @@ class MachineLoop(Loop):
             if not len(self.active):
                 break
         self.estimator.calibrate(False)
+        self.bill.start()
 
     def _sense(self, force_counts: bool = True) -> None:
         """Sample the sensors, and estimate the force from them; in the air it is known to be zero."""
-        self.sensors.sample(self._true_z(), *self._true_pressures())
+        self.gauges.sample(self._true_z(), *self._true_pressures())
         measured = self._measured()
         self.terms = self.law.terms(measured)
         estimate = self.estimator.step(measured, self.terms)
@@ -177,7 +198,8 @@ class MachineLoop(Loop):
         self._valve(reference)
         np.maximum(self.peak, self.plant.contact_force(), out=self.peak)
         if self.recorder is not None:
-            self.recorder.record(tick, time, observation, command, law)
+            machine = self._columns() if self.recorder.due(tick) else None
+            self.recorder.record(tick, time, observation, command, law, machine)
         self._stop_where_due(tick, time, observation, command, observation.pose.position, law)
         if tick % RESIDUAL_TICKS == 0:
             self._watch_bonds(time)
@@ -214,6 +236,7 @@ class MachineLoop(Loop):
     def _drive(self, torque: Float, time: float = 0.0) -> None:
         """One coupled step under valve commands (N, k); trials whose FMU failed end with its sentence."""
         self.coupled.active = self.active
+        self.bill.step(self.coupled.velocity)
         if self.master.step(self._delay.step(torque).ravel()):
             return
         k = len(self.chain.actuated)
@@ -233,30 +256,30 @@ class MachineLoop(Loop):
             bond = int(np.argmax(bad[trial]))
             value = self.master.residual.reshape(self.count, -1)[trial, bond]
             name = self.chain.actuated[bond]
-            text = f"co-simulation of {name}: bond residual {value:.2g} is above {RESIDUAL_LIMIT:g}; take a smaller step"
+            text = (
+                f"co-simulation of {name}: bond residual {value:.2g} is above {RESIDUAL_LIMIT:g}; take a smaller step"
+            )
             self._end(np.array([trial]), time, f"{text} (at {time:.3f} s)", True)
+
+    def _recorder(self, every: int) -> Recorder:
+        return Recorder(self.plant, every, self.coc, machine=columns(len(self.chain.actuated)))
+
+    def _columns(self) -> dict[str, Float]:
+        pressure_a, pressure_b = self.gauges.pressures
+        return {
+            "pressure_a": pressure_a, "pressure_b": pressure_b, "valve": self.demand.valve,
+            "piston_force": self.demand.present - self.estimator.friction(self.terms),
+            "piston_force_true": self.master.force.reshape(self.count, -1), "force_sigma": self.estimate.sigma,
+            "force_valid": self.estimate.valid.astype(float),
+            "energy_supply": self.bill.supply, "energy_pistons": self.bill.pistons,
+        }  # fmt: skip
+
+    def _meta(self, i: int, success: bool, failure: str) -> dict[str, Any]:
+        notes = [*self.law.notes, *self.bank.notes]
+        return {**super()._meta(i, success, failure), "actuators": list(self.chain.actuated), "notes": notes}
 
     def _kinematics(self) -> Kinematics:
         return self.plant.kinematics(self.coc)
-
-
-class _Delay:
-    """Valve commands (N, k) that arrive later, each trial by its own whole number of ticks."""
-
-    def __init__(self, draws: Draws, count: int, k: int, dt: float) -> None:
-        ticks = np.zeros(count, dtype=int)
-        if "actuator.delay" in draws:
-            ticks = np.round(np.asarray(draws["actuator.delay"]) / dt).astype(int)
-        self._ticks, self._now = ticks, 0
-        self._line: Float = np.zeros((int(ticks.max()) + 1, count, k))
-
-    def step(self, command: Float) -> Float:
-        """What arrives now."""
-        length = len(self._line)
-        self._line[self._now % length] = command
-        arrived = self._line[(self._now - self._ticks) % length, np.arange(len(self._ticks))]
-        self._now += 1
-        return arrived
 
 
 def _swing(time: float) -> tuple[Float, Float, float, float]:

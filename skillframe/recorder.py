@@ -6,6 +6,7 @@ trace of the whole run instead of growing without end.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from skillframe.frames import Float, quaternion_from_matrix
 from skillframe.skill import Command, Observation
-from skillframe.trace import COLUMNS, Trace
+from skillframe.trace import COLUMNS, MACHINE, Trace
 from skillframe.world.drawing import drawn_bodies
 from skillframe.world.plant import Plant
 
@@ -21,15 +22,22 @@ CAPACITY, FIRST = 20_000, 1000  # samples per trial: at most, and before the arr
 
 
 class Recorder:
-    """Columns over time, a sample every `every` control ticks; true wrenches are taken at `point` of the tool frame."""
+    """Columns over time, a sample every `every` control ticks; true wrenches are taken at `point` of the tool frame.
 
-    def __init__(self, plant: Plant, every: int, point: Float, capacity: int = CAPACITY) -> None:
+    `machine` names what a hydraulic machine has besides, with the shape of one trial's sample.
+    """
+
+    def __init__(
+        self, plant: Plant, every: int, point: Float, capacity: int = CAPACITY,
+        machine: Mapping[str, tuple[int, ...]] | None = None,
+    ) -> None:  # fmt: skip
         self._plant, self._every, self._point, self._capacity = plant, every, point, capacity
         count = plant.count
         positions, _ = plant.body_poses()
         shapes: dict[str, tuple[int, ...]] = {
             **COLUMNS, "q": (plant.configuration.shape[1],), "body_position": positions.shape[1:],
             "body_quaternion": (positions.shape[1], 4),
+            **{MACHINE + name: shape for name, shape in (machine or {}).items()},
         }  # fmt: skip
         self._data = {
             name: np.zeros((min(capacity, FIRST), count, *shape), np.float32 if name.startswith("body") else np.float64)
@@ -40,10 +48,17 @@ class Recorder:
         self._time = 0.0
         self._bodies: list[dict[str, Any]] | None = None
 
-    def record(self, tick: int, time: float, observation: Observation, command: Command, law: Float) -> None:
+    def due(self, tick: int) -> bool:
+        """Is a sample taken at this tick?"""
+        return tick % self._every == 0
+
+    def record(
+        self, tick: int, time: float, observation: Observation, command: Command, law: Float,
+        machine: Mapping[str, Float] | None = None,
+    ) -> None:  # fmt: skip
         """Take a sample if one is due at this tick."""
         self._time = time
-        if tick % self._every:
+        if not self.due(tick):
             return
         if self._length == len(self._data["time"]):
             self._make_room()
@@ -54,6 +69,7 @@ class Recorder:
             "wrench_true": self._plant.contact_wrench(self._point), "desired_position": command.pose.position,
             "desired_quaternion": quaternion_from_matrix(command.pose.rotation), "command_wrench": law,
             "q": self._plant.configuration, "body_position": positions, "body_quaternion": quaternions,
+            **{MACHINE + name: value for name, value in (machine or {}).items()},
         }  # fmt: skip
         for name, value in sample.items():
             self._data[name][self._length] = value
@@ -81,6 +97,7 @@ class Recorder:
         if self._stop[i] >= 0.0:
             length = int(np.searchsorted(self._data["time"][: self._length, i], self._stop[i], side="right"))
         arrays = {name: array[:length, i] for name, array in self._data.items()}
+        machine = {name.removeprefix(MACHINE): arrays.pop(name) for name in list(arrays) if name.startswith(MACHINE)}
         if self._bodies is None:
             self._bodies = drawn_bodies(self._plant)
-        return Trace(**arrays, meta={**meta, "bodies": self._bodies})
+        return Trace(**arrays, machine=machine, meta={**meta, "bodies": self._bodies})

@@ -18,6 +18,8 @@ from skillframe.errors import InputError
 from skillframe.frames import Float
 
 FORMAT, VERSION = "skillframe.trace", 1
+MACHINE = "machine_"
+"""Begins the names of a hydraulic machine's arrays in a file."""
 COLUMNS = {
     "time": (),
     "position": (3,),
@@ -45,10 +47,15 @@ class Trace:
         command_wrench: (T, 6) the law's output at that point, robot on environment, base axes.
         q: (T, nq) configuration.
         body_position, body_quaternion: (T, B, 3), (T, B, 4) poses of the drawn bodies in base, x, y, z, w.
+        machine: of a hydraulic machine with k actuators, else empty: `pressure_a`, `pressure_b` (T, k) measured [Pa],
+            `valve` (T, k) commanded, `piston_force` (T, k) from pressures and friction as known, `piston_force_true`
+            (T, k) [N], `force_sigma` (T, 2) of the estimated contact force in the machine's plane [N], `force_valid`
+            (T,), `energy_supply` and `energy_pistons` (T,) since the start [J].
         meta: `robot`, `world`, `params`, `seed`, `trial`, `draws`, `success`, `failure`, `status`, `reason`,
             `duration_s`, `peak_force_n`, `final_error_m`, `final_error_rad`, `center_of_compliance`, `skill`,
-            `events` ([[t, text]]), and `bodies`: [{`name`, `geoms`: [{`kind`, `size`, `position`, `quaternion`,
-            `rgba`, `vertices`, `faces`}]}] in the order of the body arrays.
+            `events` ([[t, text]]), `actuators` (names of a machine's), `notes` (sentences about what stood in for
+            what), and `bodies`: [{`name`, `geoms`: [{`kind`, `size`, `position`, `quaternion`, `rgba`, `vertices`,
+            `faces`}]}] in the order of the body arrays.
     """
 
     time: Float
@@ -63,11 +70,13 @@ class Trace:
     q: Float
     body_position: Float
     body_quaternion: Float
+    machine: dict[str, Float] = field(default_factory=dict)
     meta: dict[str, Any] = field(default_factory=dict)
 
     def save(self, path: Path) -> None:
         """Write the trace, whole or not at all."""
         arrays = {name: getattr(self, name) for name in [*COLUMNS, "q", "body_position", "body_quaternion"]}
+        arrays.update({MACHINE + name: array for name, array in self.machine.items()})
         meta = json.dumps({"format": FORMAT, "version": VERSION, **self.meta}, sort_keys=True)
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary = path.with_name(path.name + ".tmp")
@@ -95,12 +104,16 @@ class Trace:
             raise InputError(path, f"has format {said!r}, not {FORMAT!r}", "give a trace file")
         if not isinstance(meta.get("version"), int) or meta["version"] > VERSION:
             raise InputError(path, f"is of version {meta.get('version')}, newer than {VERSION}", "update skillframe")
+        machine = {name: arrays.pop(name) for name in list(arrays) if name.startswith(MACHINE)}
         _check_arrays(path, arrays)
-        return cls(**arrays, meta=meta)
+        for name, array in machine.items():
+            if not array.ndim or len(array) != len(arrays["time"]):
+                raise InputError(path, f"array {name} has the shape {array.shape}", "write the trace again")
+        return cls(**arrays, machine={name.removeprefix(MACHINE): array for name, array in machine.items()}, meta=meta)
 
 
 def _check_arrays(path: Path, arrays: dict[str, Float]) -> None:
-    wanted = {f.name for f in fields(Trace)} - {"meta"}
+    wanted = {f.name for f in fields(Trace)} - {"machine", "meta"}
     if set(arrays) != wanted:
         odd = ", ".join(sorted(set(arrays) ^ wanted))
         raise InputError(path, f"lacks, or does not know, the arrays {odd}", "write the trace again")

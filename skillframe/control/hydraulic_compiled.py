@@ -64,7 +64,8 @@ class CompiledLaw:
             *relative_bounds(nominal, gains.share), cylinder_table(self.cylinders), np.array(gains.velocity),
             np.array(gains.force), self._scalars,
         )  # fmt: skip
-        inputs = [*self._measured, *self._reference, self.theta, self._memory, *knowledge]
+        given = [part for part in self._reference if part is not None]
+        inputs = [*self._measured, *given, self.theta, self._memory, *knowledge]
         law, terms = law_function(self.chain, axes), terms_function(self.chain, axes)
         self._steps = [
             Batch(law, inputs, [*out, self._learned, self._next], _SHARED, use_compiler=use_compiler)
@@ -91,6 +92,7 @@ class CompiledLaw:
     def step(self, measured: Measured, reference: Reference, ids: NDArray[np.int64]) -> Demand:
         """A sample for the trials in `ids`, the other rows mean nothing; the call after next uses the arrays again."""
         for own, given in zip((*self._measured, *self._reference), (*measured, *reference), strict=True):
+            assert own is not None
             np.copyto(own, 0.0 if given is None else given)
         self._turn ^= 1
         self._steps[self._turn](ids)

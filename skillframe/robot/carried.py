@@ -1,4 +1,4 @@
-r"""Gravity of one more kilogram in the grip, for many configurations at once.
+r"""Another payload than declared: its inertia, and gravity of one more kilogram in the grip, for many machines at once.
 
 The link that robot.toml's `[payload]` names hangs on independent joints only. With the joints' axes \(a_j\) and origins
 \(o_j\) in base from the product of exponentials, and the link's centre of mass c,
@@ -13,13 +13,38 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from skillframe.errors import InputError
 from skillframe.frames import Float
-from skillframe.robot.payload import published_inertia
+from skillframe.robot.model import RobotModel, load_model
+from skillframe.robot.payload import published_inertia, with_payload
 
 if TYPE_CHECKING:
     from skillframe.robot.loops import ClosedChain
+
+
+def loaded_inertias(robot: RobotModel, masses: Float) -> tuple[str, list[pin.Inertia]]:
+    """Joint that moves the payload, and the inertia of all that moves with it for payloads of masses (N,) [kg].
+
+    Inertia's ten parameters are linear in the payload (`payload`), so two models give all of them.
+
+    Raises:
+        InputError, UnknownName: as `with_payload`.
+    """
+    for mass in masses:
+        with_payload(robot.spec, float(mass))
+    payload = robot.spec.payload
+    assert payload is not None
+    joint = robot.model.frames[robot.model.getFrameId(payload.link)].parentJoint
+    empty, full = (
+        load_model(with_payload(robot.spec, mass)).model.inertias[joint].toDynamicParameters()
+        for mass in (0.0, payload.rating)
+    )
+    per_kilogram = (full - empty) / max(payload.rating, 1e-9)
+    return str(robot.model.names[joint]), [
+        pin.Inertia.FromDynamicParameters(empty + float(mass) * per_kilogram) for mass in masses
+    ]
 
 
 class _Joint(NamedTuple):

@@ -1,7 +1,8 @@
 """A batch of simulated machines as the mechanics of a co-simulation: one power bond per trial and piston joint.
 
 Bonds run trial by trial, as actuators do in their bank. MuJoCo holds generalised forces over a step, so a force that
-goes linearly from F0 to F1 acts as its mean, which leaves the coupling of second order (position error H^3 F'/12 m a step).
+goes linearly from F0 to F1 acts as its mean, which leaves the coupling of second order
+(position error H^3 F'/12 m a step).
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ class CoupledPlant:
         self._dofs = np.array([plant.model.joint(name).dofadr[0] for name in joints])
         self.active: NDArray[np.int64] = np.arange(self.trials)
         self.load: Float = np.zeros((self.trials, plant.model.nv))
-        self._saved: tuple[Float, ...] = ()
+        self._saved: tuple[Float, Float] = plant.state
 
     def motion(self, force: Float) -> Motion:
         """Motion (count,) of the pistons now, with forces (count,) [N] acting on them."""
@@ -50,6 +51,12 @@ class CoupledPlant:
         return Motion(
             position[:, self._qpos].ravel(), velocity[:, self._dofs].ravel(), acceleration[:, self._dofs].ravel()
         )
+
+    @property
+    def velocity(self) -> Float:
+        """(trials, joints) of the driven joints now."""
+        velocity: Float = self.plant.state[1][:, self._dofs]
+        return velocity
 
     def advance(self, begin: Float, end: Float, step: float) -> None:
         """Advance by the plant's time step under forces (count,) that go linearly from `begin` to `end`.
@@ -75,7 +82,8 @@ class CoupledPlant:
 
     def save(self) -> None:
         """Remember the state, for `restore`."""
-        self._saved = tuple(part.copy() for part in self.plant.state)
+        position, velocity = self.plant.state
+        self._saved = position.copy(), velocity.copy()
 
     def restore(self) -> None:
         """Return to the state of the last `save`."""

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float, Pose, move_wrench, norm, quaternion_from_matrix, rotate, rotation_matrix
+from skillframe.robot.carried import loaded_inertias
 from skillframe.robot.model import RobotModel
 from skillframe.world.convert import FIXTURE, SECOND, TIMESTEP, build_spec, held
 from skillframe.world.layout import Layout
@@ -89,7 +90,7 @@ class Plant:
             friction_loss = draws["robot.joint_friction"][:, None] * self._layout.friction_share(self.robot)
             self.batch.expand("dof_frictionloss")[:] = friction_loss
         grasp = grasp_pose(draws, self.count)
-        inertial = False
+        inertial = self._load(draws)
         if grasp is not None:
             self.batch.expand("body_pos")[:, self._layout.tool] = grasp.position
             q = quaternion_from_matrix(grasp.rotation)
@@ -103,6 +104,20 @@ class Plant:
             inertial = True
         if inertial:
             self.batch.set_const()
+
+    def _load(self, draws: Draws) -> bool:
+        """Give each trial its own payload; whether there was one to give."""
+        if "robot.payload" not in draws:
+            return False
+        name, inertias = loaded_inertias(self.robot, draws["robot.payload"])
+        body = self.model.body(name).id
+        axes = [np.linalg.eigh(inertia.inertia) for inertia in inertias]
+        turns = np.array([basis * np.sign(np.linalg.det(basis)) for _, basis in axes])
+        self.batch.expand("body_mass")[:, body] = [inertia.mass for inertia in inertias]
+        self.batch.expand("body_ipos")[:, body] = [inertia.lever for inertia in inertias]
+        self.batch.expand("body_inertia")[:, body] = [moments for moments, _ in axes]
+        self.batch.expand("body_iquat")[:, body] = quaternion_from_matrix(turns)[:, [3, 0, 1, 2]]
+        return True
 
     def reset(self, configuration: Float) -> None:
         """Put the robot at rest at configurations (N, nq), in Pinocchio's order, and the fixture at its pose."""
@@ -143,7 +158,8 @@ class Plant:
         """Accelerations (N, nv) of some trials under generalised forces (N, nv), MuJoCo's order; no time passes."""
         self._applied[:] = torque
         self.batch.forward(ids=ids)
-        return self._acceleration
+        acceleration: Float = self._acceleration
+        return acceleration
 
     def tool_pose(self) -> Pose:
         """Pose of the robot's tool frame (where the sensor sits) in base."""

@@ -21,7 +21,7 @@ FLOORS = [
     {"sequence", "skillfile", "robot", "registry", "skillsource"},
     {"control", "actuation"},
     {"cosim", "world"},
-    {"executor", "arms", "machine", "machine_bank", "recorder", "trace", "prepare"},
+    {"executor", "arms", "machine", "machine_bank", "machine_columns", "recorder", "trace", "prepare"},
     {"teacher", "staged_teacher", "blind_teacher", "metrics", "campaign"},
     {"report", "demonstrate", "demonstrate_blind"},
     {"conformance", "testing", "quickstart", "reproduce"},
@@ -47,6 +47,7 @@ LOOP = {
     "arms",
     "machine",
     "machine_bank",
+    "machine_columns",
 }
 SET_UP = {  # finds, builds and unpacks FMUs before a run, simulates one alone, holds a foreign one in its own process
     f"skillframe/actuation/{name}.py"

@@ -1,0 +1,29 @@
+"""Commands that arrive later at their actuators: transport over a bus, or a valve's own dead time."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.frames import Float
+
+
+class CommandDelay:
+    """Commands (N, k) that arrive later, each trial's by its own whole number of samples; zero before the first.
+
+    Args:
+        ticks: (N,) samples of delay.
+        k: commands of a trial.
+    """
+
+    def __init__(self, ticks: NDArray[np.int64], k: int) -> None:
+        self._ticks, self._now, self._rows = ticks, 0, np.arange(len(ticks))
+        self._line: Float = np.zeros((int(ticks.max(initial=0)) + 1, len(ticks), k))
+
+    def step(self, command: Float) -> Float:
+        """What arrives now, when this is sent."""
+        length = len(self._line)
+        self._line[self._now % length] = command
+        arrived: Float = self._line[(self._now - self._ticks) % length, self._rows]
+        self._now += 1
+        return arrived

@@ -1,0 +1,69 @@
+"""What the trace of a hydraulic machine holds besides a robot's, and its energy bill.
+
+    E_supply = int p_S sum(max(q_a, 0) + max(q_b, 0)) dt,     E_pistons = int sum(F v) dt                          (1)
+
+q flows into a chamber. The pump's line gives what flows in, at the pressure that its cylinder was given; the pistons
+pass on F v, the trapezoidal rule; the rest heats oil in valves and seals, or is left in oil and moving masses.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from skillframe.frames import Float
+
+if TYPE_CHECKING:
+    from skillframe.actuation.actuator import Actuators
+
+__all__ = ["EnergyBill", "columns", "supply_pressures"]
+
+
+def columns(k: int) -> dict[str, tuple[int, ...]]:
+    """Names and shapes of one sample for k cylinders."""
+    each = dict.fromkeys(("pressure_a", "pressure_b", "valve", "piston_force", "piston_force_true"), (k,))
+    return {**each, "force_sigma": (2,), "force_valid": (), "energy_supply": (), "energy_pistons": ()}
+
+
+class EnergyBill:
+    """Equation (1) for N machines of k cylinders.
+
+    Args:
+        bank: their actuators; the supply's share is not known where they do not show `flow_a` and `flow_b`.
+        supply: (N, k) pressures p_S [Pa].
+        dt: sample time [s].
+
+    Attributes:
+        supply, pistons: (N,) [J] since `start`; NaN where it is not known.
+    """
+
+    def __init__(self, bank: Actuators, supply: Float, dt: float) -> None:
+        self._bank, self._pressure, self._dt = bank, supply, dt
+        names = bank.outputs
+        self._flows = [names.index(f"flow_{side}") for side in "ab"] if "flow_a" in names and "flow_b" in names else []
+        self._force = names.index("force")
+        self.start()
+
+    def start(self) -> None:
+        """Begin a new bill."""
+        count = len(self._pressure)
+        self.supply: Float = np.full(count, 0.0 if self._flows else np.nan)
+        self.pistons: Float = np.zeros(count)
+        self._power: Float | None = None
+
+    def step(self, velocity: Float) -> None:
+        """Add a sample; velocity (N, k) of the pistons."""
+        y, shape = self._bank.y, self._pressure.shape
+        for column in self._flows:
+            self.supply += self._dt * np.sum(self._pressure * np.maximum(y[:, column].reshape(shape), 0.0), axis=-1)
+        power = np.sum(y[:, self._force].reshape(shape) * velocity, axis=-1)
+        self.pistons += self._dt * 0.5 * (power + (power if self._power is None else self._power))
+        self._power = power
+
+
+def supply_pressures(parameters: list[dict[str, float]], known: Float, count: int) -> Float:
+    """(N, k) supply pressures of the instances: what a trial was given, else what is known (k,)."""
+    given = [row.get("supply_pressure", np.nan) for row in parameters]
+    pressure: Float = np.array(given, dtype=float).reshape(count, -1)
+    return np.where(np.isfinite(pressure), pressure, known)
