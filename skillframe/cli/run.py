@@ -78,6 +78,8 @@ def _write_replay(trace: Trace, path: Path) -> None:
 def _tell(meta: dict[str, Any], out: Path | None, replay: Path | None, as_json: bool) -> None:
     keys = ["success", "failure", "reason", "duration_s", "peak_force_n", "final_error_m", "final_error_rad"]
     outcome = {key: meta[key] for key in keys}
+    for text in meta.get("notes") or []:
+        click.echo(f"note: {text}", err=True)
     if as_json:
         click.echo(json.dumps({**outcome, "trace": str(out) if out else None}, sort_keys=True))
         return

@@ -126,7 +126,10 @@ def _read_off(trace: Trace) -> list[tuple[float, str]]:
 
 
 def run_plots(trace: Trace, force_limit: float | None = None) -> list[Markup]:
-    """Force, position, attitude and torque of a run; the force limit [N] if the trace does not know it."""
+    """Force, position, attitude and torque of a run; the force limit [N] if the trace does not know it.
+
+    A hydraulic machine's estimate knows no torque, and its tool's attitude follows from the joints: both are left out.
+    """
     time, events = np.asarray(trace.time, dtype=float), events_of(trace)
     limit = (trace.meta.get("limits") or {}).get("force_n", force_limit)
     true_size = Curve(name="in the simulator", values=norm(trace.wrench_true[:, :3]), stroke="line faint")
@@ -134,7 +137,7 @@ def run_plots(trace: Trace, force_limit: float | None = None) -> list[Markup]:
     origin, first = trace.position[0], trace.quaternion[:1]
     moved = _pairs(1e3 * (trace.desired_position - origin), 1e3 * (trace.position - origin))
     turns = _pairs(turned(trace.desired_quaternion, first), turned(trace.quaternion, first))
-    return [
+    plots = [
         time_plot("Contact force", "N", time, [true_size, *_components(trace.wrench[:, :3], "thin"), size],
                   limit=None if limit is None else float(limit), events=events, caption=FORCE_CAPTION),
         time_plot("Position", "mm", time, moved, events=events, caption=POSITION_CAPTION),
@@ -142,6 +145,7 @@ def run_plots(trace: Trace, force_limit: float | None = None) -> list[Markup]:
         time_plot("Contact torque", "Nm", time, _components(trace.wrench[:, 3:], ""), events=events,
                   caption=TORQUE_CAPTION),
     ]  # fmt: skip
+    return plots[:2] if trace.machine else plots
 
 
 def demonstration_plots(demonstration: Demonstration) -> Markup:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from skillframe.report.machine import machine_plots
 from skillframe.report.markup import Markup, data_uri, figure, join, json_script, note, number, table, tag
 from skillframe.report.plots import demonstration_plots, events_of, run_plots
 from skillframe.report.quantities import quantity
@@ -50,9 +51,12 @@ def run_block(run: Run, identifier: str, scenes: dict[str, Markup], force_limit:
         if stage
         else note("This trace holds no geometry, so it can only be plotted.")
     )
-    plots = run_plots(run.trace, force_limit)
+    plots = [*run_plots(run.trace, force_limit), *machine_plots(run.trace)]
     beside = tag("div", show, tag("div", *plots[:2], class_="plots"), class_="stagebox")
-    return tag("article", head, beside, tag("div", *plots[2:], class_="stagebox"), _stills(run, stage), class_="run")
+    said = [note(str(text)) for text in meta.get("notes") or []]
+    return tag(
+        "article", head, *said, beside, tag("div", *plots[2:], class_="stagebox"), _stills(run, stage), class_="run"
+    )
 
 
 def _title(run: Run) -> str:
