@@ -68,7 +68,8 @@ def describe(spec: CampaignSpec) -> dict[str, Any]:
     return {
         "world": scene.name, "params": scene.params, "analytic": scene.analytic, "friction": scene.friction,
         "analytic_over": _analytic_over(spec),
-        "fixture": [geom_json(g) for g in scene.fixture], "tool": tool,
+        "fixture": [geom_json(g) for g in (*scene.fixture, *(g for part in scene.sprung for g in part.geoms))],
+        "tool": tool,
     }  # fmt: skip
 
 

@@ -92,7 +92,7 @@ def _start(scene: Scene, trials: int) -> State:
 
 
 def _geoms(scene: Scene) -> list[Geom]:
-    return [*scene.fixture, *scene.tool.geoms]
+    return [*scene.fixture, *scene.tool.geoms, *(g for part in scene.sprung for g in part.geoms)]
 
 
 def _fingerprint(scene: Scene) -> str:

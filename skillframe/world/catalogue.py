@@ -8,7 +8,7 @@ from typing import Any
 from skillframe.config import build
 from skillframe.records import WorldType
 from skillframe.world.scene import Scene
-from skillframe.world.worlds import corner, edge, free, funnel, hose_coupler, peg_in_hole, socket, valley
+from skillframe.world.worlds import corner, edge, free, funnel, hose_coupler, pallets, peg_in_hole, socket, valley
 
 
 def world_types() -> Iterable[WorldType]:
@@ -32,6 +32,10 @@ def world_types() -> Iterable[WorldType]:
     yield WorldType(
         name="corner", summary="a box to set down and push into a corner", params=corner.CornerParams,
         build=corner.build,
+    )  # fmt: skip
+    yield WorldType(
+        name="pallets", summary="a stack of pallets and a stop, for machines", params=pallets.PalletsParams,
+        build=pallets.build,
     )  # fmt: skip
 
 

@@ -17,13 +17,14 @@ from skillframe.errors import SkillframeError
 from skillframe.frames import matrix_from_quaternion, quaternion_from_matrix
 from skillframe.robot.model import RobotModel
 from skillframe.world.loops import close_loops
-from skillframe.world.scene import Geom, Holder, Scene, Tool
+from skillframe.world.scene import Geom, Holder, Scene, Sprung, Tool
 
 TIMESTEP = 0.001
 SOLREF = (0.004, 1.0)  # 4 time steps, critically damped
 SOLIMP = (0.01, 0.95, 1e-4, 0.5, 1.0)  # impedance ramps up from almost nothing at touch: no chatter
 IMPRATIO = 20.0  # friction stiff enough that a jammed peg does not creep in
 FIXTURE, TOOL, SENSOR, SECOND = "fixture", "tool", "sensor", "second_sensor"
+SPRUNG = "sprung_"  # what the names of the bodies and joints of sprung parts begin with
 STICTION_SOLREF, STICTION_SOLIMP = (0.004, 1.0), (0.99, 0.999, 1e-3, 0.5, 2.0)  # joint friction that hardly creeps
 _KINDS = {
     "box": mujoco.mjtGeom.mjGEOM_BOX, "sphere": mujoco.mjtGeom.mjGEOM_SPHERE, "plane": mujoco.mjtGeom.mjGEOM_PLANE,
@@ -50,7 +51,21 @@ def build_spec(robot: RobotModel, scene: Scene, timestep: float = TIMESTEP) -> m
     fixture = fixture or spec.worldbody.add_body(name=FIXTURE, mocap=True)
     for index, geom in enumerate(scene.fixture):
         add_geom(spec, fixture, geom, f"{FIXTURE}_{index}", contype=1, conaffinity=2, friction=scene.friction)
+    for part in scene.sprung:
+        _add_sprung(spec, fixture, part, scene.friction)
     return spec
+
+
+def _add_sprung(spec: mujoco.MjSpec, fixture: Any, part: Sprung, friction: float) -> None:
+    """A part of the fixture on a slide joint: spring, damper, no weight."""
+    name = SPRUNG + part.name
+    body = fixture.add_body(name=name, gravcomp=1.0)
+    set_inertia(body, pin.Inertia(part.mass, np.zeros(3), part.mass * np.eye(3)))
+    joint = body.add_joint(name=name, axis=part.axis, type=mujoco.mjtJoint.mjJNT_SLIDE)
+    joint.stiffness = [part.stiffness, 0.0, 0.0]
+    joint.damping = [2.0 * part.damping_ratio * np.sqrt(part.stiffness * part.mass), 0.0, 0.0]
+    for index, geom in enumerate(part.geoms):
+        add_geom(spec, body, geom, f"{name}_{index}", contype=1, conaffinity=2, friction=friction)
 
 
 def held(robot: RobotModel, scene: Scene) -> bool:

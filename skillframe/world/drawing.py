@@ -7,7 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from skillframe.world.convert import FIXTURE, TOOL
+from skillframe.world.convert import FIXTURE, SPRUNG, TOOL
 from skillframe.world.plant import Plant
 from skillframe.world.scene import Geom
 from skillframe.world.visuals import link_geoms
@@ -15,12 +15,13 @@ from skillframe.world.visuals import link_geoms
 
 def drawn_bodies(plant: Plant) -> list[dict[str, Any]]:
     """Name and geoms of every body of the plant but the world, in the order of `Plant.body_poses`."""
-    links = link_geoms(plant.robot)
+    scene = plant.scene
+    known = {**link_geoms(plant.robot), FIXTURE: scene.fixture, TOOL: scene.tool.geoms}
+    known.update({SPRUNG + part.name: part.geoms for part in scene.sprung})
     bodies = []
     for body in range(1, plant.model.nbody):
         name = mujoco.mj_id2name(plant.model, mujoco.mjtObj.mjOBJ_BODY, body)
-        geoms = {FIXTURE: plant.scene.fixture, TOOL: plant.scene.tool.geoms}.get(name, links.get(name, ()))
-        bodies.append({"name": name, "geoms": [geom_json(g) for g in geoms if g.visible]})
+        bodies.append({"name": name, "geoms": [geom_json(g) for g in known.get(name, ()) if g.visible]})
     return bodies
 
 

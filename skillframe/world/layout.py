@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from skillframe.frames import Float, cross
 from skillframe.robot.model import RobotModel
-from skillframe.world.convert import FIXTURE, SECOND, SENSOR, TOOL
+from skillframe.world.convert import FIXTURE, SECOND, SENSOR, SPRUNG, TOOL
 
 
 class Layout:
@@ -27,9 +27,11 @@ class Layout:
         self.root = int(model.body_rootid[self.tool])
         first = int(model.sensor(f"{sensor}_force").adr[0])
         self.readings = slice(first, first + 6)
-        fixed = {0} | {b for b in range(model.nbody) if model.body(b).name in (FIXTURE, TOOL, SENSOR, SECOND)}
+        fixed = {0} | {b for b in range(model.nbody) if _no_link(model.body(b).name)}
         self.links = np.array([b for b in range(model.nbody) if b not in fixed])
         self.free = bool(model.njnt and model.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE)
+        sprung = [j for j in range(model.njnt) if model.joint(j).name.startswith(SPRUNG)]
+        self.sprung = model.jnt_dofadr[sprung].astype(np.int64)
         self._set_chain(model)
         self._rows, self._columns = _sparse_indices(model)
 
@@ -50,6 +52,7 @@ class Layout:
     def friction_share(self, robot: RobotModel) -> Float:
         """(nv,) part of the drawn joint friction that each generalised velocity gets."""
         share = np.ones(self.model.nv)
+        share[self.sprung] = 0.0
         for name, part in robot.spec.friction_share.items():
             share[self.model.joint(name).dofadr[0]] = part
         return share
@@ -109,6 +112,10 @@ class Layout:
             else:
                 configuration[:, start] = qpos[:, address]
         return configuration
+
+
+def _no_link(name: str) -> bool:
+    return name in (FIXTURE, TOOL, SENSOR, SECOND) or name.startswith(SPRUNG)
 
 
 def _span(indices: NDArray[np.int64]) -> slice | NDArray[np.int64]:

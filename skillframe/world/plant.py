@@ -151,15 +151,20 @@ class Plant:
 
     def step(self, torque: Float, ids: NDArray[np.int64]) -> None:
         """Advance some trials by one time step under generalised forces (N, nv) in MuJoCo's order."""
-        self._applied[:] = torque
+        self._apply_torque(torque)
         self.batch.step(ids=ids, stage=mujoco.mjtStage.mjSTAGE_VEL)
 
     def acceleration(self, torque: Float, ids: NDArray[np.int64]) -> Float:
         """Accelerations (N, nv) of some trials under generalised forces (N, nv), MuJoCo's order; no time passes."""
-        self._applied[:] = torque
+        self._apply_torque(torque)
         self.batch.forward(ids=ids)
         acceleration: Float = self._acceleration
         return acceleration
+
+    def _apply_torque(self, torque: Float) -> None:
+        """Nothing drives the fixture's sprung parts; a controller that cancels gravity would lift them."""
+        self._applied[:] = torque
+        self._applied[:, self._layout.sprung] = 0.0
 
     def tool_pose(self) -> Pose:
         """Pose of the robot's tool frame (where the sensor sits) in base."""

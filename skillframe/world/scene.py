@@ -77,6 +77,28 @@ class Holder:
     quaternion: tuple[float, float, float, float] = IDENTITY
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sprung:
+    """A part of the fixture that yields: geoms on a massive plate that slides along one axis, on a spring and a damper.
+
+    F = K s, with damping 2 zeta sqrt(K m): so a surface has a stiffness in N/m, which the contact itself, whose
+    stiffness depends on the masses that touch, has not. Its weight is compensated; at rest it does not sag.
+
+    Attributes:
+        name: one of its own among the scene's sprung parts.
+        geoms: in the fixture frame, undeflected.
+        axis: unit vector of the fixture frame along which it slides.
+        stiffness: K [N/m]; mass: m [kg]; damping_ratio: zeta.
+    """
+
+    name: str
+    geoms: tuple[Geom, ...]
+    axis: Vector
+    stiffness: float
+    mass: float = 40.0
+    damping_ratio: float = 0.5
+
+
 class State(NamedTuple):
     """Where the tool is, seen from the fixture, for goal predicates; N trials.
 
@@ -122,6 +144,7 @@ class Scene:
 
     Attributes:
         fixture: geoms in the fixture frame.
+        sprung: parts of the fixture that yield.
         friction: Coulomb coefficient of every contact between tool and fixture.
         start_tip: (3,) nominal start of the tip in the fixture frame.
         start_quaternion: nominal attitude of the tool frame in the fixture frame.
@@ -143,6 +166,7 @@ class Scene:
     goal: Callable[[State], NDArray[np.bool_]]
     goal_error: Callable[[State], tuple[Float, Float]]
     task: Task
+    sprung: tuple[Sprung, ...] = ()
     start_lift: Callable[[Float, Float], Float] = field(default=lambda offset, tilt: np.zeros(len(offset)))
     holder: Holder | None = None
     analytic: dict[str, float] = field(default_factory=dict)
