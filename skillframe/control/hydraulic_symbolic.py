@@ -45,7 +45,8 @@ def law_function(chain: ClosedChain, axes: tuple[int, int]) -> ca.Function:
     """One sample of the law for one trial.
 
     Inputs: z, zd, pressure_a, pressure_b, force; position, velocity, stiffness, damping, push, joint, joint_rate,
-    acceleration; theta, filter (2, k), theta's lower and upper bounds, cylinders (13, k), k_x, k_f, the scalars of `SCALARS`.
+    acceleration; theta, filter (2, k), theta's lower and upper bounds, cylinders (13, k), k_x, k_f, the scalars of
+    `SCALARS`.
     Outputs: valve, required and present force, theta, filter.
     """
     s = SymbolicChain(chain)

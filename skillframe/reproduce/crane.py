@@ -1,40 +1,131 @@
-"""Rows of the hydraulic crane: what its model alone can answer, and what is not run here.
+"""Rows of the hydraulic crane: what its model alone can answer, what its loop answers, and what is not run here.
 
-Holding forces follow from gravity at rest, F = J_p^-T g(z), and pressures from F = p_a A_a - p_b A_b.
+Holding forces follow from gravity at rest, F = J_p^-T g(z), and pressures from F = p_a A_a - p_b A_b. Runs are those of
+`crane_runs`: cylinders as FMUs, force from pressures, friction and payload identified in the air before.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 from skillframe.records import RowResult, RowRun, RowType
 
+if TYPE_CHECKING:
+    from skillframe.executor import Result
+    from skillframe.frames import Float
+
 START = (math.pi / 4, -math.pi / 2, 0.5)
 PRESSURES = {"lift": (130.0e5, 30.9148e5), "tilt": (90.0e5, 35.7169e5)}  # [Pa], published start values
-LOOP = "the crane's co-simulated run is not part of this command yet"
+DATA = "HydraulicManipulatorVDC"
+ERRORS = ((1.0, 1.0), (0.9, 0.8), (1.1, 1.2), (0.9, 1.2), (1.1, 0.8))
+"""Mass and friction of the plant over what the law believes; the first is exact."""
+LOADS = ((1.0, 1.0), (0.98, 0.8), (1.02, 1.2), (0.98, 1.2))
+LANDED_S, FAST = 7.0, 0.6  # contact has settled; share of the largest speed that counts as sliding
 
 
 def row_types() -> Iterable[RowType]:
     """The rows 19 to 22."""
-    yield _absent("19", "the crane learns and reproduces in contact, stiff and soft", "demonstrated, no figures",
-                  "IROS 2018 (abstract)")  # fmt: skip
-    yield _absent("20", "contact force from chamber pressures while moving", "4.1 % at 8000 N",
-                  "Koivumäki and Mattila, T-RO 2015 (abstract)")  # fmt: skip
+    yield RowType(
+        name="19", summary="the crane learns and reproduces in contact, stiff and soft",
+        published="demonstrated, no figures", source="IROS 2018 (abstract)", run=_absent,
+    )  # fmt: skip
+    yield RowType(
+        name="20", summary="contact force from chamber pressures while moving", published="4.1 % at 8000 N",
+        source="Koivumäki and Mattila, T-RO 2015 (abstract)", bar="largest error while sliding at most 5 % of the load",
+        settings={"press.depth": 0.12, "duration": 14.0}, group="crane", run=_force,
+    )  # fmt: skip
     yield RowType(
         name="21", summary="pressures that hold the crane at its start", published="130/30.9 and 90/35.7 bar",
-        source="HydraulicManipulatorVDC, start values of the simulation", bar="net piston forces within 2 %",
+        source=f"{DATA}, start values of the simulation", bar="net piston forces within 2 %",
         settings={"robot.payload": 475.0, "cylinder.bore": 0.080, "cylinder.rod": 0.045}, run=_holding,
     )  # fmt: skip
-    yield _absent("22", "diamond path of 30 s with model errors of 10 %", "no figure found",
-                  "HydraulicManipulatorVDC")  # fmt: skip
+    yield RowType(
+        name="22", summary="diamond path of 30 s with model errors of 10 % and friction errors of 20 %",
+        published="no figure found", source=DATA, bar="bounded: no trial stops, no error above 0.1 m",
+        settings={"duration": 30.0}, group="crane", run=_diamond,
+    )  # fmt: skip
 
 
-def _absent(name: str, summary: str, published: str, source: str) -> RowType:
-    def run(job: RowRun) -> RowResult:
-        return RowResult(ours="not run here", difference=f"Not computed: {LOOP}.", computed=False)
+def _absent(job: RowRun) -> RowResult:
+    reason = "the world of pallets and its teleoperated demonstrations are not part of this command yet"
+    return RowResult(ours="not run here", difference=f"Not computed: {reason}.", computed=False)
 
-    return RowType(name=name, summary=summary, published=published, source=source, run=run)
+
+def _draws(errors: Any) -> dict[str, Float]:
+    import numpy as np
+
+    mass, friction = np.array(errors).T
+    return {"robot.mass_scale": mass, "actuator.friction_scale": friction}
+
+
+def _stopped(result: Result, seconds: float) -> str:
+    """Why the first trial that did not last stopped, or ""."""
+    short = [i for i, time in enumerate(result.duration_s) if time < seconds - 0.01]
+    return str(result.failure[short[0]] or result.reason[short[0]]) if short else ""
+
+
+def _diamond(job: RowRun) -> RowResult:
+    """Error of the tool on the published path."""
+    import numpy as np
+
+    from skillframe.reproduce import crane_runs
+
+    seconds = min(float(job.settings["duration"]), job.count(30, 5))
+    errors = ERRORS[: job.count(len(ERRORS), 2)]
+    where = crane_runs.scene(crane_runs.CORNERS[0], plate=False)
+    result = crane_runs.run(
+        crane_runs.diamond, crane_runs.MOVING, where, _draws(errors), seconds=seconds, seed=job.seed
+    )  # fmt: skip
+    assert result.traces is not None
+    off = [1e3 * np.hypot(*(t.position - t.desired_position)[:, [0, 2]].T) for t in result.traces]
+    figures = [(float(np.sqrt(np.mean(e**2))), float(e.max())) for e in off]
+    rows = [
+        (f"{mass:g}", f"{friction:g}", f"{rms:.1f} mm", f"{most:.1f} mm")
+        for (mass, friction), (rms, most) in zip(errors, figures, strict=True)
+    ]
+    stopped, most = _stopped(result, seconds), max(f[1] for f in figures)
+    return RowResult(
+        ours=f"rms {figures[0][0]:.1f} mm with the exact model, {max(f[0] for f in figures):.1f} mm at worst; largest "
+        f"error {most:.1f} mm in {seconds:g} s",
+        verdict="fail" if stopped or most > 100.0 else "pass", rows=rows, values={"largest_mm": most},
+        head=("mass over model", "friction over model", "rms", "largest"),
+        difference=f"A trial stopped: {stopped}" if stopped else "As the filtered encoders see the tool.",
+    )  # fmt: skip
+
+
+def _force(job: RowRun) -> RowResult:
+    """Estimated against true contact force while the tool slides along a plate."""
+    import numpy as np
+
+    from skillframe.reproduce import crane_runs
+
+    seconds = min(float(job.settings["duration"]), job.count(60, 10))
+    errors = LOADS[: job.count(len(LOADS), 2)]
+    where = crane_runs.scene(np.array([crane_runs.FIXTURE[0], 0.0, crane_runs.ABOVE]), plate=True)
+    path = crane_runs.press_and_slide(float(job.settings["press.depth"]))
+    result = crane_runs.run(path, crane_runs.PRESSING, where, _draws(errors), seconds=seconds, seed=job.seed)
+    assert result.traces is not None
+    rows, worst, load = [], 0.0, 0.0
+    for (mass, friction), trace in zip(errors, result.traces, strict=True):
+        speed = np.abs(np.gradient(trace.position[:, 0], trace.time))
+        chosen = (trace.time > LANDED_S) & (speed > FAST * crane_runs.SPEED)
+        true, seen = trace.wrench_true[chosen][:, [0, 2]], trace.wrench[chosen][:, [0, 2]]
+        load = float(np.hypot(*true.T).mean()) if chosen.any() else math.nan
+        off = 100.0 * np.hypot(*(seen - true).T) / load
+        rms, most = (float(np.sqrt(np.mean(off**2))), float(off.max())) if chosen.any() else (math.inf, math.inf)
+        worst = max(worst, most)
+        rows.append((f"{mass:g}", f"{friction:g}", f"{load:.0f} N", f"{rms:.1f} %", f"{most:.1f} %"))
+    stopped = _stopped(result, seconds)
+    return RowResult(
+        ours=f"largest error {worst:.1f} % at {load:.0f} N; rms {rows[0][3]} with the exact model",
+        verdict="pass" if worst <= 5.0 and not stopped else "fail", rows=rows,
+        head=("mass over model", "friction over model", "load", "rms", "largest"),
+        difference=f"A trial stopped: {stopped}" if stopped else
+        "The paper's crane and surface are others, and what its 4.1 % is the largest of is not known to us; here it is "
+        "every sample at more than 0.11 m/s. Where a cylinder reverses, some 400 N stay open.",
+    )  # fmt: skip
 
 
 def _holding(job: RowRun) -> RowResult:
