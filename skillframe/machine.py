@@ -131,7 +131,8 @@ class MachineLoop(Loop):
         self.law.start()
         self.home = self.plant.tool_pose().position[:, self.task.axes].copy()
         self.joint = z[:, 2:].copy()
-        self.estimate = Estimate(np.zeros((self.count, 2)), np.zeros((self.count, 2)), np.zeros(self.count, dtype=bool))
+        nothing = np.zeros((self.count, 2))
+        self.estimate = Estimate(nothing, nothing, np.zeros(self.count, dtype=bool), nothing)
         self.demand = Demand(*(np.zeros((self.count, len(self.chain.actuated))) for _ in range(3)))
         self.estimator.start(self._measured())
 
@@ -156,7 +157,7 @@ class MachineLoop(Loop):
 
     def _measured(self) -> Measured:
         gauges = self.gauges
-        return Measured(gauges.z, gauges.rate, *gauges.pressures, self.estimate.force)
+        return Measured(gauges.z, gauges.rate, *gauges.pressures, self.estimate.feedback)
 
     def tare(self) -> None:
         """Swing in the air and identify friction and payload, then hold what was found."""
@@ -184,7 +185,7 @@ class MachineLoop(Loop):
         measured = self._measured()
         self.terms = self.law.terms(measured)
         estimate = self.estimator.step(measured, self.terms)
-        self.estimate = estimate if force_counts else estimate._replace(force=np.zeros_like(estimate.force))
+        self.estimate = estimate if force_counts else estimate._replace(feedback=np.zeros_like(estimate.force))
 
     def _valve(self, reference: Reference) -> None:
         self.demand = self.law.step(self._measured(), reference, self.active)
@@ -198,8 +199,9 @@ class MachineLoop(Loop):
         self._valve(reference)
         np.maximum(self.peak, self.plant.contact_force(), out=self.peak)
         if self.recorder is not None:
-            machine = self._columns() if self.recorder.due(tick) else None
-            self.recorder.record(tick, time, observation, command, law, machine)
+            due = self.recorder.due(tick)
+            seen, machine = (self._read(observation), self._columns()) if due else (observation, None)
+            self.recorder.record(tick, time, seen, command, law, machine)
         self._stop_where_due(tick, time, observation, command, observation.pose.position, law)
         if tick % RESIDUAL_TICKS == 0:
             self._watch_bonds(time)
@@ -212,8 +214,14 @@ class MachineLoop(Loop):
         position = tool.position.copy()
         position[:, axes] = self.terms.tip
         twist, wrench = np.zeros((self.count, 6)), np.zeros((self.count, 6))
-        twist[:, axes], wrench[:, axes] = self.terms.tip_rate, self.estimate.force
+        twist[:, axes], wrench[:, axes] = self.terms.tip_rate, self.estimate.feedback
         return Observation(np.full(self.count, time), self.dt, Pose(position, tool.rotation.copy()), twist, wrench)
+
+    def _read(self, observation: Observation) -> Observation:
+        """The same with the force as it is now, for the record; a skill that answers the force sees it late."""
+        wrench = observation.wrench.copy()
+        wrench[:, self.task.axes] = self.estimate.force
+        return observation._replace(wrench=wrench)
 
     def _reference(self, command: Command, seen: Observation, ramp: float) -> tuple[Reference, Float]:
         """What the law follows, and equation (1)'s wrench (N, 6) for limits and trace."""

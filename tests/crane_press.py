@@ -14,7 +14,7 @@ import numpy as np
 
 from skillframe.actuation.actuator import ActuatorSpec
 from skillframe.actuation.opening import open_actuators
-from skillframe.conditioning.momentum import ForceEstimator
+from skillframe.conditioning.momentum import Estimate, ForceEstimator
 from skillframe.control import vdc_actuator as act
 from skillframe.control.hydraulic import Measured, Terms
 from skillframe.control.vdc_reference import Task
@@ -248,7 +248,7 @@ class Press:
         if t == 0.0:
             self.estimator.start(measured)
         self.estimator.calibrate(t < AIR)
-        self.force = self.estimator.step(measured, at).force
+        self.force = self.estimator.step(measured, at).feedback
         speed = (at.arms @ self.plant.state()[1][..., None])[..., 0]
         row = measured, at, self.plant.contact(), speed
         command = self.law.step(t, measured._replace(force=self.force), at)
@@ -269,7 +269,7 @@ def parameters(actuation, hold):
 
 
 def replay(log, estimator):
-    """(T, N, 2) force, (T, N, 2) sigma, (T, N) valid of an estimator over a log."""
+    """Estimate of (T, N, ...) arrays of an estimator over a log."""
     rows = []
     for k in range(len(log.force)):
         measured, at = Measured(*(x[k] for x in log.measured)), Terms(*(x[k] for x in log.terms))
@@ -277,4 +277,4 @@ def replay(log, estimator):
             estimator.start(measured)
         estimator.calibrate(k * DT < AIR)
         rows.append(estimator.step(measured, at))
-    return tuple(np.array(x) for x in zip(*rows, strict=True))
+    return Estimate(*(np.array(x) for x in zip(*rows, strict=True)))

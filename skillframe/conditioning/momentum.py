@@ -21,7 +21,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.conditioning.damped import CriticallyDamped, Undamped
 from skillframe.conditioning.identification import Identification, IdentificationSettings
+from skillframe.conditioning.impulse import ImpulseFilter
 from skillframe.conditioning.kalman import SteadyWrenchFilter, steady_gain
 from skillframe.errors import SkillframeError
 from skillframe.frames import Float
@@ -40,11 +42,17 @@ class Estimate(NamedTuple):
     Attributes:
         force: (N, 2) base x and z [N]; sigma: (N, 2) its standard deviation, from W [N].
         valid: (N,) at least two pistons slide; elsewhere stiction leaves several hundred newtons open.
+        feedback: (N, 2) the force for whatever answers it, a law or a hand: it comes some 50 ms late, and has no gain
+            to speak of at the frequencies at which a machine in contact rings.
     """
 
     force: Float
     sigma: Float
     valid: NDArray[np.bool_]
+    feedback: Float
+
+
+_SPEEDS = ("stiction_speed", "least_speed", "sliding_speed")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +67,9 @@ class ForceSettings:
         stiction_speed: a piston below it hides friction exp(-(v / stiction_speed)^2) of its Coulomb friction [m/s].
         least_speed, settle: a piston slides once it has gone one way faster than this [m/s] for this long [s].
         sliding_speed: friction is F_C tanh(v / sliding_speed) + F_v v [m/s].
-        force_noise, force_corner: of the wrench's Kalman filter [N, Hz]; the corner None leaves it out.
+        force_corner: of the wrench's Kalman filter (`impulse`) [Hz]; None leaves it out.
+        sensor_corner: of the sensors' filters before, two equal poles as published [Hz]; their lag is made up for.
+        feedback_corner: of the Kalman filter of the feedback (`kalman`) [Hz].
         weighted: False gives every joint the same weight.
         identify: of friction and payload in air.
     """
@@ -69,47 +79,18 @@ class ForceSettings:
     row_noise: tuple[float, ...] = (220.0, 160.0, 170.0)
     stiction_speed: float = 4e-3
     least_speed: float = 6e-3
-    settle: float = 0.5
+    settle: float = 0.6
     sliding_speed: float = 2.5e-3
-    force_noise: float = 60.0
-    force_corner: float | None = 2.5
+    force_corner: float | None = 3.0
+    sensor_corner: float = 24.0
+    feedback_corner: float = 2.5
     weighted: bool = True
     identify: IdentificationSettings = field(default_factory=IdentificationSettings)
 
     def __post_init__(self) -> None:
-        for name in ("corner", "rate_corner", "stiction_speed", "least_speed", "sliding_speed", "force_noise"):
+        for name in ("corner", "rate_corner", "sensor_corner", "feedback_corner", *_SPEEDS):
             if not 0.0 < getattr(self, name) < float("inf"):
                 raise SkillframeError(f"force estimate: {name} must be positive, got {getattr(self, name)}")
-
-
-class CriticallyDamped:
-    """L of equation (1): two equal poles, for arrays of any shape.
-
-    Args:
-        corner: [Hz].
-        dt: sample time [s].
-    """
-
-    def __init__(self, corner: float, dt: float) -> None:
-        self._share = float(-np.expm1(-2.0 * np.pi * corner * dt))
-        self._middle: Float | None = None
-        self._value: Float = np.zeros(0)
-
-    def start(self) -> None:
-        """Forget the past: the next value is taken over as it is."""
-        self._middle = None
-
-    def step(self, value: Float) -> Float:
-        """Filtered value, to be read and not kept."""
-        if self._middle is None:
-            self._middle, self._value = value.copy(), value.copy()
-        left = value - self._middle
-        left *= self._share
-        self._middle += left
-        np.subtract(self._middle, self._value, out=left)
-        left *= self._share
-        self._value += left
-        return self._value
 
 
 class MomentumRate:
@@ -174,7 +155,8 @@ class ForceEstimator:
         self.identification = Identification(count, len(cylinders.area_a), s.identify)
         self._left, self._filter = MomentumRate(dt), CriticallyDamped(s.corner, dt)
         self._rate_share = float(-np.expm1(-2.0 * np.pi * s.rate_corner * dt))
-        self._wrench = None if s.force_corner is None else force_filter(s.force_noise, s.force_corner, dt)
+        self._wrench = None if s.force_corner is None else ImpulseFilter(s.force_corner, dt)
+        self._undamped, self._feedback = Undamped(s.corner, dt), force_filter(s.feedback_corner, dt)
         self._noise: Float = np.square(np.array(s.row_noise))
         self._every, self._tick, self.calibrating = max(1, round(s.identify.period / dt)), 0, False
         self._columns: Float = np.zeros((count, len(s.row_noise), 2 * len(cylinders.area_a) + 4))
@@ -221,8 +203,11 @@ class ForceEstimator:
         self.regressors = phi
         self.residual = residual - (phi @ self.identification.theta[..., None])[..., 0]
         self.raw, sigma = force_from_residual(jacobian, self.residual, self._variance(terms.arms, sliding))
+        if self._tick == 0:
+            self._begin()
         self._tick += 1
-        return Estimate(self._smooth(self.raw), sigma, np.sum(sliding, axis=-1) >= 2)
+        valid = np.sum(sliding, axis=-1) >= 2
+        return Estimate(self._smooth(), sigma, valid, self._feedback.step(self.raw))
 
     def friction(self, terms: Terms) -> Float:
         """(N, k) of every cylinder as it is known now, nominal and what was identified [N]."""
@@ -255,18 +240,24 @@ class ForceEstimator:
         share = np.where(sliding, np.exp(-np.square(speed)), 1.0)
         return self._noise + pull(np.square(arms), np.square(self._cylinders.coulomb_friction * share))
 
-    def _smooth(self, force: Float) -> Float:
+    def _begin(self) -> None:
+        self._feedback.start(self.raw)
+        self._undamped.start(self.raw)
+        if self._wrench is not None:
+            self._wrench.start(self.raw)
+
+    def _smooth(self) -> Float:
+        """The force now (N, 2): L's place is taken by a better filter, and the sensors' lag made up for."""
         if self._wrench is None:
-            return force
-        if self._tick == 1:
-            self._wrench.start(force)
-        return self._wrench.step(force)
+            return self.raw
+        self._wrench.step(self._undamped.step(self.raw))
+        return self._wrench.ahead(1.0 / (np.pi * self.settings.sensor_corner))
 
 
-def force_filter(noise: float, corner: float, dt: float) -> SteadyWrenchFilter:
-    """The converged Kalman filter of a force's two components, `kalman`'s model: noise [N], corner [Hz]."""
-    walk = noise * np.sqrt(dt) * (2.0 * np.pi * corner) ** 2
-    return SteadyWrenchFilter(steady_gain(np.full(2, noise), np.full(2, walk), dt), dt)
+def force_filter(corner: float, dt: float) -> SteadyWrenchFilter:
+    """The converged Kalman filter of a force's two components, `kalman`'s model with a corner [Hz]."""
+    one = np.ones(2)
+    return SteadyWrenchFilter(steady_gain(one, one * np.sqrt(dt) * (2.0 * np.pi * corner) ** 2, dt), dt)
 
 
 def spread_of(arms: Float) -> Float:

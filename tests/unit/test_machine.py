@@ -157,3 +157,16 @@ def test_pressing_on_a_plate_is_seen_in_the_pressures():
     true, seen = trace.wrench_true[moving][:, [0, 2]], trace.wrench[moving][:, [0, 2]]
     assert moving.sum() > 30
     assert np.hypot(*(seen - true).T).max() < 0.06 * np.hypot(*true.T).mean()
+
+
+def test_the_record_holds_the_force_as_it_is_now_and_the_law_gets_the_late_one(runs):
+    """Fed back, a force that looks ahead made the crane bounce to its force limit."""
+    trace = runs[0].traces[0]
+    loop = MachineLoop(Follow(diamond, MOVING), setup(), of(DRAWS, [0]), rngs([0]), 100.0)
+    loop.estimate = loop.estimate._replace(force=np.array([[3.0, 4.0]]), feedback=np.array([[1.0, 2.0]]))
+    loop.terms = loop.law.terms(loop._measured())
+    seen = loop._observe(0.0)
+    np.testing.assert_array_equal(seen.wrench[0, [0, 2]], [1.0, 2.0])
+    np.testing.assert_array_equal(loop._read(seen).wrench[0, [0, 2]], [3.0, 4.0])
+    np.testing.assert_array_equal(loop._measured().force, [[1.0, 2.0]])
+    assert trace.machine["force_sigma"].shape[1:] == (2,) and set(np.unique(trace.machine["force_valid"])) <= {0.0, 1.0}

@@ -8,13 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from skillframe.conditioning.momentum import (
-    CriticallyDamped,
-    ForceEstimator,
-    ForceSettings,
-    MomentumRate,
-    force_from_residual,
-)  # fmt: skip
+from skillframe.conditioning.momentum import ForceEstimator, ForceSettings, MomentumRate, force_from_residual
 from skillframe.control.hydraulic import Measured
 from skillframe.control.vdc_actuator import cylinders
 from skillframe.errors import SkillframeError
@@ -106,14 +100,6 @@ def test_what_known_forces_leave_of_the_momentum_s_rate_is_the_unknown_force(see
         np.testing.assert_allclose(left.step(p, u), d, atol=1e-11)
 
 
-def test_the_filter_starts_at_its_first_value_and_follows_a_ramp_two_time_constants_behind():
-    """The lag of two equal poles is 2 / (2 pi corner); a sample more or less is the tolerance."""
-    filtered, w = CriticallyDamped(8.0, DT), 2 * np.pi * 8.0
-    found = [float(filtered.step(np.array([5.0 + k * DT]))[0]) for k in range(1000)]
-    assert found[0] == 5.0
-    assert 5.999 - found[-1] == pytest.approx(2.0 / w, abs=DT)
-
-
 @given(SEEDS)
 def test_the_force_is_the_weighted_least_squares_solution_and_sigma_its_standard_deviation(seed):
     rng = np.random.default_rng(seed)
@@ -142,8 +128,8 @@ def test_while_two_pistons_slide_the_estimate_is_valid_and_its_sigma_is_small():
     moving = measured(z, zd, crane().at(z, zd).holding_force())
     at = terms(crane(), moving.z, moving.rate)
     estimator.start(moving)
-    found = [estimator.step(moving, at) for _ in range(600)]
-    assert not found[450].valid[0]  # 0.5 s, and the rate's filter
+    found = [estimator.step(moving, at) for _ in range(700)]
+    assert not found[550].valid[0]  # 0.6 s, and the rate's filter
     assert found[-1].valid[0]
     assert found[-1].sigma.max() < 0.2 * found[0].sigma.max()
 

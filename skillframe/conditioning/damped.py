@@ -1,0 +1,69 @@
+r"""The filter L(s) = (K / (s + K))^2, two equal poles, and what went into it from what came out, sample by sample.
+
+With the share a = 1 - exp(-K h) of a sample time h both poles are m <- m + a (x - m), v <- v + a (m - v), so that
+
+    m = v_before + (v - v_before) / a,     x = m_before + (m - m_before) / a                                      (1)
+
+give the input back exactly. Alone (1) is of no use: it multiplies noise by 1/a^2; it is one half of a filter whose
+other half smooths better than L (`impulse`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from skillframe.frames import Float
+
+
+def share_of(corner: float, dt: float) -> float:
+    """Share a for a corner K / 2 pi [Hz] and a sample time [s]."""
+    return float(-np.expm1(-2.0 * np.pi * corner * dt))
+
+
+class CriticallyDamped:
+    """L, for arrays of any shape.
+
+    Args:
+        corner: [Hz].
+        dt: sample time [s].
+    """
+
+    def __init__(self, corner: float, dt: float) -> None:
+        self._share = share_of(corner, dt)
+        self._middle: Float | None = None
+        self._value: Float = np.zeros(0)
+
+    def start(self) -> None:
+        """Forget the past: the next value is taken over as it is."""
+        self._middle = None
+
+    def step(self, value: Float) -> Float:
+        """Filtered value, to be read and not kept."""
+        if self._middle is None:
+            self._middle, self._value = value.copy(), value.copy()
+        left = value - self._middle
+        left *= self._share
+        self._middle += left
+        np.subtract(self._middle, self._value, out=left)
+        left *= self._share
+        self._value += left
+        return self._value
+
+
+class Undamped:
+    """Equation (1): the inverse of `CriticallyDamped`; arguments as there."""
+
+    def __init__(self, corner: float, dt: float) -> None:
+        self._inverse = 1.0 / share_of(corner, dt)
+
+    def start(self, value: Float) -> None:
+        """Begin where L was taken over at a value."""
+        self._middle: Float = value.copy()
+        self._value: Float = value.copy()
+
+    def step(self, value: Float) -> Float:
+        """What L was given when it answered with a value."""
+        middle = self._value + self._inverse * (value - self._value)
+        result = self._middle + self._inverse * (middle - self._middle)
+        self._middle, self._value = middle, value.copy()
+        return np.asarray(result)

@@ -1,0 +1,64 @@
+r"""Kalman filter of a force that is found by differentiating positions twice: its noise grows with frequency squared.
+
+What is seen of such a force f is its integral twice over, Y, through white noise r; the force has a slope that wanders:
+
+    Y' = P,   P' = f,   f' = s,   s' = white noise q,        Z = Y + white noise r                                (1)
+
+Four integrators in a row: the poles of the converged filter (Kalman and Bucy, J. Basic Eng. 83, 1961) are those of a
+Butterworth filter of fourth order at \(w = (q / r)^{1/4}\), so that its gains are
+
+    k = (c_1 w, c_2 w^2, c_1 w^3, w^4),    c_1 = 2 sqrt(1 + sqrt(1/2)),   c_2 = 2 + sqrt(2)                       (2)
+
+A ramp is followed without lag, and noise falls off by 1/frequency^3; in `kalman`, whose noise is white, by 1/frequency.
+Only Y's and P's errors are kept, so that nothing grows with time.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from skillframe.errors import SkillframeError
+from skillframe.frames import Float
+
+
+def gains(corner: float) -> Float:
+    """Gains of equation (2) for w / 2 pi [Hz]."""
+    w, first, second = 2.0 * np.pi * corner, 2.0 * np.sqrt(1.0 + np.sqrt(0.5)), 2.0 + np.sqrt(2.0)
+    return np.array([first * w, second * w**2, first * w**3, w**4])
+
+
+class ImpulseFilter:
+    """The converged filter for N forces in lock-step, each component for itself.
+
+    Args:
+        corner: w / 2 pi [Hz], at most a hundredth of the sampling rate: (2) is the gain in continuous time.
+        dt: sample time [s].
+
+    Raises:
+        SkillframeError: the corner is too high.
+    """
+
+    def __init__(self, corner: float, dt: float) -> None:
+        if corner * dt > 0.01:
+            raise SkillframeError(f"force filter: a corner of {corner:g} Hz needs {100.0 * corner:g} samples a second")
+        self._gains, self._dt = tuple(float(k) for k in dt * gains(corner)), dt
+
+    def start(self, force: Float) -> None:
+        """Begin at a force (N, m) with no slope."""
+        self._force: Float = force.copy()
+        self._slope, self._once, self._twice = (np.zeros_like(force) for _ in range(3))
+
+    def step(self, force: Float) -> Float:
+        """The filtered force (N, m) after a sample of it."""
+        h, (to_twice, to_once, to_force, to_slope) = self._dt, self._gains
+        left = force - self._force
+        error = self._twice + h * self._once + (0.5 * h * h) * left
+        self._once = self._once + h * left - to_once * error
+        self._twice = error - to_twice * error
+        self._force = self._force + h * self._slope + to_force * error
+        self._slope = self._slope + to_slope * error
+        return self._force
+
+    def ahead(self, time: float) -> Float:
+        """The force (N, m) that the slope promises for `time` [s] after the last sample, f + s time."""
+        return np.asarray(self._force + time * self._slope)
