@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import click
@@ -24,6 +25,32 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
     widths = [max(len(line[i]) for line in [columns, *texts]) for i in range(len(columns))]
     for line in [columns, *texts]:
         click.echo("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip())
+
+
+@contextmanager
+def progress(what: str) -> Iterator[Callable[[int, int], None]]:
+    """A function of how many of how many are done: a bar on a terminal, a line per tenth in a pipe; both on stderr."""
+    if not sys.stderr.isatty():
+        yield _tenths(what)
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def _tenths(what: str) -> Callable[[int, int], None]:
+    shown = -1
+
+    def show(done: int, total: int) -> None:
+        nonlocal shown
+        if 10 * done // total != shown:
+            shown = 10 * done // total
+            click.echo(f"{done} of {total} {what}", err=True)
+
+    return show
 
 
 def _drawn(columns: Sequence[str], texts: Sequence[Sequence[str]]) -> None:

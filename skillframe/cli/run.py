@@ -20,22 +20,24 @@ if TYPE_CHECKING:
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="world.*, start.*, fixture.*, grasp.* ...")
 @click.option("--out", type=click.Path(path_type=Path), help="Trace file (.npz).")
 @click.option("--replay", type=click.Path(path_type=Path), help="Page with a 3-D replay and plots of the run (.html).")
+@click.option("--video", type=click.Path(path_type=Path), help="Film of the run (.mp4).")
 @click.option("--seed", default=0, show_default=True, help="Seed of the sensor noise.")
 @click.option("--duration", default=20.0, show_default=True, help="Longest run in simulated seconds.")
 @click.option("--rate", default=100.0, show_default=True, help="Rate of the trace [Hz].")
 @click.option("--json", "as_json", is_flag=True, help="The outcome as JSON on stdout.")
 def command(
     skill: str, world: str, robot: str, coc: str | None, settings: tuple[str, ...], out: Path | None,
-    replay: Path | None, seed: int, duration: float, rate: float, as_json: bool,
+    replay: Path | None, video: Path | None, seed: int, duration: float, rate: float, as_json: bool,
 ) -> int:  # fmt: skip
     """Run SKILL (a skill file, or TYPE:DEMONSTRATION) once in a simulated world.
 
     Exit code 0 if the goal was reached, 1 if not.
 
     \b
-    Example:
+    Examples:
       skillframe run peg.skill.json --world peg_in_hole --robot panda --coc tip \\
         --set fixture.tilt_y=0.07 --set world.friction=0.3 --out run.npz --replay run.html
+      skillframe run peg.skill.json --world peg_in_hole --video run.mp4
     """
     import numpy as np
 
@@ -44,6 +46,10 @@ def command(
     from skillframe.prepare import load_robot_model, load_world, prepare, split_settings
     from skillframe.skillsource import load_skill
 
+    if video is not None:
+        from skillframe.report.video import check_film
+
+        check_film(video)
     name, document = load_skill(skill)
     params, draws = split_settings(world, dict(parse_setting(text) for text in settings))
     runnable, setup = prepare(load_robot_model(robot), load_world(world, params), document, coc)
@@ -58,7 +64,9 @@ def command(
         trace.save(out)
     if replay is not None:
         _write_replay(trace, replay)
-    _tell(trace.meta, out, replay, as_json)
+    if video is not None:
+        _write_video(trace, video)
+    _tell(trace.meta, {"trace": out, "replay": replay, "video": video}, as_json)
     if result.interrupted:
         raise KeyboardInterrupt
     return 0 if result.success[0] else 1
@@ -75,13 +83,22 @@ def _write_replay(trace: Trace, path: Path) -> None:
         write_report([file], path)
 
 
-def _tell(meta: dict[str, Any], out: Path | None, replay: Path | None, as_json: bool) -> None:
+def _write_video(trace: Trace, path: Path) -> None:
+    from skillframe.cli.output import progress
+    from skillframe.report.video import write_film
+
+    with progress("frames") as show:
+        write_film(trace, path, show)
+
+
+def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) -> None:
     keys = ["success", "failure", "reason", "duration_s", "peak_force_n", "final_error_m", "final_error_rad"]
     outcome = {key: meta[key] for key in keys}
     for text in meta.get("notes") or []:
         click.echo(f"note: {text}", err=True)
     if as_json:
-        click.echo(json.dumps({**outcome, "trace": str(out) if out else None}, sort_keys=True))
+        named = {what: str(path) if path else None for what, path in files.items()}
+        click.echo(json.dumps({**outcome, **named}, sort_keys=True))
         return
     click.echo("success" if meta["success"] else f"failure: {meta['failure']}")
     click.echo(
@@ -89,6 +106,6 @@ def _tell(meta: dict[str, Any], out: Path | None, replay: Path | None, as_json: 
         f"{meta['peak_force_n']:.1f} N; {meta['final_error_m'] * 1000:.2f} mm and "
         f"{meta['final_error_rad'] * 57.29578:.2f} degrees from the goal"
     )
-    for path, what in ((out, "trace"), (replay, "replay")):
+    for what, path in files.items():
         if path is not None:
             click.echo(f"  {what}: {path}")

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,25 +26,52 @@ OVERSAMPLE = 2
 NEAR = 1e-3
 
 
+class Canvas(NamedTuple):
+    """What has been drawn so far, on a finer grid than the picture's: (h, w), (h, w, 3), (h, w)."""
+
+    depth: Float
+    color: Float
+    owner: NDArray[np.int64]
+
+    def copy(self) -> Canvas:
+        """A canvas of its own, to draw on over the same background."""
+        return Canvas(self.depth.copy(), self.color.copy(), self.owner.copy())
+
+
 def draw(meshes: Sequence[Mesh], camera: Camera, width: int, height: int) -> Image:
     """A picture (height, width, 4) of meshes in base; clear where nothing is, every mesh with its outline."""
+    return picture(paint(blank(width, height), dict(enumerate(meshes)), camera))
+
+
+def blank(width: int, height: int) -> Canvas:
+    """An empty canvas for a picture of that size."""
     w, h = OVERSAMPLE * width, OVERSAMPLE * height
-    depth = np.full((h, w), np.inf)
-    color = np.zeros((h, w, 3))
-    owner = np.full((h, w), -1)
-    for index, mesh in enumerate(meshes):
-        _fill(mesh, index, camera, depth, color, owner)
-    edge = _outline(depth, owner)
+    return Canvas(np.full((h, w), np.inf), np.zeros((h, w, 3)), np.full((h, w), -1))
+
+
+def paint(canvas: Canvas, meshes: Mapping[int, Mesh], camera: Camera) -> Canvas:
+    """Draw meshes, each under its number, onto a canvas, which is changed and given back."""
+    for index, mesh in meshes.items():
+        _fill(mesh, index, camera, canvas)
+    return canvas
+
+
+def picture(canvas: Canvas) -> Image:
+    """The picture (height, width, 4) of a canvas, with outlines; the canvas keeps its colours."""
+    edge = _outline(canvas.depth, canvas.owner)
+    color = canvas.color.copy()
     color[edge] = INK
-    return _reduced(color, (edge | (owner >= 0)).astype(float), height, width)
+    return _reduced(color, edge | (canvas.owner >= 0))
 
 
-def _reduced(color: Float, solid: Float, height: int, width: int) -> Image:
-    """Colour and opacity averaged over the finer grid; colour counts where something is."""
-    blocks = (height, OVERSAMPLE, width, OVERSAMPLE, 1)
-    weight = solid.reshape(blocks).mean(axis=(1, 3))
-    mixed = (color * solid[..., None]).reshape(*blocks[:4], 3).mean(axis=(1, 3)) / np.where(weight > 0.0, weight, 1.0)
-    result: Image = np.round(255.0 * np.clip(np.concatenate([mixed, weight], axis=-1), 0.0, 1.0)).astype(np.uint8)
+def _reduced(color: Float, solid: NDArray[np.bool_]) -> Image:
+    """Colour (zero where nothing is) and opacity averaged over the finer grid; colour counts where something is."""
+    places = [(slice(i, None, OVERSAMPLE), slice(j, None, OVERSAMPLE)) for i, j in np.ndindex(OVERSAMPLE, OVERSAMPLE)]
+    count = np.sum([solid[place] for place in places], axis=0)
+    result: Image = np.empty((*count.shape, 4), dtype=np.uint8)
+    mixed = sum(color[place] for place in places) * (255.0 / np.maximum(count, 1))[..., None]
+    result[..., :3] = np.round(np.minimum(mixed, 255.0))
+    result[..., 3] = np.round(255.0 / OVERSAMPLE**2 * count)
     return result
 
 
@@ -63,37 +91,51 @@ def project(points: Float, camera: Camera, width: int, height: int) -> Float:
     return np.stack([x, 0.5 * height - scale * local[:, 1] / distance, distance], axis=-1)
 
 
-def _fill(mesh: Mesh, index: int, camera: Camera, depth: Float, color: Float, owner: NDArray[np.int64]) -> None:
+def _fill(mesh: Mesh, index: int, camera: Camera, canvas: Canvas) -> None:
     if not len(mesh.faces):
         return
-    height, width = depth.shape
-    points = project(mesh.vertices, camera, width, height)
+    height, width = canvas.depth.shape
+    points = project(mesh.vertices, camera, width, height)[mesh.faces]
     light = unit(KEY_LIGHT)
     shade = 0.60 + 0.34 * np.clip(mesh.normals @ light, 0.0, 1.0) + 0.10 * mesh.normals[:, 2]
-    paint = mesh.colors[:, :3] * shade[:, None]
-    for face in mesh.faces:
-        _fill_triangle(points[face], paint[face], index, depth, color, owner)
+    colors = (mesh.colors[:, :3] * shade[:, None])[mesh.faces]
+    low, high, seen = _boxes(points, width, height)
+    for face in np.flatnonzero(seen):
+        (x0, y0), (x1, y1) = low[face], high[face]
+        _fill_triangle(points[face], colors[face], (slice(y0, y1), slice(x0, x1)), index, canvas)
 
 
-def _fill_triangle(p: Float, paint: Float, index: int, depth: Float, color: Float, owner: NDArray[np.int64]) -> None:
-    area = (p[1, 0] - p[0, 0]) * (p[2, 1] - p[0, 1]) - (p[2, 0] - p[0, 0]) * (p[1, 1] - p[0, 1])
-    if area >= -1e-9 or p[:, 2].min() <= NEAR:  # seen from behind (pixels count downwards), or behind the eye
-        return
-    height, width = depth.shape
-    x0, x1 = max(int(np.floor(p[:, 0].min())), 0), min(int(np.ceil(p[:, 0].max())) + 1, width)
-    y0, y1 = max(int(np.floor(p[:, 1].min())), 0), min(int(np.ceil(p[:, 1].max())) + 1, height)
-    if x0 >= x1 or y0 >= y1:
-        return
-    x, y = np.arange(x0, x1)[None] + 0.5, np.arange(y0, y1)[:, None] + 0.5
-    a = ((p[2, 0] - p[1, 0]) * (y - p[1, 1]) - (p[2, 1] - p[1, 1]) * (x - p[1, 0])) / area
-    b = ((p[0, 0] - p[2, 0]) * (y - p[2, 1]) - (p[0, 1] - p[2, 1]) * (x - p[2, 0])) / area
+def _boxes(p: Float, width: int, height: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+    """Pixels (F, 2) from and to which triangles (F, 3, 3) reach, and which of them face the eye inside the picture."""
+    area = _area(p)
+    last = np.array([width, height])
+    low = np.clip(np.floor(p[:, :, :2].min(axis=1)), 0, last).astype(np.int64)
+    high = np.clip(np.ceil(p[:, :, :2].max(axis=1)) + 1, 0, last).astype(np.int64)
+    front = (area < -1e-9) & (p[:, :, 2].min(axis=1) > NEAR)  # pixels count downwards, so the sign is turned
+    return low, high, front & (low < high).all(axis=1)
+
+
+def _area(p: Float) -> Float:
+    area: Float = (p[:, 1, 0] - p[:, 0, 0]) * (p[:, 2, 1] - p[:, 0, 1]) - (p[:, 2, 0] - p[:, 0, 0]) * (
+        p[:, 1, 1] - p[:, 0, 1]
+    )
+    return area
+
+
+def _fill_triangle(p: Float, colors: Float, window: tuple[slice, slice], index: int, canvas: Canvas) -> None:
+    rows, columns = window
+    (x0, y0, z0), (x1, y1, z1), (x2, y2, z2) = p.tolist()
+    area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
+    x, y = np.arange(columns.start, columns.stop)[None] + 0.5, np.arange(rows.start, rows.stop)[:, None] + 0.5
+    a = ((x2 - x1) * (y - y1) - (y2 - y1) * (x - x1)) / area
+    b = ((x0 - x2) * (y - y2) - (y0 - y2) * (x - x2)) / area
     c = 1.0 - a - b
-    z = a * p[0, 2] + b * p[1, 2] + c * p[2, 2]
-    window = (slice(y0, y1), slice(x0, x1))
-    seen = (a >= 0.0) & (b >= 0.0) & (c >= 0.0) & (z < depth[window])
-    depth[window][seen] = z[seen]
-    owner[window][seen] = index
-    color[window][seen] = (a[..., None] * paint[0] + b[..., None] * paint[1] + c[..., None] * paint[2])[seen]
+    z = a * z0 + b * z1 + c * z2
+    seen = (a >= 0.0) & (b >= 0.0) & (c >= 0.0) & (z < canvas.depth[window])
+    weight = np.stack([a[seen], b[seen], c[seen]], axis=1)
+    canvas.depth[window][seen] = z[seen]
+    canvas.owner[window][seen] = index
+    canvas.color[window][seen] = weight @ colors
 
 
 def _outline(depth: Float, owner: NDArray[np.int64]) -> NDArray[np.bool_]:
