@@ -25,7 +25,8 @@ from skillframe.control.vdc_actuator import (
     CylinderGains,
     Cylinders,
     flow_demand,
-    friction,
+    friction_parameters,
+    friction_regressor,
     inverse_valve,
     pressure_force,
 )
@@ -104,6 +105,8 @@ class HydraulicGains:
             8e-9; the default k_f is a fifth of it, which tracks better where friction is not known (our measurement).
         body: part of the bodies' gain K that is the same for all [N s/m, N m s/rad]; published.
         adaptation: rho of the inertial parameters; 0 switches it off. share: bounds, +- of each parameter.
+        friction: rho_f of the cylinders' Coulomb [N/m] and viscous friction [N s/m^2 per m/s]; 0 switches it off.
+        friction_share: bounds, +- of each.
         joint: lambda of the joints that the tool's plane leaves open [1/s].
         force_corner: of the filter that gives the required force's rate [Hz]; published.
     """
@@ -113,6 +116,8 @@ class HydraulicGains:
     body: float = 5.0
     adaptation: float = 300.0
     share: float = 0.3
+    friction: tuple[float, float] = (0.0, 0.0)
+    friction_share: float = 0.5
     joint: float = 3.0
     force_corner: float = 8.0
 
@@ -184,6 +189,7 @@ class HydraulicLaw:
 
     Attributes:
         theta: (N, B, 10) estimated inertial parameters of every moving body.
+        friction: (N, 2, k) estimated Coulomb [N] and viscous friction [N s/m]; may be set to what is found otherwise.
     """
 
     def __init__(self, chain: ClosedChain, cylinders: Cylinders, gains: HydraulicGains, count: int, dt: float) -> None:
@@ -192,6 +198,9 @@ class HydraulicLaw:
         nominal = parameters(chain.model)
         self.theta: Float = np.tile(nominal, (count, 1, 1))
         self._bounds = relative_bounds(nominal, gains.share)
+        rub = friction_parameters(cylinders)
+        self.friction: Float = np.tile(rub, (count, 1, 1))
+        self._friction_bounds = relative_bounds(rub, gains.friction_share)
         self._gain: Float = gains.body * np.eye(6)
         self._cylinder_gains = CylinderGains(velocity=np.array(gains.velocity), force=np.array(gains.force))
         self._force_rate = RateFilter(gains.force_corner, dt)
@@ -217,7 +226,9 @@ class HydraulicLaw:
             rate_r[i] = motion.tree_required[self.chain.driven]
             piston[i], speed[i] = state.piston
             self._learn(i, motion)
-        return self._valves(measured, required + friction(self.cylinders, rate_r), (piston, speed, rate_r))
+        force = required + np.sum(friction_regressor(rate_r) * self.friction, axis=-2)
+        self._rub(rate_r, rate_r - speed, ids)
+        return self._valves(measured, force, (piston, speed, rate_r))
 
     def _required(self, measured: Measured, reference: Reference, i: int) -> tuple[ChainState, Bodies]:
         state = self.chain.at(measured.z[i], measured.rate[i])
@@ -242,6 +253,11 @@ class HydraulicLaw:
         if self.gains.adaptation > 0.0:
             drive = np.einsum("bij,bi->bj", motion.regressor, motion.error)
             self.theta[i] = adapt(self.theta[i], drive, self.gains.adaptation, self._bounds, self._dt)
+
+    def _rub(self, rate_r: Float, error: Float, ids: NDArray[np.int64]) -> None:
+        drive = np.array(self.gains.friction)[:, None] * friction_regressor(rate_r) * error[:, None, :]
+        moved = adapt(self.friction, drive, 1.0, self._friction_bounds, self._dt)
+        self.friction[ids] = moved[ids]
 
     def _valves(self, measured: Measured, force: Float, motion: tuple[Float, Float, Float]) -> Demand:
         if self._fresh:

@@ -13,12 +13,12 @@ from skillframe.control.generated import Batch
 from skillframe.control.hydraulic import Demand, HydraulicGains, Measured, Reference, Terms, plane_axes
 from skillframe.control.hydraulic_symbolic import cylinder_table, law_function, terms_function
 from skillframe.control.vdc import parameters
-from skillframe.control.vdc_actuator import Cylinders
+from skillframe.control.vdc_actuator import Cylinders, friction_parameters
 from skillframe.control.vdc_adaptation import relative_bounds
 from skillframe.frames import Float
 from skillframe.robot.loops import ClosedChain
 
-_SHARED = tuple(range(15, 21))  # inputs of the law that are one for all trials: bounds, cylinders, gains, scalars
+_SHARED = tuple(range(16, 24))  # inputs of the law that are one for all trials: bounds, cylinders, gains, scalars
 
 
 class CompiledLaw:
@@ -34,6 +34,7 @@ class CompiledLaw:
 
     Attributes:
         theta: (N, B, 10) estimated inertial parameters of every moving body.
+        friction: (N, 2, k) estimated Coulomb [N] and viscous friction [N s/m]; write into it what is found otherwise.
         notes: a sentence where there is no compiler.
     """
 
@@ -50,8 +51,11 @@ class CompiledLaw:
             zeros((count, n - 2)), zeros((count, n - 2)), zeros((count, n)),
         )  # fmt: skip
         self.theta, self._learned = (np.tile(nominal, (count, 1, 1)) for _ in range(2))
+        self.friction, self._rubbed = (np.tile(friction_parameters(cylinders), (count, 1, 1)) for _ in range(2))
         self._memory, self._next = zeros((count, 2, k)), zeros((count, 2, k))
-        self._scalars = np.array([gains.body, gains.adaptation, gains.joint, gains.force_corner, dt, 1.0])
+        self._scalars = np.array(
+            [gains.body, gains.adaptation, *gains.friction, gains.joint, gains.force_corner, dt, 1.0]
+        )  # fmt: skip
         self._bind(nominal, count, use_compiler)
 
     def _bind(self, nominal: Float, count: int, use_compiler: bool) -> None:
@@ -61,19 +65,23 @@ class CompiledLaw:
         self._terms = [Terms(*(np.zeros((count, *shape)) for shape in shapes)) for _ in range(2)]
         axes, gains = plane_axes(self.chain), self.gains
         knowledge = (
-            *relative_bounds(nominal, gains.share), cylinder_table(self.cylinders), np.array(gains.velocity),
-            np.array(gains.force), self._scalars,
+            *relative_bounds(nominal, gains.share),
+            *relative_bounds(friction_parameters(self.cylinders), gains.friction_share),
+            cylinder_table(self.cylinders), np.array(gains.velocity), np.array(gains.force), self._scalars,
         )  # fmt: skip
         given = [part for part in self._reference if part is not None]
-        inputs = [*self._measured, *given, self.theta, self._memory, *knowledge]
+        inputs = [*self._measured, *given, self.theta, self.friction, self._memory, *knowledge]
         law, terms = law_function(self.chain, axes), terms_function(self.chain, axes)
         self._steps = [
-            Batch(law, inputs, [*out, self._learned, self._next], _SHARED, use_compiler=use_compiler)
+            Batch(law, inputs, [*out, self._learned, self._rubbed, self._next], _SHARED, use_compiler=use_compiler)
             for out in self._demand
         ]
         seen = [self._measured.z, self._measured.rate, nominal]
         self._describe = [Batch(terms, seen, list(out), (2,), use_compiler=use_compiler) for out in self._terms]
         self.notes = self._steps[0].notes
+        self._states = (
+            (self.theta, self._learned), (self.friction, self._rubbed), (self._memory, self._next)
+        )  # fmt: skip
         self._everyone = np.arange(count)
         self._turn = 0
 
@@ -96,6 +104,7 @@ class CompiledLaw:
             np.copyto(own, 0.0 if given is None else given)
         self._turn ^= 1
         self._steps[self._turn](ids)
-        self.theta[ids], self._memory[ids] = self._learned[ids], self._next[ids]
+        for now, after in self._states:
+            now[ids] = after[ids]
         self._scalars[-1] = 0.0
         return self._demand[self._turn]

@@ -21,7 +21,7 @@ from skillframe.robot.symbolic import BodyMotion, Expression, SymbolicChain, Twi
 
 SLIDING = 5e-3  # m/s, as in `vdc_actuator`
 CYLINDER = tuple(Cylinders.__dataclass_fields__)
-SCALARS = ("body", "adaptation", "joint", "corner", "dt", "fresh")
+SCALARS = ("body", "adaptation", "coulomb", "viscous", "joint", "corner", "dt", "fresh")
 
 
 def terms_function(chain: ClosedChain, axes: tuple[int, int]) -> ca.Function:
@@ -45,9 +45,9 @@ def law_function(chain: ClosedChain, axes: tuple[int, int]) -> ca.Function:
     """One sample of the law for one trial.
 
     Inputs: z, zd, pressure_a, pressure_b, force; position, velocity, stiffness, damping, push, joint, joint_rate,
-    acceleration; theta, filter (2, k), theta's lower and upper bounds, cylinders (13, k), k_x, k_f, the scalars of
-    `SCALARS`.
-    Outputs: valve, required and present force, theta, filter.
+    acceleration; theta, friction (2, k), filter (2, k), lower and upper bounds of theta and of friction, cylinders
+    (13, k), k_x, k_f, the scalars of `SCALARS`.
+    Outputs: valve, required and present force, theta, friction, filter.
     """
     s = SymbolicChain(chain)
     n, k, count = len(chain.independent), len(chain.driven), chain.model.njoints - 1
@@ -56,8 +56,10 @@ def law_function(chain: ClosedChain, axes: tuple[int, int]) -> ca.Function:
     scalars = ca.SX.sym("scalars", len(SCALARS))
     gain = dict(zip(SCALARS, ca.vertsplit(scalars), strict=True))
     theta, rows = _rows("theta", count, PARAMETERS)
+    rub, friction = _rows("friction", 2, k)
     memory, filtered = _rows("memory", 2, k)
     bounds = [_rows(name, count, PARAMETERS) for name in ("lower", "upper")]
+    rub_bounds = [_rows(f"friction_{name}", 2, k) for name in ("lower", "upper")]
     table, cylinder = _rows("cylinder", len(CYLINDER), k)
     k_x, k_f = ca.SX.sym("k_x", k), ca.SX.sym("k_f", k)
     c = {name: cylinder[i, :].T for i, name in enumerate(CYLINDER)}
@@ -70,16 +72,18 @@ def law_function(chain: ClosedChain, axes: tuple[int, int]) -> ca.Function:
     piston = s.q[chain.driven.tolist()]
     arms = ca.jacobian(piston, s.z)
     speed, speed_r = arms @ s.zd, arms @ rate
-    f_pr = ca.solve(arms.T, needed) + c["coulomb_friction"] * ca.tanh(speed_r / SLIDING)
-    f_pr = f_pr + c["viscous_friction"] * speed_r
+    shape = ca.horzcat(ca.tanh(speed_r / SLIDING), speed_r).T
+    f_pr = ca.solve(arms.T, needed) + ca.sum1(shape * friction).T
     value, slope = _filtered(f_pr, filtered, gain)
     valve = _valve(c, (p_a, p_b), (piston, speed, speed_r), (f_pr, slope), (k_x, k_f))
-    learned = _adapted(rows, drive, [b[1] for b in bounds], gain)
-    inputs = (
-        s.z, s.zd, p_a, p_b, force, *reference, theta, memory, bounds[0][0], bounds[1][0], table, k_x, k_f, scalars
-    )  # fmt: skip
+    learned = _adapted(rows, gain["adaptation"] * ca.horzcat(*drive).T, [b[1] for b in bounds], gain["dt"])
+    speeds = ca.vertcat(gain["coulomb"], gain["viscous"])
+    drive_f = ca.repmat(speeds, 1, k) * shape * ca.repmat((speed_r - speed).T, 2, 1)
+    rubbed = _adapted(friction, drive_f, [b[1] for b in rub_bounds], gain["dt"])
+    limits = (b[0] for b in (*bounds, *rub_bounds))
+    inputs = (s.z, s.zd, p_a, p_b, force, *reference, theta, rub, memory, *limits, table, k_x, k_f, scalars)
     present = c["area_a"] * p_a - c["area_b"] * p_b
-    return _function("law", inputs, (valve, f_pr, present, learned, ca.vertcat(value.T, slope.T)))
+    return _function("law", inputs, (valve, f_pr, present, learned, rubbed, ca.vertcat(value.T, slope.T)))
 
 
 def _rows(name: str, rows: int, columns: int) -> tuple[Expression, Expression]:
@@ -197,9 +201,9 @@ def _valve(
     return ca.fmin(ca.fmax(flow / (c["edge"] * ca.if_else(flow > 0, extend, retract)), -1.0), 1.0)
 
 
-def _adapted(rows: Expression, drive: list[Expression], bounds: list[Expression], gain: dict[str, Any]) -> Expression:
+def _adapted(rows: Expression, rate: Expression, bounds: list[Expression], dt: Expression) -> Expression:
     """Parameters after a sample, `vdc_adaptation`: clipping says the same as projecting first."""
-    moved = rows + gain["dt"] * gain["adaptation"] * ca.horzcat(*drive).T
+    moved = rows + dt * rate
     return ca.fmin(ca.fmax(moved, bounds[0]), bounds[1])
 
 

@@ -1,6 +1,6 @@
 r"""Virtual Decomposition Control, one hydraulic cylinder: from a required piston force to a valve command.
 
-    f_pr = f_cr + F_fric(xd_r)
+    f_pr = f_cr + Y_f(xd_r) theta_f,    Y_f = (tanh(v / v_s), v),    theta_f' = rho_f Y_f^T (xd_r - xd) within bounds
     u_f = k_x (xd_r - xd) + k_f (f_pr - f_p) + f_pr'/B + A_a xd/(V_a/A_a + x) + A_b xd/(V_b/A_b + s - x)
           + c_l (1/(V_a/A_a + x) + 1/(V_b/A_b + s - x)) (p_a - p_b),    f_p = A_a p_a - A_b p_b
     u = u_f / (c sqrt(p_S - p_a)/(V_a/A_a + x) + c sqrt(p_b - p_R)/(V_b/A_b + s - x))    for u_f > 0,
@@ -8,8 +8,8 @@ r"""Virtual Decomposition Control, one hydraulic cylinder: from a required pisto
 
 J. Koivumaki and J. Mattila's cylinder subsystem as published with the data set of Petrovic and Mattila, Mech. Mach.
 Theory 170 (2022) 104680. With the exact inverse, (f_pr - f_p)'/B = -k_x (xd_r - xd) - k_f (f_pr - f_p), so
-(f_pr - f_p)^2 / (2 B k_x) is the accompanying function of a cylinder. Pressure drops below `laminar_pressure` are
-raised to it (our choice): the published inverse divides by a root that vanishes.
+(f_pr - f_p)^2 / (2 B k_x) + (theta_f - theta_f^)^2 / (2 rho_f) is the accompanying function of a cylinder. Pressure
+drops below `laminar_pressure` are raised to it (our choice): the published inverse divides by a root that vanishes.
 """
 
 from __future__ import annotations
@@ -97,6 +97,16 @@ def pressure_force(c: Cylinders, pressure_a: Float, pressure_b: Float) -> Float:
 def friction(c: Cylinders, velocity: Float) -> Float:
     """Coulomb and viscous friction (..., n) against a sliding piston [N]."""
     return np.asarray(c.coulomb_friction * np.tanh(velocity / _SLIDING) + c.viscous_friction * velocity)
+
+
+def friction_parameters(c: Cylinders) -> Float:
+    """theta_f (2, n) of the friction law: F_C [N] and F_v [N s/m], as the controller knows them."""
+    return np.stack([c.coulomb_friction, c.viscous_friction])
+
+
+def friction_regressor(velocity: Float) -> Float:
+    """Y_f (..., 2, n) of velocities (..., n): friction is the sum of Y_f theta_f over the second axis from the end."""
+    return np.stack([np.tanh(velocity / _SLIDING), velocity], axis=-2)
 
 
 def pressure_rates(

@@ -15,7 +15,7 @@ SAME = 1e-9  # relative; both do some thousand operations in double precision, i
 
 
 def machine():
-    return crane(), cylinders(crane().robot.spec.actuation), HydraulicGains()
+    return crane(), cylinders(crane().robot.spec.actuation), HydraulicGains(friction=(1e5, 2e5))
 
 
 def draw(rng, count):
@@ -57,7 +57,7 @@ def test_the_generated_law_is_the_readable_law_sample_after_sample(use_compiler)
         measured, reference = draw(rng, count)
         readable, generated = (law.step(measured, reference, everyone) for law in laws)
         close(generated, readable)
-        close([laws[1].theta], [laws[0].theta])
+        close([laws[1].theta, laws[1].friction], [laws[0].theta, laws[0].friction])
     for law in laws:
         law.start()
     close(*(law.step(*draw(np.random.default_rng(4), count), everyone) for law in reversed(laws)))
@@ -82,7 +82,9 @@ def test_a_trial_is_the_same_to_the_bit_alone_and_in_a_batch():
         own = alone.step(
             Measured(*(x[i : i + 1] for x in measured)), Reference(*(x[i : i + 1] for x in reference)), np.arange(1)
         )  # fmt: skip
-        for one, many in zip((*own, alone.theta), (*together, batch.theta), strict=True):
+        for one, many in zip(
+            (*own, alone.theta, alone.friction), (*together, batch.theta, batch.friction), strict=True
+        ):
             np.testing.assert_array_equal(one[0], many[i])
 
 
@@ -90,10 +92,12 @@ def test_a_trial_is_the_same_to_the_bit_alone_and_in_a_batch():
 def test_trials_that_have_ended_learn_nothing_more(law):
     measured, reference = draw(np.random.default_rng(7), 3)
     own = law(*machine(), 3, DT)
-    before = own.theta.copy()
+    before, rub = own.theta.copy(), own.friction.copy()
     own.step(measured, reference, np.array([0, 2]))
     np.testing.assert_array_equal(own.theta[1], before[1])
+    np.testing.assert_array_equal(own.friction[1], rub[1])
     assert np.any(own.theta[0] != before[0])
+    assert np.any(own.friction[0] != rub[0])
 
 
 def test_without_a_compiler_the_law_says_so(monkeypatch):
