@@ -22,7 +22,7 @@ RADIUS = 0.05
 LENGTH, WIDTH, STEP = 1.2, 0.8, 0.144
 WOOD, FOAM = (0.76, 0.60, 0.42, 1.0), (0.93, 0.94, 0.96, 1.0)
 STIFFNESS = {"wood": 1e6, "styrofoam": 3e4}
-SHEETS = 0.15
+SHEETS = 0.2
 """Thickness of the styrofoam sheets [m]: the deepest that a tool may sink into them."""
 PLATE = 0.2
 """Half thickness of the plates that are touched, and how far they reach behind each other [m]."""
