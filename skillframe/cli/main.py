@@ -27,6 +27,7 @@ COMMANDS = {
     "skill": "Show and explain a learned skill.",
     "run": "Run a skill in a simulated world.",
     "campaign": "Run a skill many times over declared uncertainty.",
+    "export": "Write a skill as settings of another controller.",
     "report": "Make a self-contained HTML report from results.",
     "reproduce": "The papers' results, row by row.",
     "robots": "List, check and show robots.",

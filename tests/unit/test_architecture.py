@@ -18,7 +18,7 @@ PLUGINS = sorted(p for p in (ROOT / "plugins").iterdir() if (p / "src").is_dir()
 FLOORS = [
     {"errors", "paths", "frames", "config"},
     {"demonstration", "conditioning", "skill", "records", "hookspecs"},
-    {"sequence", "skillfile", "robot", "registry", "skillsource"},
+    {"sequence", "skillfile", "export", "robot", "registry", "skillsource"},
     {"control", "actuation"},
     {"cosim", "world"},
     {"executor", "arms", "machine", "machine_bank", "machine_columns", "recorder", "trace", "prepare"},

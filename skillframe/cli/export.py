@@ -1,0 +1,100 @@
+"""`skillframe export`: a learned phase as settings or a message of a controller that others wrote."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from skillframe.frames import Float
+
+
+@click.command()
+@click.argument("skill", required=False, type=click.Path(path_type=Path))
+@click.option("--to", "form", metavar="FORMAT", help="Format to write; --list names them.")
+@click.option("--out", type=click.Path(path_type=Path), help="File to write (.yaml).")
+@click.option("--phase", type=int, help="Phase of a policy, counted from 1.")
+@click.option("--coc", help='Centre of compliance: "x,y,z" in the tool frame, or a frame (tip) [as learned].')
+@click.option("--attitude", metavar="QX,QY,QZ,QW", help="The tool's attitude in base at the start of the phase.")
+@click.option("--list", "listing", is_flag=True, help="List formats, write nothing.")
+@click.option("--json", "as_json", is_flag=True, help="JSON on stdout: the formats, or what was written.")
+def command(
+    skill: Path | None, form: str | None, out: Path | None, phase: int | None, coc: str | None,
+    attitude: str | None, listing: bool, as_json: bool,
+) -> None:  # fmt: skip
+    """Write a phase of SKILL as settings of another controller.
+
+    What the controller cannot hold is written as comments; what it cannot do at all is refused.
+
+    \b
+    Examples:
+      skillframe export --list
+      skillframe export peg.skill.json --to crisp --coc tip --out peg.yaml
+      skillframe export peg.skill.json --to cartesian_controllers --attitude 1,0,0,0 --out peg.yaml
+    """
+    if listing:
+        _list(as_json)
+        return
+    for name, value in (("SKILL", skill), ("--to", form), ("--out", out)):
+        if value is None:
+            raise click.UsageError(f"Missing '{name}'; for example: export peg.skill.json --to crisp --out peg.yaml")
+    assert skill is not None
+    assert form is not None
+    assert out is not None
+    _write(skill, form, out, phase, coc, attitude)
+    if as_json:
+        from skillframe.cli.output import emit_json
+
+        emit_json({"file": str(out), "format": form})
+    else:
+        click.echo(f"{out}: {form}")
+
+
+def _list(as_json: bool) -> None:
+    from skillframe.cli.output import emit_json, table
+    from skillframe.export.formats import FORMATS
+
+    if as_json:
+        emit_json([{"name": f.name, "summary": f.summary, "axes": f.axes} for f in FORMATS.values()])
+        return
+    table(("format", "axes", "what it is"), [(f.name, f.axes, f.summary) for f in FORMATS.values()])
+
+
+def _write(skill: Path, form: str, out: Path, phase: int | None, coc: str | None, attitude: str | None) -> None:
+    from skillframe.demonstration.record import resolve_point
+    from skillframe.demonstration.safe import replace_file
+    from skillframe.errors import UnknownName
+    from skillframe.export.formats import FORMATS, settings_text
+    from skillframe.export.impedance import moving_impedance
+    from skillframe.registry import registry
+    from skillframe.skillfile import load
+
+    if form not in FORMATS:
+        raise UnknownName("format", form, list(FORMATS))
+    document = load(skill)
+    kind = registry().behaviour(document["type"])
+    words = kind.describe(document)[:1] if kind.describe is not None else []
+    if coc is not None:
+        frame = document["frame"]
+        frame["center_of_compliance"] = resolve_point(coc, frame.get("frames", {})).tolist()
+    turned = None if attitude is None else _attitude(attitude)
+    moving = moving_impedance(document, phase, FORMATS[form].axes, turned, str(skill))
+    replace_file(out, settings_text(FORMATS[form], moving, [f"{skill.name}: {line}" for line in words]).encode())
+
+
+def _attitude(text: str) -> Float:
+    import numpy as np
+
+    from skillframe.errors import InputError
+    from skillframe.frames import matrix_from_quaternion
+
+    try:
+        q = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        q = np.zeros(0)
+    if q.shape != (4,) or not abs(np.sqrt(q @ q) - 1.0) < 0.01:
+        raise InputError("--attitude", f"{text!r} is not a unit quaternion", "give qx,qy,qz,qw, w last")
+    rotation: Float = matrix_from_quaternion(q / np.sqrt(q @ q))
+    return rotation

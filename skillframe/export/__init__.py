@@ -1,0 +1,1 @@
+"""Learned skills as settings and messages of controllers that others wrote."""

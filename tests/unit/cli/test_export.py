@@ -1,0 +1,62 @@
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+
+from skillframe.cli.main import run
+from skillframe.conformance.examples import example_demonstrations
+from skillframe.demonstration.files import write_demonstration
+
+pytestmark = pytest.mark.needs_plugins
+
+
+@pytest.fixture
+def skill(tmp_path: Path) -> str:
+    paths = [tmp_path / "left.npz", tmp_path / "right.npz"]
+    for path, demonstration in zip(paths, example_demonstrations(), strict=True):
+        write_demonstration(demonstration, path)
+    out = tmp_path / "slide.skill.json"
+    assert run(["learn", *map(str, paths), "--out", str(out)]) == 0
+    return str(out)
+
+
+@pytest.mark.parametrize("form", ["crisp", "aic_motion_update", "cartesian_controllers"])
+def test_a_learned_skill_is_written_as_yaml_of_every_format(skill: str, form: str, tmp_path: Path) -> None:
+    out = tmp_path / "out.yaml"
+    assert run(["export", skill, "--to", form, "--attitude", "1,0,0,0", "--out", str(out)]) == 0
+    assert isinstance(yaml.safe_load(out.read_text()), dict)
+    assert "# slide.skill.json: push along -z at 20 mm/s" in out.read_text()
+
+
+def test_the_formats_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["export", "--list", "--json"]) == 0
+    assert [f["name"] for f in json.loads(capsys.readouterr().out)] == [
+        "crisp", "cartesian_controllers", "aic_motion_update",
+    ]  # fmt: skip
+
+
+def test_the_centre_of_compliance_can_be_elsewhere_than_where_it_was_learned(skill: str, tmp_path: Path) -> None:
+    out = tmp_path / "out.yaml"
+    assert run(["export", skill, "--to", "crisp", "--coc", "0,0,0.125", "--out", str(out)]) == 0
+    assert "centre of compliance (0, 0, 0.125) m" in out.read_text()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--to", "crips"], "did you mean 'crisp'"),
+        (["--to", "cartesian_controllers"], "--attitude"),
+        (["--to", "crisp", "--attitude", "1,1,0,0"], "not a unit quaternion"),
+        (["--to", "crisp", "--phase", "2"], "no phase 2"),
+        (["--to", "crisp", "--coc", "tpi"], "tpi"),
+        ([], "Missing '--to'"),
+    ],
+)
+def test_what_cannot_be_exported_is_one_sentence_and_no_file(
+    skill: str, options: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out.yaml"
+    assert run(["export", skill, *options, "--out", str(out)]) == 2
+    assert said in capsys.readouterr().err
+    assert not out.exists()
