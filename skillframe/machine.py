@@ -31,6 +31,7 @@ from skillframe.machine_bank import banks, instance_parameters
 from skillframe.machine_columns import EnergyBill, columns, supply_pressures
 from skillframe.recorder import Recorder
 from skillframe.robot.feasibility import require_feasible
+from skillframe.robot.holding import require_held
 from skillframe.robot.loops import ClosedChain
 from skillframe.skill import Command, Observation, Skill
 from skillframe.world.coupled import CoupledPlant
@@ -121,8 +122,10 @@ class MachineLoop(Loop):
         z = self._true_z()
         hold = self._holding_force(z, draws)
         own = instance_parameters(self.setup.robot.spec, draws, hold)
-        self.master.start(0.0, 0.0, own)
         supply = supply_pressures(own, self.law.cylinders.supply_pressure, self.count)
+        require_held(self.setup.robot.spec.actuation, hold, supply, f"robot {self.setup.robot.spec.name}")
+        self.master.start(0.0, 0.0, own)
+        self._require_pressures()
         self.bill = EnergyBill(self.bank, supply, self.dt)
         if all(self.bank.capabilities(i).rollback for i in range(len(self.chain.actuated))):
             numbers = coupling_numbers(self.bank, self.coupled.effective_mass(), self.dt)
@@ -154,6 +157,14 @@ class MachineLoop(Loop):
     def _true_pressures(self) -> tuple[Float, Float]:
         a, b = (self.bank.y[:, column].reshape(self.count, -1) for column in self._pressures)
         return a, b
+
+    def _require_pressures(self) -> None:
+        for side, pressure in zip("ab", self._true_pressures(), strict=True):
+            running = self.bank.active.reshape(pressure.shape).astype(bool)
+            for trial, k in np.argwhere(running & ~np.isfinite(pressure))[:1]:
+                where = f"robot {self.setup.robot.spec.name}, {self.chain.actuated[k]}"
+                text = f"its FMU gives no pressure_{side}, from which the force is estimated (trial {trial})"
+                raise InputError(where, text, "map it under outputs of its [[actuation]]")
 
     def _measured(self) -> Measured:
         gauges = self.gauges

@@ -31,7 +31,7 @@ class ImpulseFilter:
     """The converged filter for N forces in lock-step, each component for itself.
 
     Args:
-        corner: w / 2 pi [Hz], at most a hundredth of the sampling rate: (2) is the gain in continuous time.
+        corner: w / 2 pi [Hz], at most a twentieth of the sampling rate: (2) is the gain in continuous time.
         dt: sample time [s].
 
     Raises:
@@ -39,8 +39,8 @@ class ImpulseFilter:
     """
 
     def __init__(self, corner: float, dt: float) -> None:
-        if corner * dt > 0.01:
-            raise SkillframeError(f"force filter: a corner of {corner:g} Hz needs {100.0 * corner:g} samples a second")
+        if corner * dt > 0.05:
+            raise SkillframeError(f"force filter: a corner of {corner:g} Hz needs {20.0 * corner:g} samples a second")
         self._gains, self._dt = tuple(float(k) for k in dt * gains(corner)), dt
 
     def start(self, force: Float) -> None:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import signal
 
 from skillframe.conditioning.damped import CriticallyDamped, Undamped
 from skillframe.conditioning.impulse import ImpulseFilter, gains
@@ -63,6 +64,17 @@ def test_the_gain_is_that_of_filterpys_filter_once_it_has_converged():
     np.testing.assert_allclose(kalman.K[:, 0] / DT, gains(CORNER), rtol=0.06)
 
 
+@pytest.mark.parametrize("rate", [60.0, 100.0, 1000.0])
+def test_at_every_rate_that_is_taken_a_step_is_followed_as_in_continuous_time(rate):
+    """Scipy's step response: a filter without lag on a ramp must overshoot. A sample of its largest slope, 0.8 w."""
+    smooth, k = ImpulseFilter(CORNER, 1.0 / rate), gains(CORNER)
+    smooth.start(np.zeros((1, 1)))
+    found = np.array([smooth.step(np.ones((1, 1)))[0, 0] for _ in range(round(3 * rate))])
+    _, expected = signal.step(signal.TransferFunction(k[2:], [1.0, *k]), T=np.arange(len(found) + 1) / rate)
+    np.testing.assert_allclose(found, expected[1:], atol=0.8 * 2.0 * np.pi * CORNER / rate)
+    assert found[-1] == pytest.approx(1.0, abs=1e-6)
+
+
 def test_a_ramp_is_followed_without_lag_and_promised_ahead():
     """4e-3: a sample of 1 ms, and what is left of the start after 2 s."""
     smooth = ImpulseFilter(CORNER, DT)
@@ -84,5 +96,5 @@ def test_noise_of_positions_differentiated_twice_is_taken_out_ten_times_better_t
 
 
 def test_a_corner_near_the_sampling_rate_is_refused():
-    with pytest.raises(SkillframeError, match="a corner of 20 Hz needs 2000 samples a second"):
-        ImpulseFilter(20.0, DT)
+    with pytest.raises(SkillframeError, match="a corner of 100 Hz needs 2000 samples a second"):
+        ImpulseFilter(100.0, DT)
