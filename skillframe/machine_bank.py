@@ -9,6 +9,7 @@ import numpy as np
 
 from skillframe.actuation.actuator import Actuators, ActuatorSpec
 from skillframe.actuation.opening import open_actuators
+from skillframe.errors import InputError
 from skillframe.frames import Float
 from skillframe.robot.spec import RobotSpec
 
@@ -44,8 +45,8 @@ def instance_parameters(spec: RobotSpec, draws: Mapping[str, Float], hold: Float
     result = []
     for trial, forces in enumerate(hold):
         for actuation, force in zip(spec.actuation, forces, strict=True):
-            own = actuation.fmu == CYLINDER
-            result.append(_drawn(actuation.parameters, draws, trial) | ({"initial_force": float(force)} if own else {}))
+            held = actuation.initial_force or ("initial_force" if actuation.fmu == CYLINDER else "")
+            result.append(_drawn(actuation.parameters, draws, trial) | ({held: float(force)} if held else {}))
     return result
 
 
@@ -57,7 +58,9 @@ def _drawn(parameters: Mapping[str, Any], draws: Mapping[str, Float], trial: int
     }
     if "actuator.friction_scale" in draws:
         scale = float(np.asarray(draws["actuator.friction_scale"])[trial])
-        for name in ("coulomb_friction", "viscous_friction", "static_friction"):
-            if name in parameters:
-                changed[name] = scale * float(parameters[name])
+        frictions = [n for n in ("coulomb_friction", "viscous_friction", "static_friction") if n in parameters]
+        if not frictions:
+            text = "no actuator parameter is called coulomb_friction, viscous_friction or static_friction"
+            raise InputError("actuator.friction_scale", text, "vary something that the FMU has under that name")
+        changed |= {name: scale * float(parameters[name]) for name in frictions}
     return changed

@@ -69,12 +69,12 @@ def cylinders(actuation: Sequence[Actuation], where: object = "robot.toml") -> C
     Raises:
         InputError: a parameter is missing.
     """
-    rows = [a.parameters for a in actuation]
+    rows = [a.known for a in actuation]
     for a in actuation:
-        missing = [name for name in _NAMES if name not in a.parameters]
+        missing = [name for name in _NAMES if name not in a.known]
         if missing:
             text = f"the cylinder on {a.joint} has no {', '.join(missing)}"
-            raise InputError(where, text, "add it to the parameters of its [[actuation]]")
+            raise InputError(where, text, "add it to parameters or nominal of its [[actuation]]")
     p = {name: np.array([row[name] for row in rows], dtype=float) for name in _NAMES}
     area_a = math.pi / 4 * p["bore"] ** 2
     area_b = area_a - math.pi / 4 * p["rod"] ** 2

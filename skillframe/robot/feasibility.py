@@ -36,11 +36,11 @@ def capacity(actuation: Actuation, where: object = "robot.toml") -> Capacity:
     Raises:
         InputError: a parameter that decides it is not given.
     """
-    p = actuation.parameters
+    p = actuation.known
     missing = [name for name in _NEEDED if name not in p]
     if missing:
         text = f"the cylinder on {actuation.joint} has no {', '.join(missing)}"
-        raise InputError(where, text, "add it to the parameters of its [[actuation]]")
+        raise InputError(where, text, "add it to parameters or nominal of its [[actuation]]")
     area_a = math.pi / 4 * p["bore"] ** 2
     area_b = area_a - math.pi / 4 * p["rod"] ** 2
     high, low = p["supply_pressure"], p["return_pressure"]
@@ -50,7 +50,8 @@ def capacity(actuation: Actuation, where: object = "robot.toml") -> Capacity:
 def problems(chain: ClosedChain, z: Float) -> list[str]:
     """Why the chain cannot stand at minimal coordinates (n,): sentences, none if it can.
 
-    Actuators other than `hydraulic_cylinder` are judged by stroke limits of the URDF and moment arm only.
+    Other actuators than `hydraulic_cylinder` whose areas or pressures are not given are judged by stroke limits of the
+    URDF and moment arm only.
 
     Raises:
         InputError: a cylinder whose pressures or areas are not given.
@@ -98,12 +99,12 @@ def _dead_centres(state: ChainState) -> list[str]:
 def _overloaded(state: ChainState) -> list[str]:
     spec, found = state.chain.robot.spec, []
     for actuation, force in zip(spec.actuation, state.holding_force(), strict=False):
-        if actuation.fmu != CYLINDER:
+        if actuation.fmu != CYLINDER and any(name not in actuation.known for name in _NEEDED):
             continue
         limit = capacity(actuation, spec.folder / "robot.toml")
         bound, way = (limit.push, "push") if force > 0.0 else (limit.pull, "pull")
         if abs(force) > bound:
-            pressure = actuation.parameters["supply_pressure"] / 1e5
+            pressure = actuation.known["supply_pressure"] / 1e5
             found.append(
                 f"{actuation.joint} would have to {way} {abs(force) / 1e3:.1f} kN, more than the"
                 f" {bound / 1e3:.1f} kN that {pressure:.0f} bar can give"

@@ -96,13 +96,26 @@ class Payload:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Actuation:
-    """An actuator (an FMU) on a joint; `inputs` and `outputs` map our names to the FMU's."""
+    """An actuator (an FMU) on a joint.
+
+    Attributes:
+        parameters: of the FMU, by its names; inputs, outputs: our names to the FMU's.
+        nominal: what the controller takes the cylinder for, by our names, where the FMU is not told so in `parameters`.
+        initial_force: the FMU's parameter for the force [N] that it holds at the start; "" if it has none.
+    """
 
     joint: str
     fmu: str
     parameters: dict[str, Any] = field(default_factory=dict)
     inputs: dict[str, str] = field(default_factory=dict)
     outputs: dict[str, str] = field(default_factory=dict)
+    nominal: dict[str, Any] = field(default_factory=dict)
+    initial_force: str = ""
+
+    @property
+    def known(self) -> dict[str, Any]:
+        """Parameters of the cylinder as the controller knows them, by our names."""
+        return {**self.parameters, **self.nominal}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

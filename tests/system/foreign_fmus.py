@@ -91,14 +91,16 @@ INPUT;;a;cylinder.fmu;acceleration
 OUTPUT;cylinder.fmu;force;;F
 OUTPUT;cylinder.fmu;work;;W
 OUTPUT;cylinder.fmu;pressure_a;;pa
+OUTPUT;cylinder.fmu;pressure_b;;pb
 """
 
 
-def container(version, cylinder: Path, folder: Path) -> Path:
-    """An FMU around a cylinder's, made by the toolbox with its own compiled master."""
+def container(version, cylinder: Path, folder: Path, parameters: bool = False) -> Path:
+    """An FMU around a cylinder's, made by the toolbox with its own compiled master; parameters as cylinder.NAME."""
     shutil.copy(cylinder, folder / "cylinder.fmu")
     (folder / "held.csv").write_text(CONTAINER)
     code = "from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer; fmucontainer()"
     options = ["-fmu-directory", folder, "-container", "held.csv:0.001", "-fmi", version, "-no-auto-output"]
+    options += ["-auto-parameter"] * parameters
     subprocess.run([sys.executable, "-c", code, *map(str, options)], check=True, capture_output=True, timeout=60)
     return folder / "held.fmu"

@@ -1,6 +1,7 @@
 """The crane hiab_xs031 against its published figures, and the laws of closed chains by loop embedding."""
 
 import math
+from dataclasses import fields, replace
 from functools import cache
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from skillframe.control.vdc_actuator import Cylinders, cylinders
 from skillframe.errors import InputError, UnknownName
+from skillframe.machine_bank import instance_parameters
 from skillframe.robot.audit import audit
 from skillframe.robot.feasibility import capacity, problems, require_feasible
 from skillframe.robot.loops import ClosedChain, OutOfReach, step
@@ -220,6 +223,40 @@ def test_the_lift_cylinder_pushes_and_pulls_what_the_areas_say():
     limit = capacity(crane().robot.spec.actuation[0])
     assert limit.push == pytest.approx(AREA_A * 190e5 - AREA_B * 10e5)
     assert limit.pull == pytest.approx(AREA_B * 190e5 - AREA_A * 10e5)
+
+
+def told(robot, without=()):
+    """A robot whose lift cylinder is another maker's: `parameters` are its own names, ours stand under `nominal`."""
+    lift, *rest = robot.actuation
+    values = {name: value for name, value in lift.parameters.items() if name not in without}
+    return replace(robot, actuation=[replace(lift, fmu="winch.fmu", parameters={"d": 0.08}, nominal=values), *rest])
+
+
+def test_what_is_nominal_of_another_makers_cylinder_is_known_to_capacity_and_law_as_our_own_parameters_are():
+    own, other = load_robot("hiab_xs031").actuation, told(load_robot("hiab_xs031")).actuation
+    assert capacity(other[0]) == capacity(own[0])
+    for field in fields(Cylinders):
+        assert np.array_equal(getattr(cylinders(own), field.name), getattr(cylinders(other), field.name)), field.name
+
+
+def test_another_makers_cylinder_of_which_too_little_is_known_is_refused_with_what_is_missing():
+    other = told(load_robot("hiab_xs031"), without=("bore", "leakage")).actuation
+    with pytest.raises(InputError, match=r"lift_piston has no bore, leakage; add it to parameters or nominal"):
+        cylinders(other)
+
+
+def test_the_force_held_at_the_start_goes_to_the_parameter_that_the_robot_names():
+    robot = told(load_robot("hiab_xs031"))
+    hold = np.array([[5e4, 3e4, 1e4]])
+    assert [sorted(row) for row in instance_parameters(robot, {}, hold)] == [[], ["initial_force"], ["initial_force"]]
+    named = replace(robot, actuation=[replace(robot.actuation[0], initial_force="F0"), *robot.actuation[1:]])
+    assert instance_parameters(named, {}, hold)[0] == {"F0": 5e4}
+
+
+def test_varying_a_friction_that_the_fmu_does_not_have_is_refused():
+    draws = {"actuator.friction_scale": np.array([1.2])}
+    with pytest.raises(InputError, match="no actuator parameter is called coulomb_friction"):
+        instance_parameters(told(load_robot("hiab_xs031")), draws, np.zeros((1, 3)))
 
 
 @pytest.mark.parametrize(
