@@ -90,6 +90,39 @@ def single(name, bound):
     show(f"{name}, one run, by wall time", 1.0 / wall, "x")
 
 
+def two_arms():
+    """A batch of 32 insertions with two arms in contact, each trial against real time."""
+    from skillframe.arms import simulate_arms
+    from skillframe.errors import UnknownName
+    from skillframe.executor import Setup
+    from skillframe.prepare import load_robot_model, load_world
+    from skillframe.registry import registry
+    from tests.laws.runs import generators
+
+    try:
+        kind = registry().coordinator("dual_arm")
+    except UnknownName:
+        print("two arms: the plug-in is not installed")
+        return
+    scene, count, marks = load_world("dual_peg", {}), 32, []
+    tip = list(scene.tool.frames["tip"])
+    arm = {"center_of_compliance": tip, "compliant": ["translation", "rotation"]}
+    document = {"phases": [{"arms": [{**arm, "share": 1.0}, {**arm, "compliant": [], "share": 0.0}]}]}
+    setting = Setup(robot=load_robot_model("dual_panda"), scene=scene, center_of_compliance=kind.centers(document))
+    simulate_arms(
+        kind.build(document), setting, {"start.tilt_y": np.linspace(-0.1, 0.1, count)}, generators(count),
+        duration_s=4.0, trace_hz=100.0, progress=lambda now: marks.append((now, time.process_time())),
+    )  # fmt: skip
+    (first, begun), (last, ended) = marks[0], marks[-1]
+    show(
+        f"two arms, batch of {count}: real time of each trial",
+        count * (last - first) / (ended - begun),
+        "x",
+        8.0,
+        below=False,
+    )
+
+
 def memory():
     """Resident and virtual memory of 256 trials, in a process of its own; then of a long run with a fine trace."""
     for what in ("batch", "long"):
@@ -188,6 +221,7 @@ def main():
         batch(name)
     single("arm in the valley", 6.0)
     single("arm with the peg", 4.0)
+    two_arms()
     memory()
 
 
