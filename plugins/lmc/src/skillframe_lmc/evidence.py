@@ -109,6 +109,8 @@ def _push(part: Learned) -> str:
 
 def _held_message(part: Learned, settings: Settings) -> str:
     most = max(m.excursion for m in part.motions)
+    if most >= (settings.moving_m if part.name == "translation" else settings.moving_rad):
+        return "touched nothing while it moved, and only contact counts (--set contact_only=...), so it is held"
     if part.name == "translation":
         moved, least, key = f"{1e3 * most:.1f} mm", f"{1e3 * settings.moving_m:.3g} mm", "moving_m"
     else:

@@ -169,6 +169,12 @@ def rotation(blocks: Track, settings: Settings) -> Motion:
     return _motion(blocks, knots, fine, whole, blocks.torque, 1, distance, settings)
 
 
+def touching(motion: Motion) -> Motion:
+    """The same motion without its intervals that are free of contact; path and duration stay those of the whole."""
+    keep = norm(motion.load) >= motion.load_min
+    return motion._replace(displacement=motion.displacement[keep], load=motion.load[keep], work=motion.work[keep])
+
+
 def _translation_step(x: Float, excursion: float, settings: Settings) -> float:
     path = _path(x, 0.5 * settings.step_m)
     short = min(0.5 * settings.step_m, excursion / FEWEST_STEPS)

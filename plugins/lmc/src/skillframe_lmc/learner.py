@@ -150,6 +150,8 @@ def _learn_part(
     name: Name, tracks: Sequence[Track], cut: Callable[[Track, Settings], Motion], settings: Settings
 ) -> Learned:
     motions = [cut(blocks, settings) for blocks in tracks]
+    if settings.contact_only:
+        motions = [intervals.touching(motion) for motion in motions]
     least = settings.moving_m if name == "translation" else settings.moving_rad
     moving = [m for m in motions if m.excursion >= least and len(m.displacement)]
     means = np.array([unit(m.displacement).mean(axis=0) for m in moving]).reshape(-1, 3)

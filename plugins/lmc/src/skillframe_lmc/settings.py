@@ -21,6 +21,8 @@ class Settings:
         moving_m, moving_rad: least excursion from the start that counts as a motion; below it the part is held.
         force_min_n, torque_min_nm: below it an interval counts as free of contact (raised where the sensor is noisy or
             the forces of the recording are large).
+        contact_only: leave out the motion before the tool touches and between touches; for machines, whose wrench is
+            only an estimate and whose approach says little about the push.
         quantile: share of a demonstration's intervals that must accept a direction; the rest may be outliers.
         pyramid_min_rad, pyramid_max_rad: least half-opening of the pyramids, and the largest at which a direction is
             still said to exist.
@@ -40,6 +42,7 @@ class Settings:
     moving_rad: float = radians(2.5)
     force_min_n: float = 1.0
     torque_min_nm: float = 0.08
+    contact_only: bool = False
     quantile: float = 0.8
     pyramid_min_rad: float = radians(8.0)
     pyramid_max_rad: float = radians(25.0)
@@ -60,6 +63,8 @@ class Settings:
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
             value = getattr(self, name)
+            if isinstance(value, bool):
+                continue
             if not 0.0 < value < float("inf"):
                 raise InputError(f"--set {name}", f"{value} is not a positive number", "give a positive number")
         if self.quantile > 1.0 or self.slack < 1.0:
