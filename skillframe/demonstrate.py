@@ -6,7 +6,7 @@ counted; the count is part of the result and of the file's metadata.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -19,6 +19,7 @@ from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, 
 from skillframe.robot.model import RobotModel
 from skillframe.staged_teacher import teacher_for
 from skillframe.teacher import TeacherSettings
+from skillframe.teleoperation import OperatorSettings
 from skillframe.trace import Trace
 from skillframe.world.placement import fixture_poses
 from skillframe.world.scene import Scene
@@ -67,40 +68,62 @@ def record(
     Raises:
         SkillframeError: a slot still fails after 20 attempts; says with what.
     """
+    sensors = sensors or (ESTIMATED if settings.kind == "teleoperation" else SensorSettings())
+
+    def attempt(slots: list[int], number: int) -> Result:
+        return _attempt(robot, scene, settings, slots, number, seed, draws or {}, rate_hz, duration_s, sensors)
+
+    def keep(trace: Trace, slot: int, number: int) -> Demonstration:
+        return demonstration_from(trace, scene, settings, sensors, seed=seed, slot=slot, attempt=number)
+
+    return collect(scene, count, attempt, keep, progress)
+
+
+def collect(
+    scene: Scene,
+    count: int,
+    attempt: Callable[[list[int], int], Result],
+    keep: Callable[[Trace, int, int], Demonstration],
+    progress: Callable[[str], None] | None,
+) -> Recording:
+    """Let a teacher attempt what is still missing until every slot has its demonstration.
+
+    Args:
+        scene: for the message.
+        count: slots to be filled.
+        attempt: runs the slots, the so many-th time.
+        keep: makes the demonstration of a slot from its trace and the number of the attempt.
+        progress: told in words what happens.
+
+    Raises:
+        SkillframeError: a slot still fails after 20 attempts; says with what.
+    """
     done: dict[int, Demonstration] = {}
     rejected: list[str] = []
-    sensors = sensors or (ESTIMATED if settings.kind == "teleoperation" else SensorSettings())
-    for attempt in range(MOST_ATTEMPTS):
+    for number in range(MOST_ATTEMPTS):
         slots = [slot for slot in range(count) if slot not in done]
-        result = _attempt(robot, scene, settings, slots, attempt, seed, draws or {}, rate_hz, duration_s, sensors)
+        result = attempt(slots, number)
         assert result.traces is not None
         for slot, good, failure, trace in zip(slots, result.success, result.failure, result.traces, strict=True):
             if good:
-                done[slot] = demonstration_from(trace, scene, settings, sensors, seed=seed, slot=slot, attempt=attempt)
+                done[slot] = keep(trace, slot, number)
             else:
-                rejected.append(f"demonstration {slot}, attempt {attempt}: {failure}")
+                rejected.append(f"demonstration {slot}, attempt {number}: {failure}")
         if progress is not None:
             progress(f"{len(done)} of {count} demonstrations recorded, {len(rejected)} rejected")
         if len(done) == count:
-            break
-    else:
-        raise SkillframeError(
-            f"world {scene.name}: the teacher failed {MOST_ATTEMPTS} times for one demonstration "
-            f"(last: {rejected[-1]}); lower the noise or choose another start"
-        )
-    return Recording(demonstrations=[done[slot] for slot in range(count)], rejected=rejected)
+            return Recording(demonstrations=[done[slot] for slot in range(count)], rejected=rejected)
+    raise SkillframeError(
+        f"world {scene.name}: the teacher failed {MOST_ATTEMPTS} times for one demonstration "
+        f"(last: {rejected[-1]}); lower the noise or choose another start"
+    )
 
 
 def _attempt(
     robot: RobotModel, scene: Scene, settings: TeacherSettings, slots: list[int], attempt: int, seed: int,
     draws: Mapping[str, float], rate_hz: float, duration_s: float, sensors: SensorSettings | None,
 ) -> Result:  # fmt: skip
-    starts = [{**scene.task.starts[slot % len(scene.task.starts)]} for slot in slots]
-    for start in starts:
-        for key, value in draws.items():
-            start[key] = start.get(key, 0.0) + value if key.startswith("start.") else value
-    keys = sorted({key for start in starts for key in start})
-    columns = {key: np.array([start.get(key, 0.0) for start in starts]) for key in keys}
+    columns = start_columns(scene, slots, draws)
     teacher = teacher_for(scene, fixture_poses(robot, columns, len(slots)), settings)
     last = (scene.task, *scene.task.then)[-1]
     setup = Setup(
@@ -111,8 +134,19 @@ def _attempt(
     return simulate(teacher, setup, columns, rngs, duration_s=duration_s, trace_hz=rate_hz)
 
 
+def start_columns(scene: Scene, slots: Sequence[int], draws: Mapping[str, float]) -> dict[str, Float]:
+    """Quantities (N,) of the slots: the task's starts in turn, `start.*` draws added to them, others as given."""
+    starts = [{**scene.task.starts[slot % len(scene.task.starts)]} for slot in slots]
+    for start in starts:
+        for key, value in draws.items():
+            start[key] = start.get(key, 0.0) + value if key.startswith("start.") else value
+    keys = sorted({key for start in starts for key in start})
+    return {key: np.array([start.get(key, 0.0) for start in starts]) for key in keys}
+
+
 def demonstration_from(
-    trace: Trace, scene: Scene, settings: TeacherSettings | BlindSettings, sensors: SensorSettings | None = None,
+    trace: Trace, scene: Scene, settings: TeacherSettings | BlindSettings | OperatorSettings,
+    sensors: SensorSettings | None = None,
     **provenance: int,
 ) -> Demonstration:  # fmt: skip
     """A demonstration at the tool point out of a trace taken at the handle; the wrench is as sensed, not filtered."""

@@ -33,7 +33,8 @@ class Hand:
     """How the hand holds: translation stiffness [N/m], damping [Ns/m], relaxation time [s]; rotation alike.
 
     `speed` [m/s] is how fast it pushes on, `turn_rate` [rad/s] how fast an active hand turns the part, and
-    `torque_max` [Nm] how hard.
+    `torque_max` [Nm] how hard. At its largest push a hand that `gives_way` goes back as far as it is pushed back; one
+    that does not slows down as its push grows, stops at the largest, and stays as stiff as before.
     """
 
     stiffness: float
@@ -44,6 +45,7 @@ class Hand:
     speed: float = 0.02
     turn_rate: float = 0.0
     torque_max: float = 1.5
+    gives_way: bool = True
 
 
 HANDS = {
@@ -57,6 +59,9 @@ HANDS = {
         torque_max=3.0,
     ),
     "hold": Hand(stiffness=1000.0, damping=60.0, relaxation=1.0, turn_stiffness=20.0, turn_damping=1.0),
+    "master": Hand(
+        stiffness=1200.0, damping=25.0, relaxation=0.25, turn_stiffness=20.0, turn_damping=1.0, gives_way=False
+    ),
 }  # fmt: skip
 
 
@@ -94,12 +99,13 @@ class Teacher(Skill):
         task: what the person knows, in the fixture frame.
         fixture: true pose of the fixture per trial, (N, 3) and (N, 3, 3).
         settings: how well the person aims.
+        hand: how the person holds; the task's if None.
     """
 
-    def __init__(self, task: Task, fixture: Pose, settings: TeacherSettings) -> None:
+    def __init__(self, task: Task, fixture: Pose, settings: TeacherSettings, hand: Hand | None = None) -> None:
         if task.hand not in HANDS:
             raise UnknownName("hand", task.hand, HANDS)
-        self._task, self._hand, self._settings, self._fixture = task, HANDS[task.hand], settings, fixture
+        self._task, self._hand, self._settings, self._fixture = task, hand or HANDS[task.hand], settings, fixture
 
     def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
         """Take hold of the tool where it is."""
@@ -169,6 +175,9 @@ class Teacher(Skill):
         sideways = error - along * direction
         excess = np.maximum(along - settings.force_max / hand.stiffness, 0.0)
         velocity: Float = (hand.speed if settings.speed is None else settings.speed) * direction
+        if not hand.gives_way:
+            left = 1.0 - along * (hand.stiffness / settings.force_max)
+            velocity, excess = np.clip(left, 0.0, 1.0) * velocity, np.zeros_like(excess)
         self._position = self._position + velocity * dt - sideways * (dt / hand.relaxation) - excess * direction
         return velocity
 

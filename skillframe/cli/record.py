@@ -11,6 +11,7 @@ import click
 if TYPE_CHECKING:
     from skillframe.blind_teacher import BlindSettings
     from skillframe.demonstrate import Recording
+    from skillframe.robot.model import RobotModel
     from skillframe.teacher import TeacherSettings
     from skillframe.world.scene import Scene
 
@@ -24,17 +25,29 @@ if TYPE_CHECKING:
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="File; with --count N: NAME1, NAME2, ...")
 @click.option("--count", default=1, show_default=True, type=click.IntRange(1), help="Number of demonstrations.")
 @click.option("--seed", default=0, show_default=True, help="Everything random follows from it.")
-@click.option("--noise", default=8.0, show_default=True, help="Standard deviation of the person's aim [degrees].")
-@click.option("--delay", type=float, help="One-way delay [s]; default 0, teleoperation 0.1.")
-@click.option("--scale", type=float, help="Motion scale of teleoperation; default 1, teleoperation 2.")
+@click.option("--noise", type=float, help="Standard deviation of the person's aim [degrees]; default 8, machines 6.")
+@click.option("--delay", type=float, help="One-way delay [s]; default 0, teleoperation 0.1, of machines 0.05.")
+@click.option("--scale", type=float, help="Motion scale of teleoperation; default 1, teleoperation 2, of machines 4.")
+@click.option("--force-scale", type=float, help="Machines: force of the machine over force at the hand; default 1000.")
+@click.option(
+    "--hand-stiffness", type=float, help="Machines: how stiffly the hand holds the master [N/m]; default 1200."
+)
+@click.option("--stiffness", type=float, help="Machines: stiffness while they are taught [N/m]; default 1e5.")
+@click.option("--damping", type=float, help="Machines: damping while they are taught [N s/m]; default 1e5.")
+@click.option(
+    "--feed-velocity", is_flag=True, help="Machines: feed the master's velocity as well (mind the loop gain)."
+)
+@click.option("--packet-rate", type=float, help="Machines: packets a second, held between them; default 100.")
+@click.option("--angle", type=float, help="Machines: push at this angle in their plane, -90 straight down [degrees].")
 @click.option("--belief", metavar="X,Y,TURN", help="Blind: deviation of goal minus start [mm, mm, degrees].")
 @click.option("--centre", metavar="X,Y,TURN", help="Blind: mean of goal minus start [mm, mm, degrees]; default 0,0,0.")
-@click.option("--rate", default=500.0, show_default=True, help="Sample rate [Hz].")
+@click.option("--rate", type=float, help="Sample rate [Hz]; default 500, machines 100.")
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="world.*, start.*, fixture.* ...")
 @click.option("--json", "as_json", is_flag=True, help="What was recorded as JSON on stdout.")
 def command(
-    world: str, robot: str, teacher: str, out: Path, count: int, seed: int, noise: float, delay: float | None,
-    scale: float | None, belief: str | None, centre: str | None, rate: float, settings: tuple[str, ...], as_json: bool,
+    world: str, robot: str, teacher: str, out: Path, count: int, seed: int, noise: float | None, delay: float | None,
+    scale: float | None, belief: str | None, centre: str | None, rate: float | None, settings: tuple[str, ...],
+    as_json: bool, **operated: Any,
 ) -> int:  # fmt: skip
     """Record demonstrations of a world from a simulated person.
 
@@ -42,19 +55,31 @@ def command(
     --count 2 shows the valley from both sides. A blind teacher searches from a start of its own each time, knowing no
     more than --belief; every search is kept, whether it found the goal or not.
 
+    A hydraulic machine is taught by --teacher teleoperation from a scaled master that reflects its force. First it
+    swings in the air to identify friction and payload; what it then records as wrench it estimates from its pressures.
+    A set-up whose loop gain |K + j w D [with --feed-velocity]| scale / (force scale x hand stiffness) is not below 1 is
+    refused.
+
     \b
-    Example:
+    Examples:
       skillframe demonstration record --world peg_in_hole --count 2 --seed 1 --out demo.npz
       skillframe demonstration record --world peg_in_hole --set world.fillet=0.0008 --teacher blind --count 5 \\
         --out s.npz
+      skillframe demonstration record --world pallets --robot hiab_xs031 --teacher teleoperation --delay 0.15 \\
+        --angle -40 --count 2 --out push.npz
     """
     from skillframe.config import parse_setting
     from skillframe.prepare import load_robot_model, load_world, split_settings
 
     params, draws = split_settings(world, dict(parse_setting(text) for text in settings))
     machine, scene = load_robot_model(robot), load_world(world, params)
-    common: dict[str, Any] = {"count": count, "seed": seed, "draws": draws, "rate_hz": rate, "progress": _progress}
-    if teacher == "blind":
+    common: dict[str, Any] = {"count": count, "seed": seed, "draws": draws, "progress": _progress}
+    common |= {} if rate is None else {"rate_hz": rate}
+    if machine.spec.actuation or any(value is not None and value is not False for value in operated.values()):
+        recording = _operated(
+            machine, scene, teacher, {**operated, "noise": noise, "delay": delay, "scale": scale}, common
+        )
+    elif teacher == "blind":
         from skillframe.demonstrate_blind import record_blind
 
         recording = record_blind(machine, scene, _blind(scene, belief, centre), **common)
@@ -73,6 +98,34 @@ def command(
     return 0
 
 
+def _operated(
+    machine: RobotModel, scene: Scene, teacher: str, given: dict[str, Any], common: dict[str, Any]
+) -> Recording:
+    """A hydraulic machine and its operator."""
+    from math import radians
+
+    from skillframe.errors import InputError
+
+    name = machine.spec.name
+    if not machine.spec.actuation:
+        option = next(key for key, value in given.items() if value).replace("_", "-")
+        raise InputError(f"--{option}", f"is for hydraulic machines, which {name} is not", "leave it out")
+    if teacher != "teleoperation":
+        raise InputError(
+            f"--teacher {teacher}", f"nobody leads {name} by hand, it is a hydraulic machine", "use teleoperation"
+        )
+    from skillframe.demonstrate_machine import aimed, record_operated
+    from skillframe.teleoperation import OperatorSettings
+
+    angle, noise = given.pop("angle"), given.pop("noise")
+    names = {"delay": "delay_s", "packet_rate": "packet_hz"}
+    values = {names.get(key, key): value for key, value in given.items() if value is not None}
+    if noise is not None:
+        values["aim_noise"] = radians(noise)
+    where = scene if angle is None else aimed(machine, scene, radians(angle))
+    return record_operated(machine, where, OperatorSettings(**values), **common)
+
+
 def _progress(text: str) -> None:
     click.echo(text, err=True)
 
@@ -86,14 +139,15 @@ def _write(recording: Recording, out: Path, count: int) -> list[Path]:
     return files
 
 
-def _seeing(teacher: str, noise: float, delay: float | None, scale: float | None) -> TeacherSettings:
+def _seeing(teacher: str, noise: float | None, delay: float | None, scale: float | None) -> TeacherSettings:
     from math import radians
 
     from skillframe.teacher import TeacherSettings
 
     remote = teacher == "teleoperation"
     return TeacherSettings(
-        kind=teacher, aim_noise=radians(noise), delay_s=(0.1 if remote else 0.0) if delay is None else delay,
+        kind=teacher, aim_noise=radians(8.0 if noise is None else noise),
+        delay_s=(0.1 if remote else 0.0) if delay is None else delay,
         scale=(2.0 if remote else 1.0) if scale is None else scale,
     )  # fmt: skip
 

@@ -22,8 +22,8 @@ FLOORS = [
     {"control", "actuation"},
     {"cosim", "world"},
     {"executor", "arms", "machine", "machine_bank", "machine_columns", "recorder", "trace", "prepare"},
-    {"teacher", "staged_teacher", "blind_teacher", "metrics", "campaign"},
-    {"report", "demonstrate", "demonstrate_blind"},
+    {"teacher", "staged_teacher", "blind_teacher", "teleoperation", "metrics", "campaign"},
+    {"report", "demonstrate", "demonstrate_blind", "demonstrate_machine"},
     {"conformance", "testing", "quickstart", "reproduce"},
     {"cli"},
 ]
@@ -39,6 +39,7 @@ LOOP = {
     "teacher",
     "staged_teacher",
     "blind_teacher",
+    "teleoperation",
     "control",
     "world",
     "actuation",

@@ -96,7 +96,10 @@ def build(params: PalletsParams) -> Scene:
         start_quaternion=TOOL_DOWN,
         goal=sunk_in if params.surface == "styrofoam" else there,
         goal_error=lambda state: (distance(state), np.zeros(len(state.tip.position))),
-        task=Task(direction=(np.sqrt(0.5), 0.0, -np.sqrt(0.5)), hand="sliding", starts=(over_stack, by_stop)),
+        task=Task(
+            direction=(float(np.sqrt(0.5)), 0.0, -float(np.sqrt(0.5))), hand="sliding", starts=(over_stack, by_stop),
+            done=sunk_in,
+        ),
     )  # fmt: skip
 
 
