@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -191,6 +192,7 @@ def _conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any]) -> int:
 
 def _show_rates(skills: dict[str, dict[str, Any]]) -> None:
     from skillframe.cli.output import table
+    from skillframe.report.results import cause_of
 
     rows = [
         [
@@ -201,8 +203,11 @@ def _show_rates(skills: dict[str, dict[str, Any]]) -> None:
     ]  # fmt: skip
     table(["skill", "trials", "successes", "rate", "95 % interval", "method"], rows)
     for label, s in skills.items():
-        for text, count in sorted(s["failures"].items(), key=lambda item: -item[1])[:3]:
-            click.echo(f"  {label}: {count} x {text}")
+        causes: Counter[str] = Counter()
+        for text, count in s["failures"].items():
+            causes[cause_of(text)] += count
+        for cause, count in causes.most_common(3):
+            click.echo(f"  {label}: {count} x {cause}")
 
 
 @contextmanager

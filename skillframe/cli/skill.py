@@ -57,8 +57,16 @@ def show(file: Path, as_json: bool) -> None:
     for line in words:
         click.echo(line)
     sources = ", ".join(source["file"] for source in document["learned_from"])
-    made = " ".join(f"{key} {value}" for key, value in sorted(document["created_by"].items()))
+    made = _maker(document["created_by"])
     click.echo(f"learned from {sources or 'nothing'}; made by {made}")
+
+
+def _maker(created_by: dict[str, str]) -> str:
+    """In words: skillframe-lmc 0.1.0 with skillframe 0.1.0."""
+    core, plugin = f"skillframe {created_by.get('skillframe', '')}".strip(), created_by.get("plugin")
+    if plugin in (None, "skillframe"):
+        return core
+    return f"{plugin} {created_by.get('plugin_version', '')} with {core}"
 
 
 @command.command()

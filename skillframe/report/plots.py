@@ -79,7 +79,7 @@ def _limit_line(axes: Axes, limit: float | None, unit: str) -> Markup:
         return Markup("")
     y = float(axes.up(limit))
     line = tag("line", x1=LEFT, x2=axes.right, y1=round(y, 1), y2=round(y, 1), class_="limit")
-    return join([line, text(0.5 * (LEFT + axes.right), y - 5, f"limit {limit:g} {unit}", "limit-text", "middle")])
+    return join([line, text(LEFT + 6, y - 5, f"limit {limit:g} {unit}", "limit-text", "start")])
 
 
 def _event_marks(axes: Axes, events: Sequence[tuple[float, str]]) -> Markup:
@@ -120,7 +120,7 @@ def _read_off(trace: Trace) -> list[tuple[float, str]]:
     touching = np.flatnonzero(np.nan_to_num(norm(trace.wrench_true[:, :3])) > CONTACT_N)
     events = [(float(time[touching[0]]), "first contact")] if len(touching) else []
     if force.max() > CONTACT_N:
-        events.append((float(time[np.argmax(force)]), f"highest force, {force.max():.0f} N"))
+        events.append((float(time[np.argmax(force)]), f"highest force of these samples, {force.max():.0f} N"))
     reason = str(trace.meta.get("reason") or trace.meta.get("failure") or "")
     return [*events, (float(time[-1]), f"the end: {reason}" if reason else "the end")]
 

@@ -143,3 +143,11 @@ def test_a_damaged_skill_file_exits_2_and_names_the_key(
     capsys.readouterr()
     assert run([*command, str(out)]) == 2
     assert "phases[0].translation.stiffness" in capsys.readouterr().err
+
+
+def test_show_says_who_made_a_skill(demos: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "slide.skill.json"
+    run(["learn", *demos, "--out", str(out)])
+    assert run(["skill", "show", str(out)]) == 0
+    by = load(out)["created_by"]
+    assert f"made by skillframe-lmc {by['plugin_version']} with skillframe {by['skillframe']}" in capsys.readouterr().out
