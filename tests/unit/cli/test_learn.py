@@ -150,4 +150,5 @@ def test_show_says_who_made_a_skill(demos: list[str], tmp_path: Path, capsys: py
     run(["learn", *demos, "--out", str(out)])
     assert run(["skill", "show", str(out)]) == 0
     by = load(out)["created_by"]
-    assert f"made by skillframe-lmc {by['plugin_version']} with skillframe {by['skillframe']}" in capsys.readouterr().out
+    made = f"made by skillframe-lmc {by['plugin_version']} with skillframe {by['skillframe']}"
+    assert made in capsys.readouterr().out
