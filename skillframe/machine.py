@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.actuation.delay import CommandDelay
-from skillframe.conditioning.momentum import Estimate, ForceEstimator
+from skillframe.conditioning.momentum import Estimate
+from skillframe.control.force_compiled import CompiledEstimator
 from skillframe.control.hydraulic import Demand, HydraulicGains, Measured, Reference, plane_task
 from skillframe.control.hydraulic_compiled import CompiledLaw
 from skillframe.control.vdc_actuator import cylinders
@@ -90,7 +91,7 @@ class MachineLoop(Loop):
         spec = setup.robot.spec
         known = cylinders(spec.actuation, spec.folder / "robot.toml")
         self.law = CompiledLaw(self.chain, known, HydraulicGains(), self.count, self.dt)
-        self.estimator = ForceEstimator(self.chain, known, self.count, self.dt)
+        self.estimator = CompiledEstimator(self.chain, known, self.count, self.dt)
         self.coupled = CoupledPlant(self.plant, self.chain.actuated)
         self.bank = banks(spec, self.count)
         self.master = Master(self.coupled, self.bank, CosimSettings(step=self.dt))
@@ -151,7 +152,7 @@ class MachineLoop(Loop):
         return np.asarray(scale[:, None] * hold)
 
     def _true_z(self) -> Float:
-        z: Float = self.plant.state[0][:, self._z]
+        z: Float = self.plant.state[0].take(self._z, axis=1)
         return z
 
     def _true_pressures(self) -> tuple[Float, Float]:
@@ -237,13 +238,12 @@ class MachineLoop(Loop):
     def _reference(self, command: Command, seen: Observation, ramp: float) -> tuple[Reference, Float]:
         """What the law follows, and equation (1)'s wrench (N, 6) for limits and trace."""
         axes, count = self.task.axes, self.count
-        grid = np.ix_(range(count), axes, axes)
-        stiffness = np.broadcast_to(command.impedance.stiffness, (count, 6, 6))[grid]
+        stiffness = self._in_plane(command.impedance.stiffness)
         if command.impedance.damping is None:
             largest = np.linalg.eigvalsh(stiffness)[:, -1]
             damping = np.maximum(largest / IMPEDANCE_RATE, LEAST_DAMPING)[:, None, None] * np.eye(2)
         else:
-            damping = np.broadcast_to(command.impedance.damping, (count, 6, 6))[grid]
+            damping = self._in_plane(command.impedance.damping)
         velocity, push = ramp * command.twist[:, axes], ramp * command.feedforward[:, axes]
         law = np.zeros((count, 6))
         error = (command.pose.position - seen.pose.position)[:, axes]
@@ -251,6 +251,12 @@ class MachineLoop(Loop):
         return Reference(
             command.pose.position[:, axes], velocity, stiffness, damping, push, self.joint, np.zeros_like(self.joint)
         ), law  # fmt: skip
+
+    def _in_plane(self, matrix: Float) -> Float:
+        """(N, 2, 2) of (N, 6, 6) or (6, 6)."""
+        axes = np.array(self.task.axes)
+        part: Float = matrix[..., axes[:, None], axes]
+        return part if part.ndim == 3 else np.tile(part, (self.count, 1, 1))
 
     def _drive(self, torque: Float, time: float = 0.0) -> None:
         """One coupled step under valve commands (N, k); trials whose FMU failed end with its sentence."""

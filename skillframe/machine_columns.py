@@ -39,26 +39,27 @@ class EnergyBill:
     """
 
     def __init__(self, bank: Actuators, supply: Float, dt: float) -> None:
-        self._bank, self._pressure, self._dt = bank, supply, dt
+        self._bank, self._dt = bank, dt
         names = bank.outputs
         self._flows = [names.index(f"flow_{side}") for side in "ab"] if "flow_a" in names and "flow_b" in names else []
         self._force = names.index("force")
+        self._price: Float = dt * np.repeat(supply, 2, axis=-1)  # (N, 2k), side by side as the flows
         self.start()
 
     def start(self) -> None:
         """Begin a new bill."""
-        count = len(self._pressure)
+        count = len(self._price)
         self.supply: Float = np.full(count, 0.0 if self._flows else np.nan)
         self.pistons: Float = np.zeros(count)
         self._power: Float | None = None
 
     def step(self, velocity: Float) -> None:
         """Add a sample; velocity (N, k) of the pistons."""
-        y, shape = self._bank.y, self._pressure.shape
-        for column in self._flows:
-            self.supply += self._dt * np.sum(self._pressure * np.maximum(y[:, column].reshape(shape), 0.0), axis=-1)
-        power = np.sum(y[:, self._force].reshape(shape) * velocity, axis=-1)
-        self.pistons += self._dt * 0.5 * (power + (power if self._power is None else self._power))
+        y, shape = self._bank.y, self._price.shape
+        if self._flows:
+            self.supply += np.vecdot(self._price, np.maximum(y.take(self._flows, axis=1), 0.0).reshape(shape))
+        power: Float = np.vecdot(y[:, self._force].reshape(velocity.shape), velocity)
+        self.pistons += (0.5 * self._dt) * (power + (power if self._power is None else self._power))
         self._power = power
 
 

@@ -17,11 +17,13 @@ class CommandDelay:
     """
 
     def __init__(self, ticks: NDArray[np.int64], k: int) -> None:
-        self._ticks, self._now, self._rows = ticks, 0, np.arange(len(ticks))
+        self._ticks, self._now, self._rows, self._at_once = ticks, 0, np.arange(len(ticks)), not ticks.any()
         self._line: Float = np.zeros((int(ticks.max(initial=0)) + 1, len(ticks), k))
 
     def step(self, command: Float) -> Float:
         """What arrives now, when this is sent."""
+        if self._at_once:
+            return command
         length = len(self._line)
         self._line[self._now % length] = command
         arrived: Float = self._line[(self._now - self._ticks) % length, self._rows]

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from skillframe.conditioning.damped import CriticallyDamped, Undamped
 from skillframe.conditioning.identification import Identification, IdentificationSettings
 from skillframe.conditioning.impulse import ImpulseFilter
-from skillframe.conditioning.kalman import SteadyWrenchFilter, steady_gain
+from skillframe.conditioning.kalman import Gain, SteadyWrenchFilter, steady_gain
 from skillframe.errors import SkillframeError
 from skillframe.frames import Float
 
@@ -254,10 +254,15 @@ class ForceEstimator:
         return self._wrench.ahead(1.0 / (np.pi * self.settings.sensor_corner))
 
 
+def force_gain(corner: float, dt: float) -> Gain:
+    """Converged gain of a force's two components, `kalman`'s model with a corner [Hz]."""
+    one = np.ones(2)
+    return steady_gain(one, one * np.sqrt(dt) * (2.0 * np.pi * corner) ** 2, dt)
+
+
 def force_filter(corner: float, dt: float) -> SteadyWrenchFilter:
     """The converged Kalman filter of a force's two components, `kalman`'s model with a corner [Hz]."""
-    one = np.ones(2)
-    return SteadyWrenchFilter(steady_gain(one, one * np.sqrt(dt) * (2.0 * np.pi * corner) ** 2, dt), dt)
+    return SteadyWrenchFilter(force_gain(corner, dt), dt)
 
 
 def spread_of(arms: Float) -> Float:

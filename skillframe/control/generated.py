@@ -96,9 +96,13 @@ class Batch:
             )
             tables += [pointers, sizes]
         self._tables = tables  # the C code reads them at every call
+        chosen, which = np.zeros(0, dtype=np.int64), (ctypes.c_void_p(), ctypes.c_int64())
 
         def run(ids: Ids) -> None:
-            call(*tables, ctypes.c_void_p(ids.ctypes.data), ctypes.c_int64(len(ids)))
+            nonlocal chosen, which
+            if chosen is not ids:  # mostly the same array again
+                chosen, which = ids, (ctypes.c_void_p(ids.ctypes.data), ctypes.c_int64(len(ids)))
+            call(*tables, *which)
 
         return run
 

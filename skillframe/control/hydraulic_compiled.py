@@ -101,10 +101,13 @@ class CompiledLaw:
         """A sample for the trials in `ids`, the other rows mean nothing; the call after next uses the arrays again."""
         for own, given in zip((*self._measured, *self._reference), (*measured, *reference), strict=True):
             assert own is not None
-            np.copyto(own, 0.0 if given is None else given)
+            own[...] = 0.0 if given is None else given
         self._turn ^= 1
         self._steps[self._turn](ids)
         for now, after in self._states:
-            now[ids] = after[ids]
+            if len(ids) == len(now):
+                now[...] = after
+            else:
+                now[ids] = after[ids]
         self._scalars[-1] = 0.0
         return self._demand[self._turn]

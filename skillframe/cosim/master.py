@@ -78,6 +78,8 @@ class Master:
         self._takes_acceleration = all(c.acceleration for c in capable)
         self._refresh = all(c.refresh for c in capable)
         self._gives_work = np.array([c.work for c in capable])
+        self._all_give_work = bool(self._gives_work.all())
+        self._where = getattr(plant, "where", None)
         self._column = {name: bank.inputs.index(name) for name in ("command", "position", "velocity", "acceleration")}
         self._force, self._work = bank.outputs.index("force"), bank.outputs.index("work")
         if self.settings.tolerance_j is not None and not self.rollback:
@@ -95,7 +97,8 @@ class Master:
         """Start the bank at the plant's present motion; the plant feels the forces from then on.
 
         Args:
-            time: [s]; command: (count,) first inputs.
+            time: [s].
+            command: (count,) first inputs.
             parameters: of every actuator, on top of the bank's own.
         """
         motion = self.plant.motion(np.zeros(self.bank.count))
@@ -152,18 +155,26 @@ class Master:
     def _exchange(self, step: float) -> bool:
         begin = self.plant.motion(self.force)
         fine, given = self._actuate(begin, step)
-        after: Float = np.where(self.bank.active > 0, self.bank.y[:, self._force], self.force)
+        after = self._felt(self.force)
         self._advance(after, step)
-        end = self.plant.motion(after)
-        self._account(begin, end, after, given, step)
+        if self._where is None:
+            x, v, a = self.plant.motion(after)
+        else:
+            (x, v), a = self._where(), begin.acceleration
+        self._account(begin, x, v, after, given, step)
         self.force = after
         if self._refresh:
-            self._show(end.position, end.velocity, end.acceleration)
+            self._show(x, v, a)
             fine = self.bank.refresh() and fine
-            self.force = np.where(self.bank.active > 0, self.bank.y[:, self._force], self.force)
+            self.force = self._felt(after)
         self.time += step
         self.steps += 1
         return fine
+
+    def _felt(self, before: Float) -> Float:
+        """Forces (count,) of the bank; what was felt before, where an actuator has ended."""
+        force = self.bank.y[:, self._force]
+        return force.copy() if self.bank.active.all() else np.where(self.bank.active > 0, force, before)
 
     def _actuate(self, begin: Motion, step: float) -> tuple[bool, Float]:
         """Step the bank along the parabola of the motion; (all well, work the actuators gave)."""
@@ -175,23 +186,26 @@ class Master:
             speed = v + a * s if self._takes_acceleration else v + a * (s + 0.5 * part)
             self._show(x + s * (v + 0.5 * a * s), speed, a)
             fine = self.bank.step(self.time + s, part) and fine
-            given = given + np.where(self._gives_work, self.bank.y[:, self._work], 0.0)
+            given += self.bank.y[:, self._work]
+        if self._all_give_work:
+            return fine, given
         path = step * (v + 0.5 * a * step)
         assumed = bond_work(self.force, self.bank.y[:, self._force], path, v, v + a * step, step)
         return fine, np.where(self._gives_work, given, assumed)
 
     def _advance(self, after: Float, step: float) -> None:
         count = self.settings.plant_substeps
+        if count == 1:
+            self.plant.advance(self.force, after, step)
+            return
         for j in range(count):
             shares = (j / count, (j + 1) / count)
             begin, end = (self.force + share * (after - self.force) for share in shares)
             self.plant.advance(begin, end, step / count)
 
-    def _account(self, begin: Motion, end: Motion, after: Float, given: Float, step: float) -> None:
-        path = end.position - begin.position
-        received = bond_work(self.force, after, path, begin.velocity, end.velocity, step)
-        guessed = begin.velocity + begin.acceleration * step
-        self.mismatch: Float = np.abs(after * (end.velocity - guessed)) * step
+    def _account(self, begin: Motion, x: Float, v: Float, after: Float, given: Float, step: float) -> None:
+        received = bond_work(self.force, after, x - begin.position, begin.velocity, v, step)
+        self.mismatch: Float = np.abs(after * (v - begin.velocity - begin.acceleration * step)) * step
         self.difference = self.difference + received - given
         self.exchanged = self.exchanged + np.abs(received)
 

@@ -19,7 +19,11 @@ class Motion(NamedTuple):
 
 
 class Plant(Protocol):
-    """Mechanics with `count` bonds, trial by trial as in the bank of actuators."""
+    """Mechanics with `count` bonds, trial by trial as in the bank of actuators.
+
+    It may also have `where() -> (position, velocity)`, (count,) each, for the end of a step: where accelerations are
+    dear the master then asks for them once a step, at its beginning.
+    """
 
     count: int
 

@@ -40,6 +40,7 @@ class CoupledPlant:
         self.count = self.trials * len(self.joints)
         self._qpos = np.array([plant.model.joint(name).qposadr[0] for name in joints])
         self._dofs = np.array([plant.model.joint(name).dofadr[0] for name in joints])
+        self._spread: Float = np.eye(plant.model.nv)[self._dofs]
         self.active: NDArray[np.int64] = np.arange(self.trials)
         self.load: Float = np.zeros((self.trials, plant.model.nv))
         self._saved: tuple[Float, Float] = plant.state
@@ -47,15 +48,17 @@ class CoupledPlant:
     def motion(self, force: Float) -> Motion:
         """Motion (count,) of the pistons now, with forces (count,) [N] acting on them."""
         acceleration = self.plant.acceleration(self._torque(force), self.active)
+        return Motion(*self.where(), acceleration.take(self._dofs, axis=1).ravel())
+
+    def where(self) -> tuple[Float, Float]:
+        """Positions and velocities (count,) of the pistons now."""
         position, velocity = self.plant.state
-        return Motion(
-            position[:, self._qpos].ravel(), velocity[:, self._dofs].ravel(), acceleration[:, self._dofs].ravel()
-        )
+        return position.take(self._qpos, axis=1).ravel(), velocity.take(self._dofs, axis=1).ravel()
 
     @property
     def velocity(self) -> Float:
         """(trials, joints) of the driven joints now."""
-        velocity: Float = self.plant.state[1][:, self._dofs]
+        velocity: Float = self.plant.state[1].take(self._dofs, axis=1)
         return velocity
 
     def advance(self, begin: Float, end: Float, step: float) -> None:
@@ -90,6 +93,6 @@ class CoupledPlant:
         self.plant.set_state(*self._saved, self.active)
 
     def _torque(self, force: Float) -> Float:
-        torque = self.load.copy()
-        torque[:, self._dofs] += force.reshape(self.trials, -1)
+        torque: Float = force.reshape(self.trials, -1) @ self._spread
+        torque += self.load
         return torque

@@ -24,6 +24,7 @@ from skillframe.world.layout import Layout
 from skillframe.world.scene import Scene, State
 
 Draws = Mapping[str, Float]
+_VELOCITY = int(mujoco.mjtStage.mjSTAGE_VEL)
 
 
 class Kinematics(NamedTuple):
@@ -152,19 +153,24 @@ class Plant:
     def step(self, torque: Float, ids: NDArray[np.int64]) -> None:
         """Advance some trials by one time step under generalised forces (N, nv) in MuJoCo's order."""
         self._apply_torque(torque)
-        self.batch.step(ids=ids, stage=mujoco.mjtStage.mjSTAGE_VEL)
+        self.batch.step(ids=self._some(ids), stage=_VELOCITY)
 
     def acceleration(self, torque: Float, ids: NDArray[np.int64]) -> Float:
         """Accelerations (N, nv) of some trials under generalised forces (N, nv), MuJoCo's order; no time passes."""
         self._apply_torque(torque)
-        self.batch.forward(ids=ids)
+        self.batch.forward(ids=self._some(ids))
         acceleration: Float = self._acceleration
         return acceleration
+
+    def _some(self, ids: NDArray[np.int64]) -> NDArray[np.int64] | None:
+        """None for all trials, which the engine need not check."""
+        return ids if len(ids) < self.count else None
 
     def _apply_torque(self, torque: Float) -> None:
         """Nothing drives the fixture's sprung parts; a controller that cancels gravity would lift them."""
         self._applied[:] = torque
-        self._applied[:, self._layout.sprung] = 0.0
+        if len(self._layout.sprung):
+            self._applied[:, self._layout.sprung] = 0.0
 
     def tool_pose(self) -> Pose:
         """Pose of the robot's tool frame (where the sensor sits) in base."""
