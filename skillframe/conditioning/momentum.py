@@ -41,7 +41,7 @@ class Estimate(NamedTuple):
 
     Attributes:
         force: (N, 2) base x and z [N]; sigma: (N, 2) its standard deviation, from W [N].
-        valid: (N,) at least two pistons slide; elsewhere stiction leaves several hundred newtons open.
+        valid: (N,) two pistons or more have been sliding for long enough; else stiction leaves some hundred newtons open.
         feedback: (N, 2) the force for whatever answers it, a law or a hand: it comes some 50 ms late, and has no gain
             to speak of at the frequencies at which a machine in contact rings.
     """
@@ -66,6 +66,7 @@ class ForceSettings:
             measured in air with encoders of 1e-4 rad (m) and pressure sensors of 0.22 bar at 1 kHz.
         stiction_speed: a piston below it hides friction exp(-(v / stiction_speed)^2) of its Coulomb friction [m/s].
         least_speed, settle: a piston slides once it has gone one way faster than this [m/s] for this long [s].
+        memory: and the force is valid so much later [s], when its filter, of a period of 0.33 s, holds nothing else.
         sliding_speed: friction is F_C tanh(v / sliding_speed) + F_v v [m/s].
         force_corner: of the wrench's Kalman filter (`impulse`) [Hz]; None leaves it out.
         sensor_corner: of the sensors' filters before, two equal poles as published [Hz]; their lag is made up for.
@@ -79,7 +80,8 @@ class ForceSettings:
     row_noise: tuple[float, ...] = (220.0, 160.0, 170.0)
     stiction_speed: float = 4e-3
     least_speed: float = 6e-3
-    settle: float = 0.6
+    settle: float = 0.4
+    memory: float = 0.35
     sliding_speed: float = 2.5e-3
     force_corner: float | None = 3.0
     sensor_corner: float = 24.0
@@ -206,7 +208,7 @@ class ForceEstimator:
         if self._tick == 0:
             self._begin()
         self._tick += 1
-        valid = np.sum(sliding, axis=-1) >= 2
+        valid = np.sum(self._since >= self.settings.settle + self.settings.memory, axis=-1) >= 2
         return Estimate(self._smooth(), sigma, valid, self._feedback.step(self.raw))
 
     def friction(self, terms: Terms) -> Float:

@@ -80,7 +80,7 @@ class CompiledEstimator(ForceEstimator):
         self._look(self._everyone)
         residual, _, phi, sliding, _ = self._seen
         if self.calibrating and due:
-            rows = pull(np.abs(terms.arms), 1.0 - sliding) == 0.0
+            rows = pull(np.abs(terms.arms), np.where(sliding > 0.0, 0.0, 1.0)) == 0.0
             self.identification.update(phi, residual, self._noise, rows)
         self._theta[...] = self.identification.theta
         self._weigh(self._everyone)
@@ -89,4 +89,4 @@ class CompiledEstimator(ForceEstimator):
         self._fresh[0] = 0.0
         self._tick += 1
         _, _, force, sigma, feedback = self._told
-        return Estimate(force, sigma, sliding.sum(axis=-1) >= 2.0, feedback)
+        return Estimate(force, sigma, (sliding > 1.0).sum(axis=-1) >= 2, feedback)

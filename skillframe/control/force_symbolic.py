@@ -53,7 +53,8 @@ def look_function(c: Cylinders, s: ForceSettings, n: int, dt: float) -> ca.Funct
     """From a sample to the residual.
 
     Inputs: rate, pressure_a, pressure_b, mass, drift, gravity, jacobian, arms, piston_rate, load, memory, fresh.
-    Outputs: behind L the residual, J (2, n) and phi; sliding (k,) as 1 or 0, the residual's variance (n,), memory.
+    Outputs: behind L the residual, J (2, n) and phi; sliding (k,), 1 at once and 2 after the filter's memory, else 0;
+    the residual's variance (n,); memory.
     """
     k = len(c.area_a)
     shapes = {
@@ -82,7 +83,8 @@ def look_function(c: Cylinders, s: ForceSettings, n: int, dt: float) -> ca.Funct
     since = ca.if_else(going, m["since"] + dt, 0.0)
     sliding = since >= s.settle
     m["rate"], m["since"], m["momentum"] = rate, since, momentum
-    outputs = (columns[:, 0], columns[:, 1:3].T, columns[:, 3:], sliding, _variance(c, s, v["arms"], rate, sliding))
+    level, variance = sliding + (since >= s.settle + s.memory), _variance(c, s, v["arms"], rate, sliding)
+    outputs = (columns[:, 0], columns[:, 1:3].T, columns[:, 3:], level, variance)
     inputs = [*(pair[0] for pair in given.values()), m.symbol, fresh]
     return _function("look", inputs, [*outputs, m.after()])
 

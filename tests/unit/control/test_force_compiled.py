@@ -14,7 +14,7 @@ from tests.laws.vdc_loop import START, crane
 
 DT = 1e-3
 SAME = 1e-8  # relative to the largest; differences over a millisecond leave 1e-16 x 1e3 of the momentum, twice
-QUICK = ForceSettings(settle=0.01)  # so that pistons count as sliding within a short test
+QUICK = ForceSettings(settle=0.01, memory=0.005)  # so that pistons count as sliding within a short test
 
 
 def machine(count):
