@@ -37,10 +37,11 @@ class UnknownName(SkillframeError):
         known: the names that exist.
     """
 
-    def __init__(self, kind: str, name: str, known: Iterable[str], note: str = "") -> None:
+    def __init__(self, kind: str, name: str, known: Iterable[str], note: str = "", where: str = "") -> None:
         self.kind, self.name, self.known = kind, name, sorted(known)
         near = suggest(name, self.known)
-        text = f"unknown {kind} {name!r}"
+        text = f"{where}: " if where else ""
+        text += f"unknown {kind} {name!r}"
         text += f"; did you mean {near!r}?" if near else ""
         text += f" (there are: {', '.join(self.known) or 'none'})"
         super().__init__(text + (f"; {note}" if note else ""))

@@ -113,7 +113,10 @@ def load(path: Path) -> Document:
     """
     document = _parse(path)
     _check(document, str(path))
-    skill = registry().behaviour(document["type"])
+    try:
+        skill = registry().behaviour(document["type"])
+    except UnknownName as error:
+        raise UnknownName(error.kind, error.name, error.known, where=str(path)) from None
     if document.get("type_version", 1) > skill.version:
         raise InputError(
             path,

@@ -74,7 +74,13 @@ def _load(path: Path) -> dict[str, Any]:
         TypeError,
         NotImplementedError,
     ) as error:
-        raise InputError(path, f"is not a readable npz file, or is truncated ({error})", "write it again") from None
+        raise InputError(path, f"is not a readable npz file, or is truncated{_why(error)}", "write it again") from None
+
+
+def _why(error: Exception) -> str:
+    """The cause in brackets; numpy takes any binary file for a pickle and says how to load one, which nobody should."""
+    text = str(error).strip("'\"")
+    return "" if "pickle" in text or not text else f" ({text})"
 
 
 def _meta(path: Path, arrays: dict[str, Any]) -> dict[str, Any]:

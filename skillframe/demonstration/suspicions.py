@@ -89,6 +89,8 @@ def magnitudes(d: Demonstration) -> Iterator[str]:
     force, torque = norm(d.wrench[:, :3]), norm(d.wrench[:, 3:])
     if force.max() > LARGEST_FORCE:
         yield f"force: up to {force.max():.3g} N at t = {d.time[np.argmax(force)]:.3f} s; check its unit (--units)"
+    if not force.max() > 0.0:
+        return
     strong = force > 0.3 * force.max()
     lever = float(np.median(torque[strong] / np.maximum(force[strong], 1e-9)))
     if lever > LONGEST_LEVER and torque.max() > 0.0:

@@ -140,7 +140,7 @@ def test_what_is_wrong_is_said_in_one_sentence(tmp_path: Path, change: dict[str,
 
 
 def test_an_unknown_type_is_refused_with_the_nearest_name(tmp_path: Path) -> None:
-    with pytest.raises(UnknownName, match="unknown skill 'hodl'; did you mean 'hold'"):
+    with pytest.raises(UnknownName, match=r"\.json: unknown skill 'hodl'; did you mean 'hold'"):
         skillfile.load(written(tmp_path, {"type": "hodl"}))
 
 

@@ -91,6 +91,11 @@ def test_what_the_data_suggest_is_a_warning_with_its_evidence(demo: Demonstratio
     assert any(text in w for w in audit(change(demo)).warnings), audit(change(demo)).warnings
 
 
+def test_a_recording_without_contact_on_purpose_is_audited_without_complaint(demo: Demonstration) -> None:
+    free = with_wrench(demo, lambda wrench: 0.0 * wrench)
+    assert not any("lever" in w or "force:" in w for w in audit(free).warnings)
+
+
 def test_a_clean_demonstration_has_no_warnings(demo: Demonstration) -> None:
     found = audit(demo)
     assert found.warnings == []

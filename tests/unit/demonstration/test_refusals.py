@@ -228,6 +228,13 @@ def test_a_pickled_array_is_never_loaded(tmp_path: Path) -> None:
         read_demonstration(tmp_path / "demo.npz")
 
 
+def test_any_binary_file_is_refused_without_advice_to_unpickle_it(tmp_path: Path) -> None:
+    (tmp_path / "demo.npz").write_bytes(bytes(range(256)) * 8)
+    with pytest.raises(InputError, match="not a readable npz") as refusal:
+        read_demonstration(tmp_path / "demo.npz")
+    assert "pickle" not in str(refusal.value)
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
