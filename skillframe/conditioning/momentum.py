@@ -41,7 +41,7 @@ class Estimate(NamedTuple):
 
     Attributes:
         force: (N, 2) base x and z [N]; sigma: (N, 2) its standard deviation, from W [N].
-        valid: (N,) two pistons or more have been sliding for long enough; else stiction leaves some hundred newtons open.
+        valid: (N,) two pistons or more have been sliding for long enough; else stiction leaves 400 N open and more.
         feedback: (N, 2) the force for whatever answers it, a law or a hand: it comes some 50 ms late, and has no gain
             to speak of at the frequencies at which a machine in contact rings.
     """
