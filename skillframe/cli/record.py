@@ -75,7 +75,7 @@ def command(
     machine, scene = load_robot_model(robot), load_world(world, params)
     common: dict[str, Any] = {"count": count, "seed": seed, "draws": draws, "progress": _progress}
     common |= {} if rate is None else {"rate_hz": rate}
-    if machine.spec.actuation or any(value is not None and value is not False for value in operated.values()):
+    if machine.spec.actuation or any(map(_given, operated.values())):
         recording = _operated(
             machine, scene, teacher, {**operated, "noise": noise, "delay": delay, "scale": scale}, common
         )
@@ -108,7 +108,7 @@ def _operated(
 
     name = machine.spec.name
     if not machine.spec.actuation:
-        option = next(key for key, value in given.items() if value).replace("_", "-")
+        option = next(key for key, value in given.items() if _given(value)).replace("_", "-")
         raise InputError(f"--{option}", f"is for hydraulic machines, which {name} is not", "leave it out")
     if teacher != "teleoperation":
         raise InputError(
@@ -124,6 +124,11 @@ def _operated(
         values["aim_noise"] = radians(noise)
     where = scene if angle is None else aimed(machine, scene, radians(angle))
     return record_operated(machine, where, OperatorSettings(**values), **common)
+
+
+def _given(value: object) -> bool:
+    """Was an option on the command line?"""
+    return value is not None and value is not False
 
 
 def _progress(text: str) -> None:

@@ -183,7 +183,7 @@ def _phase(translation: Learned, rotation: Learned, settings: Settings) -> Docum
     pitch = translation.speed / rotation.speed if translation.speed > 0.0 and rotation.speed > 0.0 else None
     speeds = _speeds(translation, rotation, pitch, settings)
     leads = [
-        _lead(translation, settings.lead_force_n),
+        min(_lead(translation, settings.lead_force_n), settings.lead_force_max_n),
         _lead(rotation, settings.lead_torque_nm),
     ]
     stiffness = [
@@ -198,7 +198,7 @@ def _phase(translation: Learned, rotation: Learned, settings: Settings) -> Docum
         part.name: _part(part, speed, k, *floor, settings)
         for part, speed, k, floor in zip((translation, rotation), speeds, stiffness, floors, strict=True)
     }
-    return {**parts, "pitch": pitch, "stop": asdict(_stop(translation, rotation, speeds, leads))}
+    return {**parts, "pitch": pitch, "stop": asdict(_stop(translation, rotation, speeds, leads, settings))}
 
 
 def _speeds(translation: Learned, rotation: Learned, pitch: float | None, settings: Settings) -> tuple[float, float]:
@@ -217,7 +217,9 @@ def _lead(part: Learned, least: float) -> float:
     return max(least, float(np.percentile(loads, 90))) if part.direction is not None and len(loads) else least
 
 
-def _stop(translation: Learned, rotation: Learned, speeds: tuple[float, float], leads: Sequence[float]) -> Stop:
+def _stop(
+    translation: Learned, rotation: Learned, speeds: tuple[float, float], leads: Sequence[float], settings: Settings
+) -> Stop:
     """Limits from the demonstrations' size: three times the travel, five times the time."""
     travel = max(m.excursion for m in translation.motions)
     turn = max(m.excursion for m in rotation.motions)
@@ -228,6 +230,8 @@ def _stop(translation: Learned, rotation: Learned, speeds: tuple[float, float], 
     ]
     shown = max((m.duration for part in (translation, rotation) for m in part.motions), default=0.0)
     return Stop(
+        stall_m=settings.stall_m,
+        stall_rad=settings.stall_rad,
         lead_force_n=leads[0],
         lead_torque_nm=leads[1],
         force_limit_n=max(60.0, 4.0 * leads[0]),

@@ -32,6 +32,9 @@ class Settings:
         speed_max_m_s, speed_max_rad_s: caps on the demonstrated speed.
         stiffness_n_m, stiffness_nm_rad: along and about axes that are not compliant.
         lead_force_n, lead_torque_nm: largest push, as stiffness times lead of the desired over the measured pose.
+        lead_force_max_n: the teacher's push, where it was larger, is taken over up to this.
+        stall_m, stall_rad: a run is done when, while pushing, nothing has moved by more than this for half a second;
+            larger for machines, which never stand quite still.
         mass_kg, inertia_kg_m2: nominal tool, for the damping written into the file.
         damping_min_ns_m, damping_min_nms_rad: least damping, which is what compliant axes get.
     """
@@ -55,6 +58,9 @@ class Settings:
     stiffness_nm_rad: float = 20.0
     lead_force_n: float = 20.0
     lead_torque_nm: float = 2.0
+    lead_force_max_n: float = 1e6
+    stall_m: float = 1e-4
+    stall_rad: float = 1e-3
     mass_kg: float = 2.6
     inertia_kg_m2: float = 0.05
     damping_min_ns_m: float = 20.0
@@ -69,3 +75,5 @@ class Settings:
                 raise InputError(f"--set {name}", f"{value} is not a positive number", "give a positive number")
         if self.quantile > 1.0 or self.slack < 1.0:
             raise InputError("--set", "quantile must be at most 1 and slack at least 1", "mend it")
+        if self.lead_force_max_n < self.lead_force_n:
+            raise InputError("--set lead_force_max_n", "is below lead_force_n", "give a larger one")

@@ -1,0 +1,58 @@
+"""Teaching the crane by teleoperation, through the command line: recorded, read, learned, refused."""
+
+import json
+
+import numpy as np
+import pytest
+
+from skillframe.cli.main import run
+from skillframe.demonstration.files import read_demonstration
+from tests.crane_teaching import LEARN, margin
+
+CRANE = ["demonstration", "record", "--world", "pallets", "--robot", "hiab_xs031", "--teacher", "teleoperation"]
+
+
+@pytest.mark.slow
+@pytest.mark.needs_plugins
+def test_two_demonstrations_of_an_operator_teach_a_push_that_is_feasible(tmp_path, capsys):
+    near = ["--set", "world.away=0.3", "--set", "world.above=0.25"]
+    assert run([*CRANE, *near, "--count", "2", "--seed", "3", "--out", str(tmp_path / "push.csv"), "--json"]) == 0
+    files = json.loads(capsys.readouterr().out)["files"]
+    first = read_demonstration(files[0])
+    assert first.meta["wrench"] == {
+        "frame": "base", "point": "tool", "sign": "environment", "includes_tool_weight": False
+    }  # fmt: skip
+    assert first.meta["teacher"] == "teleoperation" and first.rate == pytest.approx(100.0)
+    assert set(first.extra) == {"sigma_1", "sigma_2", "force_valid"} and np.all(first.extra["sigma_1"] > 0.0)
+    pushed = first.wrench[np.abs(first.wrench[:, 2]) > 2000.0]
+    assert len(pushed) > 50 and np.all(pushed[:, 2] > 0.0)  # the stack pushes the tool up
+    options = [part for name, value in LEARN.items() for part in ("--set", f"{name}={json.dumps(value)}")]
+    assert run(["learn", *files, "--out", str(tmp_path / "push.skill.json"), *options, "--json"]) == 0
+    part = json.loads(capsys.readouterr().out)["phases"][0]["translation"]
+    angle = np.degrees(np.arctan2(part["desired_direction"][2], part["desired_direction"][0]))
+    assert margin(angle) >= 10.0
+    assert len(part["compliant_axes"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--feed-velocity"], "loop gain 5.25 is not below 1"),
+        (["--force-scale", "100"], "loop gain 3.33 is not below 1"),
+        (["--hand-stiffness", "400", "--delay", "0.15"], "loop gain 1.00 is not below 1"),
+        (["--delay", "-0.1"], "delay_s: must not be negative"),
+        (["--packet-rate", "0"], "packet_hz: must be positive"),
+        (["--teacher", "kinesthetic"], "nobody leads hiab_xs031 by hand"),
+    ],
+)
+def test_a_channel_that_cannot_be_used_is_refused_in_a_sentence_and_leaves_no_file(options, said, tmp_path, capsys):
+    assert run([*CRANE, *options, "--out", str(tmp_path / "push.npz")]) == 2
+    text = capsys.readouterr().err
+    assert said in text and text.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_options_of_machines_are_refused_for_a_robot_that_is_none(tmp_path, capsys):
+    command = ["demonstration", "record", "--world", "valley", "--angle", "0", "--out", str(tmp_path / "x.npz")]
+    assert run(command) == 2
+    assert "--angle: is for hydraulic machines" in capsys.readouterr().err
