@@ -165,3 +165,21 @@ def test_the_override_that_the_weight_is_gone_reaches_the_reader(demo: Demonstra
 def test_every_command_has_help_with_an_example(capsys: pytest.CaptureFixture[str], name: str) -> None:
     assert run(["demonstration", name, "--help"]) == 0
     assert "Example" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "words", [["check"], ["convert", "--out", "right.npz", "--arm", "right"], ["convert", "--out", "right.npz"]]
+)
+def test_arms_whose_clocks_differ_are_refused_by_every_command_in_a_sentence(
+    demo: Demonstration, capsys: pytest.CaptureFixture[str], words: list[str]
+) -> None:
+    rows = [line.split(",") for line in Path("demo.csv").read_text().splitlines()]
+    names = [f"{arm}_{name}" for arm in ("left", "right") for name in rows[0]]
+    late = [[*row, repr(float(row[0]) + 0.02), *row[1:]] for row in rows[1:]]
+    Path("both.csv").write_text("\n".join(",".join(row) for row in [names, *late]))
+    verb, *options = words
+    assert run(["demonstration", verb, "both.csv", *options]) == 2
+    (said,) = capsys.readouterr().err.splitlines()
+    assert "both.csv" in said and "row " in said
+    assert "the clocks of the arms left and right differ by 20 ms; resample the arms onto one clock" in said
+    assert not Path("right.npz").exists()
