@@ -21,6 +21,9 @@ from typing import Any
 from skillframe.actuation.bindings import InstanceFailed
 from skillframe.errors import SkillframeError
 
+TELLING = 0.25
+"""Share of the memory allowed from which on a crash is told with it; below, the same crash has the same words."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SandboxLimits:
@@ -103,7 +106,7 @@ class Child:
         return f"{self.name} ({self.path.name})"
 
     def _death(self) -> str:
-        """In words how the child ended, with the most memory it held."""
+        """In words how the child ended, with the most memory it held if that may be why."""
         try:
             _, status, usage = os.wait4(self._process.pid, 0)
         except ChildProcessError:
@@ -112,7 +115,8 @@ class Child:
         self._process.returncode = code
         memory = f"having used {usage.ru_maxrss // 1024} MB of {self.limits.memory_bytes // 1024**2} MB"
         if code < 0:
-            return f"crashed ({signal.Signals(-code).name}, {memory})"
+            large = usage.ru_maxrss * 1024 > TELLING * self.limits.memory_bytes
+            return f"crashed ({signal.Signals(-code).name}{', ' + memory if large else ''})"
         return f"ran out of memory ({memory})" if code == 12 else f"left with code {code}"
 
     def kill(self) -> None:

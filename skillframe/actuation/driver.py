@@ -43,7 +43,7 @@ class FmuBank:
         self._capabilities: dict[int, Capabilities] = {}
         names = [spec.name or fact.name for spec, fact in zip(specs, facts, strict=True)]
         self._instances = [
-            Instance(facts[k], names[k] if trials == 1 else f"{names[k]} of trial {trial}")
+            Instance(facts[k], names[k])
             for trial in range(trials) for k in range(len(specs))
         ]  # fmt: skip
         wirings = [wire(x, self._spec(i), self.inputs, self.outputs) for i, x in enumerate(self._instances)]

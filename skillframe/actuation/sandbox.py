@@ -54,8 +54,7 @@ class SandboxBank:
 
     def _name(self, index: int) -> str:
         spec, facts = self._kind(index)
-        name = spec.name or facts.name
-        return name if self.count == len(self._specs) else f"{name} of trial {index // len(self._specs)}"
+        return spec.name or facts.name  # not which trial of the bank: a trial fails in the same words in any bank
 
     def _ready(self, index: int) -> Child:
         """The child of an instance; a new one where there is none or the old one has grown fat."""

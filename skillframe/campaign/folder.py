@@ -127,21 +127,30 @@ def _copy_robot(spec: CampaignSpec, target: Path) -> str:
 
 
 def _copy_robot_file(source: Path, target: Path) -> str:
-    """A robot.toml with the URDF it names, or a bare URDF."""
+    """A robot.toml with the URDF and the FMU files it names, or a bare URDF."""
     name = source.resolve().parent.name if source.name == "robot.toml" else source.stem
     place = target / "robots" / name
     place.mkdir(parents=True)
     shutil.copyfile(source, place / source.name)
     if source.suffix == ".toml":
-        urdf = read_toml(source).get("urdf")
+        given = read_toml(source)
+        urdf = given.get("urdf")
         if not isinstance(urdf, str) or not (source.parent / urdf).is_file():
             raise InputError(f"{source}: urdf", f"no such file: {urdf!r}", "it is relative to robot.toml")
-        inside = place / urdf
-        if not inside.resolve().is_relative_to(place.resolve()):
-            raise InputError(f"{source}: urdf", f"{urdf} lies outside the robot's folder", "put both into one folder")
-        inside.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(source.parent / urdf, inside)
+        _copy_beside(source, place, urdf, "urdf")
+        for fmu in {str(row.get("fmu")) for row in given.get("actuation", []) if isinstance(row, dict)}:
+            if (source.parent / fmu).is_file():  # else a name in fmus/
+                _copy_beside(source, place, fmu, "fmu")
     return (place / source.name).relative_to(target).as_posix()
+
+
+def _copy_beside(source: Path, place: Path, file: str, key: str) -> None:
+    """A file that robot.toml names, at the same place in the copied folder."""
+    inside = place / file
+    if not inside.resolve().is_relative_to(place.resolve()):
+        raise InputError(f"{source}: {key}", f"{file} lies outside the robot's folder", "put both into one folder")
+    inside.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(source.parent / file, inside)
 
 
 def _all_fixed(spec: CampaignSpec, params: type) -> dict[str, Value]:

@@ -55,7 +55,7 @@ def run(bank, steps=10):
     [
         (
             "crash",
-            r"crash2 \(crash2.fmu\) crashed \(SIGSEGV, having used \d+ MB of 1500 MB\) while stepping from 0.005 s",
+            r"crash2 \(crash2.fmu\) crashed \(SIGSEGV\) while stepping from 0.005 s",
         ),
         ("hang", r"did not answer within 1 s while stepping from 0.005 s; it was stopped"),
         ("nan", r"an output is not a finite number at 0.005 s"),

@@ -151,6 +151,19 @@ def test_a_prepared_folder_needs_nothing_but_itself(campaign, tmp_path):
     assert spec.fixed == {"world.clearance": 0.00025, "world.profile": "round", "world.segments": 48}
 
 
+def test_fmu_files_beside_a_robot_are_copied_and_named_ones_are_not(campaign, tmp_path):
+    path = campaign(trials=4)
+    robot, rows = tmp_path / "robots" / "box" / "robot.toml", '[[actuation]]\njoint = "j"\nfmu = "{}"\n'
+    (robot.parent / "own.fmu").write_bytes(b"own")
+    robot.write_text('urdf = "box.urdf"\n' + rows.format("own.fmu") + rows.format("hydraulic_cylinder"))
+    spec = prepare(read(path), tmp_path / "out", lambda spec: {}, FakeParams)
+    assert sorted(p.name for p in (spec.folder / spec.robot).parent.iterdir()) == ["box.urdf", "own.fmu", "robot.toml"]
+    (tmp_path / "far.fmu").write_bytes(b"far")
+    robot.write_text('urdf = "box.urdf"\n' + rows.format("../../far.fmu"))
+    with pytest.raises(InputError, match="lies outside the robot's folder"):
+        prepare(read(path), tmp_path / "again", lambda spec: {}, FakeParams)
+
+
 def test_a_refused_scene_leaves_no_folder_behind(campaign, tmp_path):
     def refuse(spec):
         raise InputError("world.fake", "clearance is negative")
