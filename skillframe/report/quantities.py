@@ -7,10 +7,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-ANGLES = re.compile(r"(^|_)(tilt|angle|slope|roll|pitch|yaw|rotation|turn)(_|$)")
-LENGTHS = re.compile(r"(^|_)(offset|position|clearance|depth|radius|length|width|height|gap|tolerance|fillet)(_|$)")
-NEWTONS = re.compile(r"(^|_)force(_|$)")
-TORQUES = re.compile(r"(^|_)(torque|joint_friction)(_|$)")
+UNITS: tuple[tuple[str, str, float], ...] = (
+    ("scale", "", 1.0),
+    ("torque|joint_friction", "Nm", 1.0),
+    ("force", "N", 1.0),
+    ("tilt|angle|slope|roll|pitch|yaw|rotation|turn", "°", float(np.degrees(1.0))),
+    ("pressure", "bar", 1e-5),
+    ("payload|mass", "kg", 1.0),
+    ("delay", "ms", 1e3),
+    ("offset|position|clearance|depth|radius|length|width|height|gap|tolerance|fillet", "mm", 1e3),
+)
+"""Words of a name, the unit for people, and its factor; the first that fits counts."""
 
 
 class Quantity(NamedTuple):
@@ -45,10 +52,5 @@ def quantity(name: str) -> Quantity:
 
 
 def _unit(rest: str) -> tuple[str, float]:
-    if TORQUES.search(rest):
-        return "Nm", 1.0
-    if NEWTONS.search(rest):
-        return "N", 1.0
-    if ANGLES.search(rest):
-        return "°", float(np.degrees(1.0))
-    return ("mm", 1e3) if LENGTHS.search(rest) else ("", 1.0)
+    found = ((unit, factor) for words, unit, factor in UNITS if re.search(rf"(^|_)({words})(_|$)", rest))
+    return next(found, ("", 1.0))

@@ -65,6 +65,11 @@ def test_theory_is_a_curve_where_it_depends_on_the_other_quantity_and_lines_else
         ("world.friction", "friction"),
         ("world.clearance", "clearance [mm]"),
         ("sensor.force_noise", "sensor force noise [N]"),
+        ("actuator.supply_pressure", "actuator supply pressure [bar]"),
+        ("actuator.friction_scale", "actuator friction scale"),
+        ("actuator.delay", "actuator delay [ms]"),
+        ("robot.payload", "robot payload [kg]"),
+        ("robot.mass_scale", "robot mass scale"),
     ],
 )
 def test_quantities_are_named_in_words_with_their_unit(name, axis):
