@@ -16,9 +16,10 @@ import numpy as np
 from skillframe.demonstration.record import resolve_point
 from skillframe.errors import InputError, UnknownName
 from skillframe.executor import QUANTITIES, Setup
-from skillframe.frames import Float
+from skillframe.frames import Float, Pose
 from skillframe.records import CoordinatorType, Document
 from skillframe.registry import registry
+from skillframe.robot.kinematics import UnreachablePose, inverse_kinematics
 from skillframe.robot.model import RobotModel, load_model
 from skillframe.robot.spec import load_robot
 from skillframe.skill import Skill
@@ -112,16 +113,32 @@ def _centers(kind: CoordinatorType, document: Document, scene: Scene, coc: str |
 
 
 def _check_area(robot: RobotModel, scene: Scene, document: Document, area: Float) -> None:
-    """Refuse a box (2, 3), relative to the start, that leaves the robot's workspace from the nominal start."""
-    if robot.spec.limits.workspace_m is None:
-        return
+    """Refuse a box (2, 3), relative to the start, that leaves the robot's workspace from the nominal start.
+
+    The workspace is `limits.workspace_m`; without one, an arm's is what it reaches in the attitude of the start.
+    """
     start = start_poses(robot, scene, {}, 1)
     turn = start.rotation[0] if document["frame"]["axes"] == "phase_start" else np.eye(3)
     corners = np.array(list(itertools.product(*area.T))) @ turn.T + start.position[0]
-    low, high = np.array(robot.spec.limits.workspace_m)
-    if np.any(corners.min(axis=0) < low) or np.any(corners.max(axis=0) > high):
-        reach = " to ".join(str(np.round(c, 3).tolist()) for c in (corners.min(axis=0), corners.max(axis=0)))
-        raise InputError(
-            f"skill type {document['type']}", f"its search area, {reach} m, leaves the workspace of {robot.spec.name}",
-            "start elsewhere, search less far, or widen limits.workspace_m in robot.toml",
-        )  # fmt: skip
+    if _inside(robot, corners, start.rotation[0]):
+        return
+    reach = " to ".join(str(np.round(c, 3).tolist()) for c in (corners.min(axis=0), corners.max(axis=0)))
+    raise InputError(
+        f"skill type {document['type']}", f"its search area, {reach} m, leaves the workspace of {robot.spec.name}",
+        "start elsewhere, search less far, or widen limits.workspace_m in robot.toml",
+    )  # fmt: skip
+
+
+def _inside(robot: RobotModel, corners: Float, attitude: Float) -> bool:
+    if robot.spec.limits.workspace_m is not None:
+        low, high = np.array(robot.spec.limits.workspace_m)
+        return bool(np.all(corners >= low) and np.all(corners <= high))
+    if robot.spec.actuation:  # a machine's path is judged by its cylinders
+        return True
+    q = robot.home
+    try:
+        for corner in corners:
+            q = inverse_kinematics(robot, 0, Pose(corner, attitude), q)
+    except UnreachablePose:
+        return False
+    return True

@@ -81,3 +81,13 @@ def test_a_campaign_with_a_search_area_outside_the_workspace_is_refused_before_i
     assert run(["campaign", "run", "campaign.toml", "--out", "results"]) == 2
     assert "leaves the workspace of fenced" in said(capsys)
     assert not (tmp_path / "results" / "results.csv").exists()
+
+
+def test_without_a_stated_workspace_an_arm_s_is_what_it_reaches(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    found = example("search")
+    phase = found["phases"][0]
+    wide = {**phase["exploration"], "covariance": [[0.04, 0.0], [0.0, 0.04]]}  # 0.2 m: half a metre each way
+    save({**found, "phases": [{**phase, "exploration": wide}]}, tmp_path / "wide.json")
+    assert run(["run", "wide.json", "--world", "peg_in_hole", "--robot", "panda", "--out", "run.npz"]) == 2
+    assert "leaves the workspace of panda" in said(capsys)
