@@ -22,7 +22,8 @@ from skillframe.conditioning.momentum import Estimate
 from skillframe.control.force_compiled import CompiledEstimator
 from skillframe.control.hydraulic import Demand, HydraulicGains, Measured, Reference, plane_task
 from skillframe.control.hydraulic_compiled import CompiledLaw
-from skillframe.control.vdc_actuator import cylinders
+from skillframe.control.vdc_actuator import cylinders, friction_parameters
+from skillframe.control.vdc_adaptation import relative_bounds
 from skillframe.cosim.coupling import coupling_numbers, require_stable
 from skillframe.cosim.master import CosimSettings, Master
 from skillframe.errors import InputError
@@ -189,7 +190,17 @@ class MachineLoop(Loop):
             if not len(self.active):
                 break
         self.estimator.calibrate(False)
+        self._hold()
         self.bill.start()
+
+    def _hold(self) -> None:
+        """Let the law compensate the friction that was found, and hold what it has learned of the inertias."""
+        found, known = self.estimator.identification, self.law.cylinders
+        nominal = friction_parameters(known)
+        lower, upper = relative_bounds(nominal, self.law.gains.friction_share)
+        errors = np.stack([found.coulomb, found.viscous], axis=1)
+        self.law.adapt(False)
+        self.law.friction[:] = np.clip(nominal + errors, lower, upper)
 
     def _sense(self, force_counts: bool = True) -> None:
         """Sample the sensors, and estimate the force from them; in the air it is known to be zero."""
@@ -200,7 +211,7 @@ class MachineLoop(Loop):
         self.estimate = estimate if force_counts else estimate._replace(feedback=np.zeros_like(estimate.force))
 
     def _valve(self, reference: Reference) -> None:
-        self.demand = self.law.step(self._measured(), reference, self.active)
+        self.demand = self.law.step(self._measured()._replace(z=self.gauges.now), reference, self.active)
 
     def _tick(self, tick: int) -> None:
         time = tick * self.dt
@@ -224,7 +235,7 @@ class MachineLoop(Loop):
         """Pose and twist as the encoders say, wrench as the pressures say."""
         tool, axes = self.plant.tool_pose(), self.task.axes
         position = tool.position.copy()
-        position[:, axes] = self.terms.tip
+        position[:, axes] = self.terms.tip + self.gauges.lag * self.terms.tip_rate
         twist, wrench = np.zeros((self.count, 6)), np.zeros((self.count, 6))
         twist[:, axes], wrench[:, axes] = self.terms.tip_rate, self.estimate.feedback
         return Observation(np.full(self.count, time), self.dt, Pose(position, tool.rotation.copy()), twist, wrench)

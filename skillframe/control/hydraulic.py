@@ -204,11 +204,15 @@ class HydraulicLaw:
         self._gain: Float = gains.body * np.eye(6)
         self._cylinder_gains = CylinderGains(velocity=np.array(gains.velocity), force=np.array(gains.force))
         self._force_rate = RateFilter(gains.force_corner, dt)
-        self._fresh = True
+        self._fresh, self.learning = True, True
 
     def start(self) -> None:
         """Forget the past; the required force's filter begins at the first required force."""
         self._fresh = True
+
+    def adapt(self, on: bool) -> None:
+        """Learn, as at first, or hold what was learned: in contact with stiff things learning rings (our trials)."""
+        self.learning = on
 
     def terms(self, measured: Measured) -> Terms:
         """The model's terms where the machine is measured to be."""
@@ -227,7 +231,8 @@ class HydraulicLaw:
             piston[i], speed[i] = state.piston
             self._learn(i, motion)
         force = required + np.sum(friction_regressor(rate_r) * self.friction, axis=-2)
-        self._rub(rate_r, rate_r - speed, ids)
+        if self.learning:
+            self._rub(rate_r, rate_r - speed, ids)
         return self._valves(measured, force, (piston, speed, rate_r))
 
     def _required(self, measured: Measured, reference: Reference, i: int) -> tuple[ChainState, Bodies]:
@@ -250,7 +255,7 @@ class HydraulicLaw:
         return self._task.generalised(state, in_base)
 
     def _learn(self, i: int, motion: Bodies) -> None:
-        if self.gains.adaptation > 0.0:
+        if self.learning and self.gains.adaptation > 0.0:
             drive = np.einsum("bij,bi->bj", motion.regressor, motion.error)
             self.theta[i] = adapt(self.theta[i], drive, self.gains.adaptation, self._bounds, self._dt)
 

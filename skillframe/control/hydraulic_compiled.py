@@ -89,6 +89,10 @@ class CompiledLaw:
         """Forget the past; the required force's filter begins at the first required force."""
         self._scalars[-1] = 1.0
 
+    def adapt(self, on: bool) -> None:
+        """Learn, as at first, or hold what was learned: in contact with stiff things learning rings (our trials)."""
+        self._scalars[1:4] = (self.gains.adaptation, *self.gains.friction) if on else 0.0
+
     def terms(self, measured: Measured) -> Terms:
         """The model's terms where the machine is measured to be; the arrays are used again by the call after next."""
         np.copyto(self._measured.z, measured.z)

@@ -1,7 +1,8 @@
 """What a hydraulic machine measures: its joints by encoders and its chambers by pressure transducers, behind filters.
 
 White noise at every sample, then a critically damped filter of second order whose state is the rate; noise and corner
-are those published with the data set of Petrovic and Mattila, Mech. Mach. Theory 170 (2022) 104680.
+are those published with the data set of Petrovic and Mattila, Mech. Mach. Theory 170 (2022) 104680. What comes out is
+2/w old; with the rate where it is now is known too (ours: at 0.2 m/s the lag alone is 2.7 mm of the tool).
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ class MachineSensors:
     """The sensors of N machines with n coordinates and k cylinders; randomness from one generator per trial.
 
     Attributes:
-        z, rate: (N, n) filtered; pressure_a, pressure_b: (N, k) filtered [Pa].
+        z, rate: (N, n) filtered; pressure_a, pressure_b: (N, k) filtered [Pa]. lag: of all of them [s].
     """
 
     def __init__(
@@ -43,6 +44,7 @@ class MachineSensors:
         self._rngs, self._n, self._k = list(rngs), n, k
         self._scale: Float = np.repeat([settings.encoder, settings.pressure], [n, 2 * k])
         self._filter = RateFilter(settings.corner, dt)
+        self.lag = 1.0 / (np.pi * settings.corner)
         self._noise: Float = np.zeros((BLOCK, len(self._rngs), n + 2 * k))
         self._next = BLOCK
 
@@ -65,6 +67,12 @@ class MachineSensors:
     def z(self) -> Float:
         """(N, n) minimal coordinates."""
         return self._filter.value[:, : self._n]
+
+    @property
+    def now(self) -> Float:
+        """(N, n) minimal coordinates without the filters' lag, z + lag z'."""
+        ahead: Float = self.z + self.lag * self.rate
+        return ahead
 
     @property
     def rate(self) -> Float:

@@ -109,3 +109,18 @@ def test_the_same_machine_gives_the_same_code():
     """Else every process would compile anew."""
     first, second = (source(law_function(crane(), (0, 2))) for _ in range(2))
     assert first == second
+
+
+@pytest.mark.parametrize("law", [HydraulicLaw, CompiledLaw])
+def test_a_law_that_is_told_to_hold_learns_nothing_and_later_goes_on(law):
+    measured, reference = draw(np.random.default_rng(9), 1)
+    own = law(*machine(), 1, DT)
+    own.adapt(False)
+    theta, rub = own.theta.copy(), own.friction.copy()
+    own.step(measured, reference, np.arange(1))
+    np.testing.assert_array_equal(own.theta, theta)
+    np.testing.assert_array_equal(own.friction, rub)
+    own.adapt(True)
+    own.step(measured, reference, np.arange(1))
+    assert np.any(own.theta != theta)
+    assert np.any(own.friction != rub)
