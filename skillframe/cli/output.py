@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -28,10 +29,13 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
 
 
 @contextmanager
-def progress(what: str) -> Iterator[Callable[[int, int], None]]:
-    """A function of how many of how many are done: a bar on a terminal, a line per tenth in a pipe; both on stderr."""
+def progress(what: str, after_s: float = 0.0) -> Iterator[Callable[[float, float], None]]:
+    """A function of how many of how many are done: a bar on a terminal, a line per tenth in a pipe; both on stderr.
+
+    Work that is over within `after_s` shows nothing in a pipe.
+    """
     if not sys.stderr.isatty():
-        yield _tenths(what)
+        yield _tenths(what, time.monotonic() + after_s)
         return
     from rich.console import Console
     from rich.progress import Progress
@@ -41,14 +45,14 @@ def progress(what: str) -> Iterator[Callable[[int, int], None]]:
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
-def _tenths(what: str) -> Callable[[int, int], None]:
+def _tenths(what: str, earliest: float) -> Callable[[float, float], None]:
     shown = -1
 
-    def show(done: int, total: int) -> None:
+    def show(done: float, total: float) -> None:
         nonlocal shown
-        if 10 * done // total != shown:
-            shown = 10 * done // total
-            click.echo(f"{done} of {total} {what}", err=True)
+        if int(10 * done / total) != shown and time.monotonic() >= earliest:
+            shown = int(10 * done / total)
+            click.echo(f"{done:g} of {total:g} {what}", err=True)
 
     return show
 

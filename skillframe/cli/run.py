@@ -11,6 +11,8 @@ import click
 if TYPE_CHECKING:
     from skillframe.trace import Trace
 
+QUIET_S = 5.0  # a run that is over by then needs no progress
+
 
 @click.command(name="run")
 @click.argument("skill")
@@ -41,6 +43,7 @@ def command(
     """
     import numpy as np
 
+    from skillframe.cli.output import progress
     from skillframe.config import parse_setting
     from skillframe.executor import simulate
     from skillframe.prepare import load_robot_model, load_world, prepare, split_settings
@@ -53,10 +56,11 @@ def command(
     name, document = load_skill(skill)
     params, draws = split_settings(world, dict(parse_setting(text) for text in settings))
     runnable, setup = prepare(load_robot_model(robot), load_world(world, params), document, coc)
-    result = simulate(
-        runnable, setup, {key: np.array([value]) for key, value in draws.items()}, [np.random.default_rng(seed)],
-        duration_s=duration, trace_hz=rate,
-    )  # fmt: skip
+    with progress("s simulated", QUIET_S) as show:
+        result = simulate(
+            runnable, setup, {key: np.array([value]) for key, value in draws.items()}, [np.random.default_rng(seed)],
+            duration_s=duration, trace_hz=rate, progress=lambda now: show(round(now, 2), duration),
+        )  # fmt: skip
     assert result.traces is not None
     trace = result.traces[0]
     trace.meta.update({"skill": name, "seed": seed, "draws": draws})
