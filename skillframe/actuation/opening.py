@@ -8,7 +8,7 @@ from pathlib import Path
 from skillframe.actuation.actuator import Actuators, ActuatorSpec
 from skillframe.actuation.allow import is_allowed
 from skillframe.actuation.build import cached_path
-from skillframe.actuation.inspection import inspect_fmu
+from skillframe.actuation.inspection import FmuFacts, inspect_fmu
 from skillframe.actuation.library import find_fmu, fmu_folders
 from skillframe.actuation.toolchain import find_compiler
 
@@ -20,9 +20,8 @@ def open_actuators(
 ) -> Actuators:
     """A bank for these actuators, `trials` times.
 
-    Where one FMU of the robot is foreign and not allowed, all of them run in child processes, so that one trial's
-    failure stays its own. Without a C compiler, a robot whose actuators are all `hydraulic_cylinder` gets the Python
-    reference, which `notes` says.
+    FMUs that are foreign and not allowed run in child processes, so that one trial's failure stays its own. Without a C
+    compiler, a robot whose actuators are all `hydraulic_cylinder` gets the Python reference, which `notes` says.
 
     Args:
         specs: the actuators.
@@ -42,7 +41,23 @@ def open_actuators(
         return ReferenceBank(specs, read_table(folders[CYLINDER]), trials)
     paths = [find_fmu(spec.fmu, base, version) for spec in specs]
     facts = [inspect_fmu(path) for path in paths]
-    if all(is_allowed(path) for path in paths):
+    kinds: dict[bool, list[int]] = {}
+    for index, path in enumerate(paths):
+        kinds.setdefault(is_allowed(path), []).append(index)
+    banks = [
+        (chosen, _bank(allowed, [specs[i] for i in chosen], [facts[i] for i in chosen], trials))
+        for allowed, chosen in sorted(kinds.items(), reverse=True)
+    ]
+    if len(banks) == 1:
+        return banks[0][1]
+    from skillframe.actuation.mixed import MixedBank
+
+    return MixedBank(specs, banks)
+
+
+def _bank(allowed: bool, specs: Sequence[ActuatorSpec], facts: Sequence[FmuFacts], trials: int) -> Actuators:
+    """A bank in this process, or in children."""
+    if allowed:
         from skillframe.actuation.driver import FmuBank
 
         return FmuBank(specs, facts, trials)

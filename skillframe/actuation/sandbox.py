@@ -5,6 +5,7 @@ A crash, a hang or a leak then ends one trial with a sentence. All children of a
 
 from __future__ import annotations
 
+import os
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -18,6 +19,9 @@ from skillframe.actuation.child import Child, SandboxLimits
 from skillframe.actuation.inspection import FmuFacts
 from skillframe.actuation.wiring import columns, mapping
 from skillframe.errors import SkillframeError
+
+LOADING = 2 * (os.cpu_count() or 1)
+"""Children that load at the same time: more of them would wait for each other and be taken for hung."""
 
 
 class SandboxBank:
@@ -77,25 +81,31 @@ class SandboxBank:
         self.status[:] = OK
         self._problems.clear()
         self._time = time
-        fresh = []
-        for i in range(self.count):
-            extra = dict(parameters[i]) if parameters else {}
-            before, now = self._children[i], self._ready(i)
-            fresh.append(now is not before)
-            given = {"time": time, "parameters": {**self._kind(i)[0].parameters, **extra}, "u": self.u[i].tolist()}
-            now.tell(b"s", given)
-        for i, child in enumerate(self._children):
-            if child is None:
-                continue
-            try:
-                if fresh[i]:
-                    child.receive(self.limits.start_s, "loading")
-                self.y[i] = np.frombuffer(child.receive(self.limits.start_s, "starting"))
-            except SkillframeError as error:
-                self._drop(i)
-                self.active[i], self.status[i], self._problems[i] = 0, LOST, str(error)
+        for first in range(0, self.count, LOADING):
+            wave = range(first, min(first + LOADING, self.count))
+            fresh = [self._tell_start(i, time, parameters[i] if parameters else {}) for i in wave]
+            for i, new in zip(wave, fresh, strict=True):
+                self._hear_start(i, new)
         if self._problems and not self.active.any():
             raise InstanceFailed(next(iter(self._problems.values())))
+
+    def _tell_start(self, index: int, time: float, extra: Mapping[str, Any]) -> bool:
+        """Ask an instance to start; whether its child is new and has to load the FMU first."""
+        before, now = self._children[index], self._ready(index)
+        own = {**self._kind(index)[0].parameters, **extra}
+        now.tell(b"s", {"time": time, "parameters": own, "u": self.u[index].tolist()})
+        return now is not before
+
+    def _hear_start(self, index: int, new: bool) -> None:
+        child = self._children[index]
+        assert child is not None
+        try:
+            if new:
+                child.receive(self.limits.start_s, "loading")
+            self.y[index] = np.frombuffer(child.receive(self.limits.start_s, "starting"))
+        except SkillframeError as error:
+            self._drop(index)
+            self.active[index], self.status[index], self._problems[index] = 0, LOST, str(error)
 
     def step(self, time: float, step: float) -> bool:
         """Advance from `time` by `step` [s] with inputs `u`; True if every active instance went well."""

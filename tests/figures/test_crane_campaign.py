@@ -27,8 +27,8 @@ def show(name: str, values: np.ndarray, wins: np.ndarray) -> None:
 
 def test_two_hundred_rows_name_the_two_trials_whose_fmu_failed(tmp_path: Path) -> None:
     out = tmp_path / "results"
-    path = campaign(tmp_path / "campaign", TRIALS, CRASH, HANG, seconds=20.0)
-    assert run(["campaign", "run", str(path), "--out", str(out), "--chunk", "40"]) == 0
+    path = campaign(tmp_path / "campaign", TRIALS, CRASH, HANG, seconds=12.0)
+    assert run(["campaign", "run", str(path), "--out", str(out), "--chunk", "20"]) == 0
     rows = list(csv.DictReader((out / "results.csv").read_text().splitlines()))
     assert [r["trial"] for r in rows] == [str(i) for i in range(TRIALS)]
     fmu = {i: r["failure"] for i, r in enumerate(rows) if "worn_cylinder.fmu" in r["failure"]}

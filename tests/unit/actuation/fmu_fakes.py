@@ -51,6 +51,7 @@ Outcome model_event(Model *m, double *next, Report *r) {{ (void)m; (void)next; (
 """
 MISCHIEF = {
     "good": "",
+    "trusted": "",
     "crash": 'if (m->time > 0.0045) { volatile int *p = NULL; *p = 1; }',
     "hang": "if (m->time > 0.0045) for (;;) sleep(1);",
     "nan": "if (m->time > 0.0045) { m->own.lag = 0.0 / 0.0; return model_outputs(m, r); }",

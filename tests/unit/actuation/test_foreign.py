@@ -16,6 +16,7 @@ from skillframe.actuation.driver import FmuBank
 from skillframe.actuation.extract import unpack
 from skillframe.actuation.foreign import build_from_sources
 from skillframe.actuation.inspection import inspect_fmu
+from skillframe.actuation.mixed import MixedBank
 from skillframe.actuation.opening import open_actuators
 from skillframe.actuation.sandbox import SandboxBank
 from skillframe.errors import InputError, UnknownName
@@ -252,4 +253,25 @@ def test_all_children_of_a_bank_step_at_the_same_time(built):
     assert not run_from and not bank.active.any()
     # each is given its limit from when it is asked for; four in a row would be 4 s
     assert time.monotonic() - begin < 4 * LIMITS.step_s
+    bank.close()
+
+
+def test_only_what_is_foreign_runs_in_children_and_its_end_leaves_the_others(built):
+    """One actuator of a trial is allowed, its neighbour crashes; both have their columns in one table."""
+    allow(built("trusted"))
+    outputs = {"force": "force", "lag": "lag"}
+    specs = [ActuatorSpec(fmu=str(built(k)), name=k, outputs=outputs) for k in ("trusted", "crash")]
+    bank = open_actuators(specs, trials=2)
+    assert isinstance(bank, MixedBank)
+    assert bank.notes == ("crash2.fmu: not allowed in this process, so in child processes",)
+    bank.u[:, bank.inputs.index("command")] = [1.0, 1.0, 3.0, 3.0]
+    bank.start()
+    run(bank)
+    assert bank.active.tolist() == [1, 0, 1, 0]
+    assert [bank.problem(i)[:16] for i in range(4)] == ["", "crash (crash2.fm", "", "crash (crash2.fm"]
+    lag = bank.y[[0, 2], bank.outputs.index("lag")]
+    assert lag == pytest.approx((1 - 0.999**10) * np.array([1.0, 3.0]), rel=1e-12)
+    bank.start()
+    assert bank.step(0.0, 1e-3)
+    assert bank.active.all()
     bank.close()
