@@ -117,8 +117,8 @@ def _opengl() -> Finding:
         works = done.returncode == 0
     except subprocess.TimeoutExpired:
         works = False
-    fix = "" if works else "sudo apt install libegl1 libgl1-mesa-dri (without it, stills are plain wireframes)"
-    return Finding(name="OpenGL (EGL)", found="works" if works else "", needed_for="rendered stills", fix=fix)
+    fix = "" if works else "sudo apt install libegl1 libgl1-mesa-dri (stills and films are shaded wireframes that need none)"
+    return Finding(name="OpenGL (EGL)", found="works" if works else "", needed_for="pictures by MuJoCo itself", fix=fix)
 
 
 def _browser() -> Finding:
