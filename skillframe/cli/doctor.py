@@ -117,7 +117,7 @@ def _opengl() -> Finding:
         works = done.returncode == 0
     except subprocess.TimeoutExpired:
         works = False
-    fix = "" if works else "sudo apt install libegl1 libgl1-mesa-dri (stills and films are shaded wireframes that need none)"
+    fix = "" if works else "sudo apt install libegl1 libgl1-mesa-dri (stills and films are wireframes without it)"
     return Finding(name="OpenGL (EGL)", found="works" if works else "", needed_for="pictures by MuJoCo itself", fix=fix)
 
 
