@@ -140,6 +140,7 @@ class MachineLoop(Loop):
         self.estimate = Estimate(nothing, nothing, np.zeros(self.count, dtype=bool), nothing)
         self.demand = Demand(*(np.zeros((self.count, len(self.chain.actuated))) for _ in range(3)))
         self.estimator.start(self._measured())
+        self._end_failed(0.0)
 
     def _holding_force(self, z: Float, draws: Draws) -> Float:
         """(N, k) piston forces that balance the gravity of each trial's own masses at rest."""
@@ -273,8 +274,11 @@ class MachineLoop(Loop):
         """One coupled step under valve commands (N, k); trials whose FMU failed end with its sentence."""
         self.coupled.active = self.active
         self.bill.step(self.coupled.velocity)
-        if self.master.step(self._delay.step(torque).ravel()):
-            return
+        if not self.master.step(self._delay.step(torque).ravel()):
+            self._end_failed(time)
+
+    def _end_failed(self, time: float) -> None:
+        """End the trials of which an FMU has failed."""
         k = len(self.chain.actuated)
         for index in range(self.bank.count):
             trial = index // k

@@ -3,10 +3,15 @@
 import csv
 import json
 
+import numpy as np
 import pytest
 
 from skillframe.actuation.toolchain import find_compiler
 from skillframe.cli.main import run
+from skillframe.executor import Setup
+from skillframe.machine import MachineLoop
+from skillframe.prepare import load_robot_model, load_world
+from skillframe.reproduce.crane_runs import MOVING, Follow, diamond
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.system.worn_cylinder import campaign
 
@@ -43,3 +48,17 @@ def test_a_crash_and_a_hang_end_one_trial_each_and_the_table_can_be_resumed_and_
     text = page.read_text(encoding="utf-8")
     assert "crashed (SIGSEGV)" in text and "did not answer" in text
     assert all(f"actuator.{name}" in text for name in VARIED)
+
+
+def test_a_trial_whose_fmu_refuses_to_start_ends_at_once_with_its_sentence_and_the_others_go_on(tmp_path):
+    campaign(tmp_path, TRIALS, CRASH, HANG)
+    file = tmp_path / "worn_crane" / "robot.toml"
+    foreign = 'fmu = "worn_cylinder.fmu"\ninitial_force = "initial_force"'
+    file.write_text(file.read_text().replace('fmu = "hydraulic_cylinder"', foreign))
+    robot, where = load_robot_model(str(file)), load_world("pallets", {})
+    draws = {"actuator.deadband": np.array([0.0, 1.5])}
+    rngs = [np.random.default_rng(i) for i in range(2)]
+    loop = MachineLoop(Follow(diamond, MOVING), Setup(robot=robot, scene=where), draws, rngs, None)
+    assert loop.active.tolist() == [0]
+    assert "parameter deadband is 1.5; it must be below 1" in loop.reason[1]
+    assert np.isfinite(loop.master.force[:3]).all()
