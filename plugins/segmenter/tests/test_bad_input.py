@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-import quasistatic as made
 
 from skillframe.cli import main
 from skillframe.demonstration.files import write_demonstration
 from skillframe.errors import InputError, SkillframeError
 from skillframe.records import LearnOptions
 from skillframe.registry import registry
+from tests.figures import quasistatic as made
 
 Z = np.array([0.0, 0.0, 1.0])
 X = np.array([1.0, 0.0, 0.0])

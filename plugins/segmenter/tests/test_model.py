@@ -5,7 +5,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-import quasistatic as made
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -16,6 +15,7 @@ from skillframe_segmenter.settings import Settings
 from skillframe_segmenter.windows import windows
 
 from skillframe.frames import norm
+from tests.figures import quasistatic as made
 
 RNG = np.random.default_rng(20)
 

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import quasistatic as made
 from skillframe_segmenter.model import from_document
 from skillframe_segmenter.observer import follow
 from skillframe_segmenter.segmentation import segment
 
 from skillframe.frames import norm
+from tests.figures import quasistatic as made
 from tests.figures.phases import NOTHING, one_story, phases_of, score
 
 SEEDS = (11, 12)

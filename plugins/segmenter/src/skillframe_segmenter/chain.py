@@ -58,43 +58,43 @@ def smooth(initial: Float, emission: Float, transition: Float) -> Smoothed:
 
 
 def _blocks(steps: Float) -> Float:
-    """(L, B, n, K, K): the steps of n blocks side by side, filled up with identities."""
+    """(L, K, K, B, n): the steps of n blocks side by side, filled up with identities; long axes last, for speed."""
     batch, count, k, _ = steps.shape
     length = max(1, int(np.ceil(np.sqrt(count))))
     blocks = max(1, -(-count // length))
     filled = np.empty((batch, blocks * length, k, k))
     filled[:, :count], filled[:, count:] = steps, np.eye(k)
-    return np.ascontiguousarray(filled.reshape(batch, blocks, length, k, k).transpose(2, 0, 1, 3, 4))
+    return np.ascontiguousarray(filled.reshape(batch, blocks, length, k, k).transpose(2, 3, 4, 0, 1))
 
 
 def _product(a: Float, b: Float) -> Float:
-    """Matrix product over leading dimensions; for a few rows, sums of outer products beat one BLAS call each."""
-    result: Float = a[..., :, 0, None] * b[..., None, 0, :]
-    for j in range(1, a.shape[-1]):
-        result += a[..., :, j, None] * b[..., None, j, :]
+    """Matrix product over the first two axes (..., K, K, B, n) of both, all others side by side."""
+    result: Float = a[..., :, 0, None, :, :] * b[..., None, 0, :, :, :]
+    for j in range(1, b.shape[-4]):
+        result += a[..., :, j, None, :, :] * b[..., None, j, :, :, :]
     return result
 
 
 def _forward(first: Float, steps: Float) -> tuple[Float, Float]:
     blocks = _blocks(steps)
-    length, batch, count = blocks.shape[:3]
+    length, k, _, batch, count = blocks.shape
     scale = np.zeros((batch, count))
     for i in range(length):
         if i:
             blocks[i] = _product(blocks[i - 1], blocks[i])
-        size = blocks[i].max(axis=(-2, -1))
-        blocks[i] /= size[..., None, None]
+        size = blocks[i].max(axis=(0, 1))
+        blocks[i] /= size
         scale += np.log(size)
-    carry, log_scale = first, np.zeros(batch)
-    starts = np.empty((batch, count, first.shape[-1]))
+    carry, log_scale = np.ascontiguousarray(first.T), np.zeros(batch)
+    starts = np.empty((k, batch, count))
     for i in range(count):
-        starts[:, i] = carry
-        carry = (carry[:, :, None] * blocks[-1, :, i]).sum(axis=1)
-        total = carry.sum(axis=-1)
+        starts[:, :, i] = carry
+        carry = (carry[:, None] * blocks[-1, :, :, :, i]).sum(axis=0)
+        total = carry.sum(axis=0)
         log_scale += scale[:, i] + np.log(total)
-        carry = carry / total[:, None]
-    inside = (starts[None, ..., None] * blocks).sum(axis=-2)
-    inside = inside.transpose(1, 2, 0, 3).reshape(batch, -1, first.shape[-1])[:, : steps.shape[1]]
+        carry = carry / total
+    inside = _product(starts[None], blocks)[:, 0]
+    inside = inside.transpose(2, 3, 0, 1).reshape(batch, -1, k)[:, : steps.shape[1]]
     inside /= inside.sum(axis=-1, keepdims=True)
     return np.concatenate([first[:, None], inside], axis=1), log_scale
 

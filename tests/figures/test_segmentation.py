@@ -13,19 +13,20 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-import quasistatic as made
 from skillframe_segmenter.model import from_document
 from skillframe_segmenter.observer import follow
 
 from skillframe.demonstration.files import read_demonstration
 from skillframe.demonstration.record import Demonstration
+from skillframe.errors import InputError
 from skillframe.paths import recordings_dir
+from tests.figures import quasistatic as made
 from tests.figures import staged
 from tests.figures.phase_baselines import BASELINES
 from tests.figures.phases import NOTHING, Interval, Score, one_story, phases_of, policy, score
 
-pytestmark = [pytest.mark.figures]
-SEEDS = range(1000, 1012)
+pytestmark = [pytest.mark.figures, pytest.mark.needs_plugins]
+SEEDS = range(3000, 3012)
 MOVES = tuple(0.03 * np.array(s) for s in ((1.0, -1.0, 1.0), (-1.0, 1.0, -1.0)))
 
 
@@ -90,7 +91,14 @@ class Row(NamedTuple):
 def offline(group: Group, phases: Sequence[int]) -> Row:
     right, alike, total, worst = 0, 0, NOTHING, list[float]()
     for seed in SEEDS:
-        document, taught = learned(group, seed, "wrench_hmm"), group(seed)
+        taught = group(seed)
+        try:
+            document = learned(group, seed, "wrench_hmm")
+        except InputError as error:  # a refusal finds no change
+            print(f"    seed {seed} refused: {error}")
+            total += score([c for t in taught for c in t.changes], [])
+            worst.append(np.inf)
+            continue
         right += phases_of(document) in phases
         alike += one_story(document)
         rows = document["demonstrations"]
