@@ -20,6 +20,8 @@ from skillframe.world.worlds.common import TOOL_DOWN, require
 
 RADIUS = 0.05
 LENGTH, WIDTH, STEP = 1.2, 0.8, 0.144
+POST = 0.2
+"""Width of the stop [m]: it stands before the middle of the stack and leaves the view open."""
 WOOD, FOAM = (0.76, 0.60, 0.42, 1.0), (0.93, 0.94, 0.96, 1.0)
 STIFFNESS = {"wood": 1e6, "styrofoam": 3e4}
 SHEETS = 0.2
@@ -147,11 +149,11 @@ def _top(top: float, face: float, surface: str) -> tuple[Geom, ...]:
 def _face(top: float, face: float, surface: str) -> tuple[Geom, ...]:
     """The stop's plate: reaches as deep below the stack's top as styrofoam may yield."""
     low, high = top - SHEETS - PLATE, top + ABOVE_STOP
-    size, middle = (PLATE, 0.5 * WIDTH, 0.5 * (high - low)), 0.5 * (low + high)
+    size, middle = (PLATE, 0.5 * POST, 0.5 * (high - low)), 0.5 * (low + high)
     solid = Geom(kind="box", size=size, position=(face + PLATE, 0.0, middle), visible=False)
     thick, colour = (0.5 * SHEETS, FOAM) if surface == "styrofoam" else (0.011, WOOD)
     half = 0.5 * ABOVE_STOP
-    return (solid, _drawn((thick, 0.5 * WIDTH, half), (face + thick, 0.0, top + half), colour))
+    return (solid, _drawn((thick, 0.5 * POST, half), (face + thick, 0.0, top + half), colour))
 
 
 _BOARDS = (-0.33, -0.165, 0.0, 0.165, 0.33)
@@ -182,4 +184,4 @@ def _wall(top: float, face: float) -> tuple[Geom, ...]:
     """What holds the stop: a post behind it, and a brace."""
     grey = (0.45, 0.48, 0.52, 1.0)
     height = 0.5 * (top + ABOVE_STOP)
-    return (_drawn((0.06, 0.5 * WIDTH, height), (face + 2.0 * PLATE, 0.0, height), grey),)
+    return (_drawn((0.06, 0.5 * POST, height), (face + 2.0 * PLATE, 0.0, height), grey),)
