@@ -8,6 +8,7 @@ F = N (n - mu t). Sensor noise 0.5 N, 0.01 Nm, 0.05 mm, 1e-4 rad at 250 Hz. Trut
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -188,6 +189,7 @@ def peg(seed: int, index: int = 0, *, noise: float = 8.0) -> Made:
     return hand.finish()
 
 
+@cache
 def demonstrations(task: str, seed: int, count: int = 3, first: int = 0, **options: float) -> list[Made]:
     """`count` demonstrations of a task; the valley's sides in turn."""
     if task == "valley":

@@ -220,3 +220,50 @@ def test_the_policy_s_tree_prints_as_text(run, files, tmp_path):
     assert "├─ phase 1: push along -z" in result.out
     assert "└─ phase 2:" in result.out and "then the end" in result.out
     assert run("skill", "show", out).out.count("phase 1") >= 2
+
+
+def half(count=3):
+    """Slides of which the last is cut off before the tool slides."""
+    whole = slides(count)
+    return [*whole[:-1], whole[-1].between(0.0, made.demonstrations("ls", 2, count)[-1].changes[0] - 0.1)]
+
+
+@pytest.mark.parametrize(
+    ("given", "options", "words"),
+    [
+        (lambda: [legs(1, -Z), legs(2, -Z), legs(3, X)], (), "d3.npz: shares no phase"),
+        (half, (), "d3.npz: stops half-way"),
+        (lambda: [legs(1, -Z, X), legs(2, -Z, X), legs(3, X, -Z)], (), "d3.npz: goes through its phases the other way"),
+        (slides, ("--phases", "60"), "which allows 1 to"),
+        (slides, ("--phases", "0"), "which allows 1 to"),
+        (slides, ("--set-boundary", "1:1=99"), "boundary 1 cannot be at 99 s"),
+        (slides, ("--set-boundary", "7:1=1.0"), "demonstration '7'"),
+    ],
+    ids=["no phase shared", "half-way", "other way round", "too many", "none", "boundary outside", "no such file"],
+)
+def test_demonstrations_that_do_not_belong_together_end_segment_with_2_and_a_sentence(
+    run, tmp_path, given, options, words
+):
+    demonstrations = given()
+    files = [tmp_path / f"d{i + 1}.npz" for i in range(len(demonstrations))]
+    for demonstration, path in zip(demonstrations, files, strict=True):
+        write_demonstration(demonstration, path)
+    result = run("segment", *files, "--out", tmp_path / "p.json", *options)
+    assert result.code == 2
+    assert words in " ".join(result.err.split()) and "Traceback" not in result.err
+    assert not (tmp_path / "p.json").exists()
+
+
+@pytest.mark.parametrize("command", [("skill", "show"), ("run", "--world", "corner", "--out", "t.npz")])
+def test_a_policy_file_whose_phase_model_does_not_match_ends_with_2_and_a_sentence(run, files, tmp_path, command):
+    out = tmp_path / "p.json"
+    assert run("segment", *files, "--out", out).code == 0
+    document = json.loads(out.read_text())
+    document["phases"] = document["phases"][:1]
+    out.write_text(json.dumps(document))
+    options = [str(tmp_path / w) if w.endswith(".npz") else w for w in command[1:]]
+    words = [command[0], out, *options] if command[0] == "run" else [*command, out]
+    result = run(*words)
+    assert result.code == 2
+    assert "knows 2 phases, but the file holds 1" in " ".join(result.err.split()) and "Traceback" not in result.err
+    assert not list(tmp_path.glob("t*.npz"))

@@ -114,6 +114,7 @@ def test_new_demonstrations_are_followed_without_chatter(by):
             assert (total.missed, total.false) == (0, 0), (task, switches)
 
 
+@pytest.mark.slow
 def test_the_gate_hears_the_table_where_it_now_stands_and_the_pose_does_not():
     """Prior-only: the gate sees the wrench, or the pose, and not the motion, which on a robot is the phase's own."""
     near = {"wrench_hmm": NOTHING, "pose_hmm": NOTHING}

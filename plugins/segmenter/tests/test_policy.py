@@ -1,0 +1,74 @@
+"""A policy tells which phase ran when and why it switched: fed with what a demonstration felt, and run end to end."""
+
+import re
+
+import numpy as np
+import pytest
+
+from skillframe.cli import main
+from skillframe.frames import Pose, matrix_from_quaternion
+from skillframe.records import LearnOptions
+from skillframe.registry import registry
+from skillframe.skill import Observation, Status
+from skillframe.skillsource import learned
+from tests.figures import quasistatic as made
+
+DT = 1e-3
+
+
+@pytest.fixture(scope="module")
+def document():
+    return learned(registry().skill("policy"), [m.demonstration for m in made.demonstrations("ls", 2)], LearnOptions())
+
+
+def felt(demonstration, shift=0.0, seconds=None):
+    """What a tool would see that went as the demonstration did: resampled to 1 kHz, one trial."""
+    wanted = np.arange(0.0, seconds or demonstration.duration, DT)
+    at = np.searchsorted(demonstration.time, wanted).clip(max=len(demonstration.time) - 1)
+    rotation = matrix_from_quaternion(demonstration.quaternion[at])
+    for time, i, r in zip(wanted, at, rotation, strict=True):
+        pose = Pose(demonstration.position[i][None] + shift, r[None])
+        yield Observation(np.array([time]), DT, pose, np.zeros((1, 6)), demonstration.wrench[i][None])
+
+
+def followed(document, observations):
+    skill, begun = registry().skill("policy").build(document), False
+    for observation in observations:
+        if not begun:
+            skill.start(observation, [np.random.default_rng(1)])
+            begun = True
+        command = skill.step(observation)
+    return skill.journal(0), command
+
+
+def test_a_policy_goes_on_when_the_wrench_of_the_next_phase_is_felt_and_says_so(document):
+    one = made.demonstrations("ls", 2, 1, first=4)[0]
+    journal, command = followed(document, felt(one.demonstration, seconds=one.changes[0] + 1.5))
+    (begun, first), (switched, second), *_ = journal
+    assert (begun, first) == (0.0, "phase 1: begins")
+    assert second.startswith("phase 2: begins, as the wrench asks for it (")
+    # the gate waits two windows of 50 ms; a tool that still moves must have been asked for a second
+    assert one.changes[0] < switched < one.changes[0] + 1.3
+    assert command.status[0] == Status.RUNNING
+
+
+def test_a_policy_does_not_mind_where_the_table_stands(document):
+    one = made.demonstrations("ls", 2, 1, first=4)[0]
+    here, _ = followed(document, felt(one.demonstration, seconds=one.changes[0] + 1.5))
+    there, _ = followed(document, felt(one.demonstration, shift=0.03, seconds=one.changes[0] + 1.5))
+    assert there == here
+
+
+@pytest.mark.slow
+def test_a_report_of_a_run_shows_which_phase_ran_when_and_why_it_switched(tmp_path, capsys):
+    out, trace, page = tmp_path / "p.json", tmp_path / "t.npz", tmp_path / "r.html"
+    demo = tmp_path / "demo.npz"
+    record = ["demonstration", "record", "--world", "corner", "--robot", "free_tool", "--teacher", "kinesthetic"]
+    assert main.run([*record, "--count", "3", "--seed", "5", "--out", str(demo)]) == 0
+    assert main.run(["segment", *map(str, sorted(tmp_path.glob("demo*.npz"))), "--out", str(out)]) == 0
+    assert main.run(["run", str(out), "--world", "corner", "--robot", "free_tool", "--out", str(trace)]) == 0
+    assert main.run(["report", str(trace), "--out", str(page)]) == 0
+    told = page.read_text()
+    assert re.search(r"phase 1: begins", told)
+    assert re.search(r"phase 2: begins, as (the wrench asks for it|phase 1 ended: came to rest)", told)
+    assert "└─ phase 2" in capsys.readouterr().out
