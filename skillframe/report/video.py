@@ -105,6 +105,7 @@ def _frames(
         for pane in panes:
             seen = _over_paper(picture(paint(pane.background.copy(), _moving(stage, sample), pane.camera)))
             frame[:HEIGHT, pane.column : pane.column + seen.shape[1]] = seen
+        frame[:HEIGHT, FAR_WIDTH] = FAINT
         frame[HEIGHT:] = strip.at(sample)
         yield frame
         tell(done, len(samples))
@@ -112,6 +113,7 @@ def _frames(
 
 def _pane(stage: Stage, camera: Camera, width: int, column: int) -> _Pane:
     still = {b: _mesh(stage, b, 0) for b, fixed in enumerate(stage.still) if fixed}
+    camera = camera._replace(distance=camera.distance * max(1.0, HEIGHT / width))  # a narrow pane sees less
     return _Pane(camera, paint(blank(width, HEIGHT), still, camera), column)
 
 
