@@ -24,6 +24,7 @@ SOLREF = (0.004, 1.0)  # 4 time steps, critically damped
 SOLIMP = (0.01, 0.95, 1e-4, 0.5, 1.0)  # impedance ramps up from almost nothing at touch: no chatter
 IMPRATIO = 20.0  # friction stiff enough that a jammed peg does not creep in
 FIXTURE, TOOL, SENSOR, SECOND = "fixture", "tool", "sensor", "second_sensor"
+BASE = "robot_base"  # what does not move of the robot; nothing but drawn
 SPRUNG = "sprung_"  # what the names of the bodies and joints of sprung parts begin with
 STICTION_SOLREF, STICTION_SOLIMP = (0.004, 1.0), (0.99, 0.999, 1e-3, 0.5, 2.0)  # joint friction that hardly creeps
 _KINDS = {
@@ -89,6 +90,7 @@ def _set_options(spec: mujoco.MjSpec, timestep: float) -> None:
 
 def _add_robot(spec: mujoco.MjSpec, model: pin.Model) -> dict[int, Any]:
     spec.option.gravity = np.array(model.gravity.linear)
+    spec.worldbody.add_body(name=BASE)
     bodies: dict[int, Any] = {0: spec.worldbody}
     for joint in range(1, model.njoints):
         body = bodies[model.parents[joint]].add_body(name=model.names[joint])

@@ -7,7 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from skillframe.world.convert import FIXTURE, SPRUNG, TOOL
+from skillframe.world.convert import BASE, FIXTURE, SPRUNG, TOOL
 from skillframe.world.plant import Plant
 from skillframe.world.scene import Geom
 from skillframe.world.visuals import link_geoms
@@ -16,7 +16,8 @@ from skillframe.world.visuals import link_geoms
 def drawn_bodies(plant: Plant) -> list[dict[str, Any]]:
     """Name and geoms of every body of the plant but the world, in the order of `Plant.body_poses`."""
     scene = plant.scene
-    known = {**link_geoms(plant.robot), FIXTURE: scene.fixture, TOOL: scene.tool.geoms}
+    links = link_geoms(plant.robot)
+    known = {**links, BASE: links[plant.robot.model.names[0]], FIXTURE: scene.fixture, TOOL: scene.tool.geoms}
     known.update({SPRUNG + part.name: part.geoms for part in scene.sprung})
     bodies = []
     for body in range(1, plant.model.nbody):

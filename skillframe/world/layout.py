@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from skillframe.frames import Float, cross
 from skillframe.robot.model import RobotModel
-from skillframe.world.convert import FIXTURE, SECOND, SENSOR, SPRUNG, TOOL
+from skillframe.world.convert import BASE, FIXTURE, SECOND, SENSOR, SPRUNG, TOOL
 
 
 class Layout:
@@ -115,7 +115,7 @@ class Layout:
 
 
 def _no_link(name: str) -> bool:
-    return name in (FIXTURE, TOOL, SENSOR, SECOND) or name.startswith(SPRUNG)
+    return name in (BASE, FIXTURE, TOOL, SENSOR, SECOND) or name.startswith(SPRUNG)
 
 
 def _span(indices: NDArray[np.int64]) -> slice | NDArray[np.int64]:

@@ -6,6 +6,7 @@ Meshes are left out: a URDF's links that are only meshes are drawn as capsules b
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping
 
 import numpy as np
 import pinocchio as pin
@@ -21,13 +22,15 @@ def link_geoms(robot: RobotModel) -> dict[str, tuple[Geom, ...]]:
     """Geoms by joint name (the name of the body that the joint moves), in that body's frame."""
     model = robot.model
     found: dict[str, list[Geom]] = {name: [] for name in model.names}
-    for link in ET.parse(robot.spec.urdf).getroot().findall("link"):
+    root = ET.parse(robot.spec.urdf).getroot()
+    materials = {material.get("name", ""): material for material in root.findall("material")}
+    for link in root.findall("link"):
         name = link.get("name", "")
         if not model.existBodyName(name):
             continue
         frame = model.frames[model.getBodyId(name)]
         for visual in link.findall("visual"):
-            geom = _visual(visual, frame.placement)
+            geom = _visual(visual, frame.placement, materials)
             if geom is not None:
                 found[model.names[frame.parentJoint]].append(geom)
     for joint in range(2, model.njoints):
@@ -38,7 +41,7 @@ def link_geoms(robot: RobotModel) -> dict[str, tuple[Geom, ...]]:
     return {name: tuple(geoms) for name, geoms in found.items()}
 
 
-def _visual(visual: ET.Element, placement: pin.SE3) -> Geom | None:
+def _visual(visual: ET.Element, placement: pin.SE3, materials: Mapping[str, ET.Element]) -> Geom | None:
     shape = visual.find("geometry")
     child = None if shape is None else next(iter(shape), None)
     if child is None:
@@ -57,7 +60,12 @@ def _visual(visual: ET.Element, placement: pin.SE3) -> Geom | None:
     x, y, z, w = (float(v) for v in quaternion_from_matrix(at.rotation))
     px, py, pz = (float(v) for v in at.translation)
     return Geom(
-        kind=kind, size=size, position=(px, py, pz), quaternion=(x, y, z, w), rgba=_colour(visual), collide=False
+        kind=kind,
+        size=size,
+        position=(px, py, pz),
+        quaternion=(x, y, z, w),
+        rgba=_colour(visual, materials),
+        collide=False,
     )
 
 
@@ -69,8 +77,12 @@ def _origin(origin: ET.Element | None) -> pin.SE3:
     return pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), xyz)
 
 
-def _colour(visual: ET.Element) -> tuple[float, float, float, float]:
-    colour = visual.find("material/color")
+def _colour(visual: ET.Element, materials: Mapping[str, ET.Element]) -> tuple[float, float, float, float]:
+    """Of the visual's own material, or of the robot's material of that name."""
+    material = visual.find("material")
+    colour = None if material is None else material.find("color")
+    if colour is None and material is not None and material.get("name", "") in materials:
+        colour = materials[material.get("name", "")].find("color")
     if colour is None:
         return LINK_COLOUR
     r, g, b, a = (float(v) for v in colour.get("rgba", "0.8 0.8 0.8 1").split())

@@ -87,7 +87,7 @@ def build(params: PalletsParams) -> Scene:
     over_stack, by_stop = ({"start.offset_x": sign * 0.2, "start.offset_z": sign * 0.15} for sign in (-1.0, 1.0))
     return Scene(
         name="pallets",
-        fixture=(*_stack(top, params.surface), *_wall(top, face)),
+        fixture=(*_stack(top, params.surface), *_wall(top, face + 2.0 * _cover(params.surface))),
         sprung=(
             sprung("stack", (0.0, 0.0, 1.0), _top(top, face, params.surface)),
             sprung("stop", (1.0, 0.0, 0.0), _face(top, face, params.surface)),
@@ -151,7 +151,7 @@ def _face(top: float, face: float, surface: str) -> tuple[Geom, ...]:
     low, high = top - SHEETS - PLATE, top + ABOVE_STOP
     size, middle = (PLATE, 0.5 * POST, 0.5 * (high - low)), 0.5 * (low + high)
     solid = Geom(kind="box", size=size, position=(face + PLATE, 0.0, middle), visible=False)
-    thick, colour = (0.5 * SHEETS, FOAM) if surface == "styrofoam" else (0.011, WOOD)
+    thick, colour = _cover(surface), FOAM if surface == "styrofoam" else WOOD
     half = 0.5 * ABOVE_STOP
     return (solid, _drawn((thick, 0.5 * POST, half), (face + thick, 0.0, top + half), colour))
 
@@ -163,10 +163,15 @@ def _drawn(size: Vector, position: Vector, colour: tuple[float, float, float, fl
     return Geom(kind="box", size=size, position=position, rgba=colour, collide=False)
 
 
+def _cover(surface: str) -> float:
+    """Half the thickness of what the stop is covered with [m]."""
+    return 0.5 * SHEETS if surface == "styrofoam" else 0.011
+
+
 def _stack(top: float, surface: str) -> tuple[Geom, ...]:
     """Pallets as they look, under the sheets if there are any: three skids and a deck each."""
     ground = Geom(
-        kind="box", size=(2.2, 1.2, 0.01), position=(-0.4, 0.0, -0.01), rgba=(0.62, 0.64, 0.66, 1.0), collide=False
+        kind="box", size=(2.5, 1.2, 0.01), position=(-0.9, 0.0, -0.01), rgba=(0.62, 0.64, 0.66, 1.0), collide=False
     )
     height = top - (SHEETS if surface == "styrofoam" else 0.022)
     middle, count = 0.5 + RADIUS - 0.5 * LENGTH, max(1, round(height / STEP))
@@ -180,8 +185,8 @@ def _stack(top: float, surface: str) -> tuple[Geom, ...]:
     return tuple(parts)
 
 
-def _wall(top: float, face: float) -> tuple[Geom, ...]:
-    """What holds the stop: a post behind it, and a brace."""
+def _wall(top: float, behind: float) -> tuple[Geom, ...]:
+    """What holds the stop: a post behind it, with 10 mm for the stop to yield."""
     grey = (0.45, 0.48, 0.52, 1.0)
     height = 0.5 * (top + ABOVE_STOP)
-    return (_drawn((0.06, 0.5 * POST, height), (face + 2.0 * PLATE, 0.0, height), grey),)
+    return (_drawn((0.06, 0.5 * POST, height), (behind + 0.07, 0.0, height), grey),)

@@ -6,6 +6,8 @@ from skillframe.errors import InputError
 from skillframe.frames import norm
 from skillframe.world.catalogue import make_scene, world_types
 from skillframe.world.drawing import drawn_bodies
+from skillframe.world.placement import fixture_poses
+from skillframe.world.plant import Plant
 from skillframe.world.shapes import filleted_peg, hole, quaternion_about, slope
 
 RECORDS = {record.name: record for record in world_types()}
@@ -149,3 +151,13 @@ def test_what_is_drawn_are_all_bodies_in_the_order_of_their_poses(plant):
 def test_every_joint_of_the_arm_is_seen(plant):
     bodies = drawn_bodies(plant("panda", "free"))
     assert all(body["geoms"] for body in bodies if body["name"].startswith("joint"))
+
+
+def test_what_does_not_move_of_a_robot_is_drawn_too_in_the_colours_that_its_urdf_names(robot, scene):
+    """hiab_xs031 stands on a grey foot with a white pillar; its boom is orange."""
+    model, task = robot("hiab_xs031"), scene("pallets")
+    now = Plant(model, task, 1, fixture_poses(model, {}, 1), {})
+    drawn = {body["name"]: body["geoms"] for body in drawn_bodies(now)}
+    assert [geom["rgba"] for geom in drawn["robot_base"]][0] == [0.35, 0.37, 0.40, 1.0]
+    assert [0.85, 0.42, 0.10, 1.0] in [geom["rgba"] for geom in drawn["lift"]]
+    assert len(drawn) == now.body_poses()[0].shape[1]
