@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from skillframe.cli.main import run
+from skillframe.executor import simulate
+from skillframe.prepare import load_robot_model, load_world, prepare
 from skillframe.trace import Trace
 from tests.crane_corner import PEAK, SKILL, into_the_corner
 
@@ -30,3 +32,23 @@ def test_one_run_ends_within_10_mm_of_the_corner_and_its_page_shows_the_machine(
 def test_from_each_start_the_corner_is_reached_through_styrofoam_too():
     corner = into_the_corner("styrofoam", 3, seed=7)
     assert corner.good.all(), (corner.result.failure, corner.result.peak_force_n)
+
+
+def test_a_trial_in_contact_is_the_same_to_the_last_bit_alone_and_beside_another():
+    skill = json.loads(SKILL.read_text(encoding="utf-8"))
+    drawn = {
+        "start.offset_z": np.array([-0.32, -0.30]), "actuator.friction_scale": np.array([0.9, 1.1]),
+        "actuator.deadband": np.array([0.004, 0.0]), "actuator.delay": np.array([0.0, 3e-3]),
+    }  # fmt: skip
+
+    def traces(ids):
+        runnable, setup = prepare(load_robot_model("hiab_xs031"), load_world("pallets", {}), skill)
+        rngs, mine = [np.random.default_rng([3, i]) for i in ids], {name: v[ids] for name, v in drawn.items()}
+        return simulate(runnable, setup, mine, rngs, duration_s=1.5, trace_hz=100.0).traces
+
+    together = traces([0, 1])
+    for i in range(2):
+        (alone,) = traces([i])
+        assert np.abs(alone.wrench_true[:, 2]).max() > 1000.0
+        for name in ("position", "wrench", "wrench_true", "q", "body_position"):
+            assert np.array_equal(getattr(alone, name), getattr(together[i], name)), name

@@ -158,6 +158,6 @@ def test_what_does_not_move_of_a_robot_is_drawn_too_in_the_colours_that_its_urdf
     model, task = robot("hiab_xs031"), scene("pallets")
     now = Plant(model, task, 1, fixture_poses(model, {}, 1), {})
     drawn = {body["name"]: body["geoms"] for body in drawn_bodies(now)}
-    assert [geom["rgba"] for geom in drawn["robot_base"]][0] == [0.35, 0.37, 0.40, 1.0]
+    assert drawn["robot_base"][0]["rgba"] == [0.35, 0.37, 0.40, 1.0]
     assert [0.85, 0.42, 0.10, 1.0] in [geom["rgba"] for geom in drawn["lift"]]
     assert len(drawn) == now.body_poses()[0].shape[1]
