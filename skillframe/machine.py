@@ -88,6 +88,8 @@ class MachineLoop(Loop):
     ) -> None:
         self.chain = ClosedChain(setup.robot)
         self.task = plane_task(self.chain)
+        first, second = self.task.axes
+        self._plane = slice(first, second + 1, second - first)
         super().__init__(skill, setup, draws, rngs, trace_hz)
         spec = setup.robot.spec
         known = cylinders(spec.actuation, spec.folder / "robot.toml")
@@ -206,13 +208,14 @@ class MachineLoop(Loop):
     def _sense(self, force_counts: bool = True) -> None:
         """Sample the sensors, and estimate the force from them; in the air it is known to be zero."""
         self.gauges.sample(self._true_z(), *self._true_pressures())
-        measured = self._measured()
-        self.terms = self.law.terms(measured)
-        estimate = self.estimator.step(measured, self.terms)
+        self._seen = self._measured()
+        self.terms = self.law.terms(self._seen)
+        estimate = self.estimator.step(self._seen, self.terms)
         self.estimate = estimate if force_counts else estimate._replace(feedback=np.zeros_like(estimate.force))
 
     def _valve(self, reference: Reference) -> None:
-        self.demand = self.law.step(self._measured()._replace(z=self.gauges.now), reference, self.active)
+        measured = self._seen._replace(z=self.gauges.now, force=self.estimate.feedback)
+        self.demand = self.law.step(measured, reference, self.active)
 
     def _tick(self, tick: int) -> None:
         time = tick * self.dt
@@ -234,11 +237,11 @@ class MachineLoop(Loop):
 
     def _observe(self, time: float) -> Observation:
         """Pose and twist as the encoders say, wrench as the pressures say."""
-        tool, axes = self.plant.tool_pose(), self.task.axes
+        tool, plane = self.plant.tool_pose(), self._plane
         position = tool.position.copy()
-        position[:, axes] = self.terms.tip + self.gauges.lag * self.terms.tip_rate
+        position[:, plane] = self.terms.tip + self.gauges.lag * self.terms.tip_rate
         twist, wrench = np.zeros((self.count, 6)), np.zeros((self.count, 6))
-        twist[:, axes], wrench[:, axes] = self.terms.tip_rate, self.estimate.feedback
+        twist[:, plane], wrench[:, plane] = self.terms.tip_rate, self.estimate.feedback
         return Observation(np.full(self.count, time), self.dt, Pose(position, tool.rotation.copy()), twist, wrench)
 
     def _read(self, observation: Observation) -> Observation:
@@ -249,26 +252,25 @@ class MachineLoop(Loop):
 
     def _reference(self, command: Command, seen: Observation, ramp: float) -> tuple[Reference, Float]:
         """What the law follows, and equation (1)'s wrench (N, 6) for limits and trace."""
-        axes, count = self.task.axes, self.count
+        plane, count = self._plane, self.count
         stiffness = self._in_plane(command.impedance.stiffness)
         if command.impedance.damping is None:
             largest = np.linalg.eigvalsh(stiffness)[:, -1]
             damping = np.maximum(largest / IMPEDANCE_RATE, LEAST_DAMPING)[:, None, None] * np.eye(2)
         else:
             damping = self._in_plane(command.impedance.damping)
-        velocity, push = ramp * command.twist[:, axes], ramp * command.feedforward[:, axes]
+        velocity, push = ramp * command.twist[:, plane], ramp * command.feedforward[:, plane]
         law = np.zeros((count, 6))
-        error = (command.pose.position - seen.pose.position)[:, axes]
-        law[:, axes] = push + _times(stiffness, error) + _times(damping, velocity - seen.twist[:, axes])
+        error = (command.pose.position - seen.pose.position)[:, plane]
+        law[:, plane] = push + _times(stiffness, error) + _times(damping, velocity - seen.twist[:, plane])
         return Reference(
-            command.pose.position[:, axes], velocity, stiffness, damping, push, self.joint, np.zeros_like(self.joint)
+            command.pose.position[:, plane], velocity, stiffness, damping, push, self.joint, np.zeros_like(self.joint)
         ), law  # fmt: skip
 
     def _in_plane(self, matrix: Float) -> Float:
         """(N, 2, 2) of (N, 6, 6) or (6, 6)."""
-        axes = np.array(self.task.axes)
-        part: Float = matrix[..., axes[:, None], axes]
-        return part if part.ndim == 3 else np.tile(part, (self.count, 1, 1))
+        part: Float = matrix[..., self._plane, self._plane]
+        return part if part.ndim == 3 else np.broadcast_to(part, (self.count, 2, 2))
 
     def _drive(self, torque: Float, time: float = 0.0) -> None:
         """One coupled step under valve commands (N, k); trials whose FMU failed end with its sentence."""

@@ -174,7 +174,8 @@ class Master:
     def _felt(self, before: Float) -> Float:
         """Forces (count,) of the bank; what was felt before, where an actuator has ended."""
         force = self.bank.y[:, self._force]
-        return force.copy() if self.bank.active.all() else np.where(self.bank.active > 0, force, before)
+        ended = 0 in self.bank.active.tobytes()
+        return np.where(self.bank.active > 0, force, before) if ended else force.copy()
 
     def _actuate(self, begin: Motion, step: float) -> tuple[bool, Float]:
         """Step the bank along the parabola of the motion; (all well, work the actuators gave)."""

@@ -1,0 +1,135 @@
+"""Rows of the hydraulic crane: co-simulation with three cylinders, contact, estimate and filter, on one core.
+
+A trial presses a plate at K = 1e5 N/m and D = 5e4 N s/m; sensors, estimate, law, three FMUs, MuJoCo (RK4) and a trace
+at 100 Hz are in the loop at 1 kHz. CPU time, of ticks alone, in windows of a quarter of a second: the fastest in
+contact is what the code can do, the mean what it did on a machine whose cores others used as well.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from contextlib import ExitStack
+from unittest import mock
+
+import numpy as np
+
+COUNT, SECONDS, WINDOW_MS = 32, 4.0, 250
+
+
+def setting():
+    from skillframe.executor import Setup
+    from skillframe.prepare import load_robot_model
+    from skillframe.reproduce import crane_runs
+
+    start = np.array([crane_runs.FIXTURE[0], 0.0, 0.7])
+    scene = crane_runs.scene(start, plate=True)
+    return Setup(robot=load_robot_model("hiab_xs031"), scene=scene, center_of_compliance=np.zeros(3))
+
+
+def loop(count):
+    """A loop after its calibration in the air."""
+    from skillframe.machine import MachineLoop
+    from tests.laws.pushing import Push
+
+    stiffness, damping = np.diag([1e5] * 3 + [0.0] * 3), np.diag([5e4] * 3 + [1.0] * 3)
+    skill = Push((0.2, 0.0, -1.0), stiffness, speed=0.1, cap=8000.0, stall=False, damping=damping)
+    draws = {
+        "robot.mass_scale": np.linspace(0.98, 1.02, count), "actuator.friction_scale": np.linspace(0.8, 1.2, count)
+    }  # fmt: skip
+    rngs = [np.random.default_rng(i) for i in range(count)]
+    made = MachineLoop(skill, setting(), draws, rngs, 100.0)
+    with np.errstate(invalid="ignore", over="ignore"):
+        made.tare()
+    return made
+
+
+def timed(count, seconds=SECONDS):
+    """Simulated seconds of all trials per CPU second: in the fastest window with contact, and in the mean."""
+    made = loop(count)
+    marks = []
+
+    def note(now):
+        if round(1000 * now) % WINDOW_MS == 0:
+            marks.append((time.process_time(), bool(made.plant.contact_force().max() > 0.0)))
+
+    with np.errstate(invalid="ignore", over="ignore"):
+        made.run(seconds, note)
+    assert not made.limited.any(), made.reason
+    spent = [(after[0] - before[0], before[1]) for before, after in itertools.pairwise(marks)]
+    fastest = min(cpu for cpu, touching in spent if touching)
+    mean = sum(cpu for cpu, _ in spent) / len(spent)
+    return count * WINDOW_MS * 1e-3 / fastest, count * WINDOW_MS * 1e-3 / mean
+
+
+def uncompiled():
+    """The loop as a machine without a compiler runs it that was given a built FMU: interpreter, ctypes."""
+    stack = fresh_banks()
+    stack.enter_context(mock.patch("skillframe.control.generated.build_library", return_value=None))
+    stack.enter_context(mock.patch("skillframe.actuation.driver.compiled_step", return_value=None))
+    return stack
+
+
+def reference_actuators():
+    """The loop as it is without a compiler and without a built FMU: interpreter, the reference cylinder in numpy."""
+    stack = fresh_banks()
+    for module in ("build", "opening"):
+        stack.enter_context(mock.patch(f"skillframe.actuation.{module}.find_compiler", return_value=None))
+    return stack
+
+
+def fresh_banks():
+    """Banks that were opened before count as not there, here and afterwards."""
+    stack = ExitStack()
+    stack.enter_context(mock.patch("skillframe.machine_bank._KEPT", {}))
+    return stack
+
+
+def second_run():
+    """CPU seconds of resetting and starting the cylinders in a bank that is there."""
+    made = loop(1)
+    before = time.process_time()
+    for _ in range(20):
+        made.bank.start(0.0)
+    return (time.process_time() - before) / 20
+
+
+def driver(show):
+    """Three cylinders through our driver against fmpy's list interface, and one cylinder by itself."""
+    from skillframe.actuation.inspection import inspect_fmu
+    from skillframe.actuation.library import find_fmu
+    from tests.system.test_fmu_driver import H, bank, list_interface, side_by_side
+
+    for version in (2, 3):
+        facts = inspect_fmu(find_fmu("hydraulic_cylinder", version=version))
+        fast, plain = bank(facts), bank(facts, compiled=False)
+        best = side_by_side(
+            {"list": list_interface(facts), "c": lambda t: fast.step(t, H), "ctypes": lambda t: plain.step(t, H)}  # noqa: B023
+        )
+        for how, bound in (("c", 6.0), ("ctypes", 3.0)):
+            what = f"3 cylinders, FMI {version}, fmpy's lists over our driver ({how})"
+            show(what, best["list"] / best[how], "x", bound, below=False)
+        show(f"1 cylinder, FMI {version}, a millisecond at constant input", 1e6 * best["c"] / 3, "us", 4.0)
+
+
+def rows(show):
+    """Print the crane's rows with `run.show`."""
+    from skillframe.actuation.toolchain import find_compiler
+
+    if find_compiler() is None:
+        print("crane: no C compiler here")
+        return
+    best, mean = timed(1)
+    show("crane, one run: real time, fastest 0.25 s in contact", best, "x", 6.0, below=False)
+    show("crane, one run: real time, mean", mean, "x")
+    with uncompiled():
+        best, mean = timed(1)
+    show("crane, no compiler, FMUs built elsewhere: real time, fastest", best, "x", 3.0, below=False)
+    show("crane, no compiler, FMUs built elsewhere: real time, mean", mean, "x")
+    with reference_actuators():
+        best, _ = timed(1)
+    show("crane, no compiler, cylinders in numpy: real time, fastest", best, "x", 3.0, below=False)
+    best, mean = timed(COUNT, 3.5)
+    show(f"crane, batch of {COUNT}: simulated seconds of all trials per second, mean", mean, "x", 8.0, below=False)
+    show("crane: starting its cylinders again in the same process", 1e3 * second_run(), "ms", 5.0)
+    driver(show)
