@@ -61,7 +61,7 @@ def teach(angle: float, delay: float, seeds: range, **channel: float) -> tuple[l
         if not left:
             break
         rngs = [np.random.default_rng([*slot, attempt]) for slot in left]
-        result = operate(robot, scene, settings, _draws(angle, left), rngs)
+        result = operate(robot, scene, settings, draws(angle, left), rngs)
         assert result.traces is not None
         for slot, good, reason, trace in zip(left, result.success, result.failure, result.traces, strict=True):
             if good:
@@ -76,7 +76,8 @@ def _taught(traces, scene, settings):
     return Taught([demonstration_of_machine(trace, scene, settings) for trace in traces], traces)
 
 
-def _draws(angle, slots):
+def draws(angle: float, slots: list[tuple[int, int]]) -> dict[str, np.ndarray]:
+    """Start and plant of every (seed, demonstration)."""
     offsets = starts(angle)
     plants = [np.random.default_rng([seed, 77]).uniform(-1.0, 1.0, 2) for seed, _ in slots]
     friction, mass = np.array(plants).T

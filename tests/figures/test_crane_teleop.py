@@ -7,14 +7,18 @@ friction 0.3, from -73.3 to -16.7 degrees.
 from __future__ import annotations
 
 from functools import cache
+from math import radians
 
 import numpy as np
 import pytest
 
+from skillframe import teleoperation
+from skillframe.demonstrate_machine import aimed, operate
 from skillframe.errors import InputError
+from skillframe.prepare import load_robot_model, load_world
 from skillframe.teleoperation import OperatorSettings, loop_gain
 from tests.crane_corner import PEAK, into_the_corner
-from tests.crane_teaching import Taught, angle_of, estimate_error, learn, margin, teach
+from tests.crane_teaching import Taught, angle_of, draws, estimate_error, learn, margin, teach
 from tests.figures.teaching import row
 
 pytestmark = [pytest.mark.figures, pytest.mark.needs_plugins]
@@ -84,6 +88,22 @@ def test_what_was_learned_ends_in_the_corner_from_three_starts(surface: str) -> 
         f"peak median {np.median(result.peak_force_n):.0f}, largest {result.peak_force_n.max():.0f} N (bar {PEAK:.0f})",
     )  # fmt: skip
     assert corner.good.all(), (list(result.failure), result.peak_force_n)
+
+
+@pytest.mark.parametrize("delay", DELAYS)
+def test_such_a_channel_let_through_ends_at_the_force_limit_on_the_stop(delay, monkeypatch) -> None:
+    """Small gain is sufficient, not necessary: on the stack the same channel came through."""
+    monkeypatch.setattr(teleoperation, "require_stable_loop", lambda settings: None)
+    robot, slots = load_robot_model("hiab_xs031"), [(seed, i) for seed in SEEDS[:4] for i in (0, 1)]
+    scene = aimed(robot, load_world("pallets", {}), radians(-45.0))
+    settings = OperatorSettings(delay_s=delay, feed_velocity=True)
+    rngs = [np.random.default_rng(slot) for slot in slots]
+    result = operate(robot, scene, settings, draws(-45.0, slots), rngs)
+    for i, name in enumerate(("stack", "stop")):
+        fine, peak = result.success[i::2], result.peak_force_n[i::2]
+        row(f"let through, {1e3 * delay:.0f} ms, {name}", f"done {fine.sum()}/{len(fine)}", f"peak {peak.max():.0f} N")
+    assert not result.success[1::2].any()
+    assert all("force limit" in text for text in result.failure[1::2])
 
 
 @pytest.mark.parametrize("delay", DELAYS)
