@@ -26,7 +26,7 @@ from skillframe.teacher import TeacherSettings
 
 pytestmark = [pytest.mark.needs_plugins]
 POLICIES, STARTS, EACH = 6, 9, 3
-SEED, SHORT_SEED = 4000, 4100
+SHORT_SEED = 4100
 AIM_NOISE = float(np.deg2rad(8.0))
 
 
@@ -37,12 +37,14 @@ class Whole(NamedTuple):
         world, params: where it is done.
         spread: starts vary about those shown by so much, evenly both ways.
         center: of compliance when it runs; None: where it was learned.
+        seed: of the first policy.
     """
 
     world: str
     params: dict[str, Any]
     spread: dict[str, float]
     center: str | None = None
+    seed: int = 4000
 
 
 TASKS = {
@@ -53,7 +55,12 @@ TASKS = {
         center="tip",
     ),
     "valley: slide, then along": Whole("valley", {"along": 0.05}, {"start.offset_x": 0.01, "start.offset_y": 0.005}),
-    "corner: set down, push in": Whole("corner", {}, {"start.offset_x": 0.01, "start.offset_y": 0.01}),
+    "corner: set down, push in": Whole(
+        "corner",
+        {},
+        {"start.offset_x": 0.01, "start.offset_y": 0.01},
+        seed=4300,  # phases are joined by a rule that was made on the corner's policies of 4000 and 4200
+    ),
 }
 
 
@@ -83,10 +90,11 @@ def line(name: str, *cells: object) -> None:
 
 def run_all(name: str) -> int:
     """Policies of a task, all from starts of their own; prints a row for each centre of compliance."""
-    task, policies = TASKS[name], [taught(TASKS[name], SEED + i) for i in range(POLICIES)]
+    task = TASKS[name]
+    policies = [taught(task, task.seed + i) for i in range(POLICIES)]
     wins = {}
     for center in dict.fromkeys((task.center, None)):
-        results = [executed(p, task, STARTS, SEED + i, center) for i, p in enumerate(policies)]
+        results = [executed(p, task, STARTS, task.seed + i, center) for i, p in enumerate(policies)]
         wins[center] = sum(int(r.success.sum()) for r in results)
         low, high = binomtest(wins[center], POLICIES * STARTS).proportion_ci(method="exact")
         peak = np.median(np.concatenate([r.peak_force_n for r in results]))

@@ -3,18 +3,24 @@
 Two phases may be one skill shown from two sides: if they never share a demonstration and stand at the same place in
 the sequence (after the same phases, before the same phases), if demonstrations begin with the one and with the other
 (a policy has one beginning), or if one is what another demonstration leaves out on its way from the other. They are
-joined if the learner finds one desired direction for both, which is the definition itself. Our choice; the papers join
-phases by their model alone.
+joined if the learner finds one desired direction for both, which is the definition itself. So are two that follow each
+other, both in contact and with the attitude held, and were learned as pushes less than 35 degrees apart: a box that
+touches a wall on its way into a corner is still pushed the same way. What the tool does in free air is another matter,
+since a push that leans on the friction cone explains both. Our choice; the papers join phases by their model alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from math import cos, inf, radians
 from typing import Any
+
+import numpy as np
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
+from skillframe.frames import norm
 from skillframe.records import Document, LearnOptions
 from skillframe.registry import registry
 from skillframe_segmenter.agreement import check_agreement
@@ -23,6 +29,7 @@ from skillframe_segmenter.settings import Settings
 from skillframe_segmenter.zvc import ZvcSettings
 
 SHORTEST_S = 0.25
+SAME_PUSH = cos(radians(35.0))
 OWN = ("segmenter", "skill", "phases", "recoveries", "set_boundary")
 
 
@@ -108,17 +115,53 @@ def _learn(
 
 
 def _joined(found: Document, demonstrations: Sequence[Demonstration], skill: str, options: LearnOptions) -> Document:
-    """The segmentation with alternatives joined that the learner explains by one direction."""
+    """The segmentation with those phases joined that the learner explains by one direction."""
     kind = registry().skill(skill)
-    for one, two in alternatives(found["demonstrations"]):
-        if kind.learn is None:
-            break
-        parts = pieces(found, demonstrations, [one]) + pieces(found, demonstrations, [two])
-        body = kind.learn(parts, options)
-        translation = body["phases"][0].get("translation", {})
-        if translation.get("desired_direction") is not None:
+    if kind.learn is None:
+        return found
+    rows = found["demonstrations"]
+    bodies = [_learn(found, demonstrations, k, skill, options) for k in range(_count(found))]
+    touching = {k for k in range(_count(found)) if _in_contact(found, demonstrations, k)}
+    candidates = [
+        ((one, two), pieces(found, demonstrations, [one]) + pieces(found, demonstrations, [two]))
+        for one, two in alternatives(rows)
+    ] + [
+        ((one, two), pieces(found, demonstrations, [one, two]))
+        for one, two in neighbours(rows)
+        if {one, two} <= touching and _one_push(bodies[one], bodies[two])
+    ]
+    for (one, two), parts in candidates:
+        if _part(kind.learn(parts, options), "translation").get("desired_direction") is not None:
             return _joined(relabelled(found, one, two), demonstrations, skill, options)
     return found
+
+
+def neighbours(rows: Sequence[Mapping[str, Any]]) -> list[tuple[int, int]]:
+    """Pairs of phases, the smaller first, that follow each other in a demonstration."""
+    return sorted({(min(pair), max(pair)) for row in rows for pair in pairwise(row["labels"])})
+
+
+def _in_contact(found: Document, demonstrations: Sequence[Demonstration], phase: int) -> bool:
+    """Whether a phase feels a force beyond the model's scale at most times; false where there is no such model."""
+    scale: float = found["phase_model"].get("scales", {}).get("force", inf)
+    force = np.concatenate([norm(piece.wrench[:, :3]) for piece in pieces(found, demonstrations, [phase])])
+    return float(np.median(force)) > scale
+
+
+def _part(body: Document, name: str) -> Mapping[str, Any]:
+    part: Mapping[str, Any] = body["phases"][0].get(name) or {}
+    return part
+
+
+def _one_push(one: Document, two: Document) -> bool:
+    """Whether two learned phases hold their attitude and push the same way."""
+    turns = [_part(body, "rotation") for body in (one, two)]
+    if any(
+        turn.get("desired_direction") or turn.get("compliant_axes") or turn.get("fully_compliant") for turn in turns
+    ):
+        return False
+    a, b = (_part(body, "translation").get("desired_direction") for body in (one, two))
+    return a is not None and b is not None and sum(x * y for x, y in zip(a, b, strict=True)) > SAME_PUSH
 
 
 def alternatives(rows: Sequence[Mapping[str, Any]]) -> list[tuple[int, int]]:
