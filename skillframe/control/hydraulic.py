@@ -106,6 +106,7 @@ class HydraulicGains:
         body: part of the bodies' gain K that is the same for all [N s/m, N m s/rad]; published.
         adaptation: rho of the inertial parameters; 0 switches it off. share: bounds, +- of each parameter.
         friction: rho_f of the cylinders' Coulomb [N/m] and viscous friction [N s/m^2 per m/s]; 0 switches it off.
+            Published: 1e5 of both.
         friction_share: bounds, +- of each.
         joint: lambda of the joints that the tool's plane leaves open [1/s].
         force_corner: of the filter that gives the required force's rate [Hz]; published.
@@ -116,7 +117,7 @@ class HydraulicGains:
     body: float = 5.0
     adaptation: float = 300.0
     share: float = 0.3
-    friction: tuple[float, float] = (0.0, 0.0)
+    friction: tuple[float, float] = (2e5, 2e5)
     friction_share: float = 0.5
     joint: float = 3.0
     force_corner: float = 8.0

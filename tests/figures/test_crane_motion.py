@@ -21,7 +21,7 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 LAP = round(20.0 / DT)
 SHARE = 0.9
 TRUTH = [Truth(friction, SHARE) for friction in (1.2, 0.8, 1.2, 0.8)]
-SEEDS = range(1, 5)
+SEEDS = range(11, 15)
 PUBLISHED = HydraulicGains(force=tuple(FORCE))
 
 
@@ -68,7 +68,7 @@ def test_with_the_published_gains_it_is_more_than_ten_times_worse_without_adapta
     """A fifth of k_f makes the law five times less sensitive to forces it does not know, so less is left to learn."""
     for name, gains in (("published k_f", PUBLISHED), ("a fifth of it", HydraulicGains())):
         second = laps(2, gains)[1]
-        never = laps(1, HydraulicGains(force=gains.force, adaptation=0.0))[0]
+        never = laps(1, HydraulicGains(force=gains.force, adaptation=0.0, friction=(0.0, 0.0)))[0]
         ratio = worst(never)[0] / worst(second)[0]
         row(f"diamond, {name}: second lap", told(second))
         row(f"diamond, {name}: without adaptation", told(never), f"{ratio:.1f} times worse")
@@ -84,7 +84,7 @@ def test_tuned_ordinary_controllers_are_worse_on_the_path():
     """
     rivals = [*TUNED.values(), TUNED["pid"]._replace(bandwidth=32.0)]
     law = laws_of_first_truth()
-    plants = TRUTH[:1] * len(rivals), [1] * len(rivals)
+    plants = TRUTH[:1] * len(rivals), [SEEDS[0]] * len(rivals)
     errors, speed, _ = run(Rivals(path, SHARE, rivals), path, 40.0, *plants, bonds=np.inf)
     for i, rival in enumerate(rivals):
         lap = errors[LAP:, i]
