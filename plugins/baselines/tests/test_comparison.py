@@ -12,7 +12,7 @@ pytestmark = [pytest.mark.figures, pytest.mark.needs_plugins]
 CAMPAIGNS = Path(__file__).resolve().parents[1] / "comparison"
 WORLDS = ("valley", "peg_in_hole", "hose_coupler")
 SKILLS = ("lmc", "replay", "dmp", "gmr", "seds")
-TEACHINGS = (101, 102)  # seeds of two pairs of demonstrations; each pair is learned and tried on draws of its own
+TEACHINGS = (103, 104)  # seeds of two pairs of demonstrations; each pair is learned and tried on draws of its own
 IN_PLACE = 6  # trials a teaching with the fixture where it was demonstrated, starts varied as in the others
 
 
