@@ -29,8 +29,9 @@ def draw(where):
 
     mpl.rcParams["svg.hashsalt"] = "crane"
     figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.0), layout="constrained")
+    never = HydraulicGains(adaptation=0.0, friction=(0.0, 0.0))
     controllers = {
-        "VDC": Vdc(path, SHARE, 1), "VDC without adaptation": Vdc(path, SHARE, 1, HydraulicGains(adaptation=0.0, friction=(0.0, 0.0))),
+        "VDC": Vdc(path, SHARE, 1), "VDC without adaptation": Vdc(path, SHARE, 1, never),
         "computed torque, tuned": Rivals(path, SHARE, [TUNED["model"]]),
         "PI on the valve, tuned": Rivals(path, SHARE, [TUNED["valve"]]),
     }  # fmt: skip
