@@ -49,10 +49,12 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     if moves:
         cutting = {**cutting, "boundaries": [list(move) for move in moves]}
     found = segmenter.fit(demonstrations, own["phases"], cutting)
-    check_agreement(found["demonstrations"], demonstrations)
     options = LearnOptions(at=options.at, hand=options.hand, axes=options.axes, settings=learning)
     if own["phases"] is None:
-        found = _joined(found, demonstrations, own["skill"], options)
+        found = _joined(found, demonstrations, own["skill"], options, stand_ins=False)
+    check_agreement(found["demonstrations"], demonstrations)
+    if own["phases"] is None:
+        found = _joined(found, demonstrations, own["skill"], options, stand_ins=True)
     bodies = [_learn(found, demonstrations, k, own["skill"], options) for k in range(_count(found))]
     shared = {key: value for key, value in bodies[0].items() if key != "phases"}
     return {
@@ -114,8 +116,14 @@ def _learn(
     return kind.learn(pieces(found, demonstrations, [phase]), options)
 
 
-def _joined(found: Document, demonstrations: Sequence[Demonstration], skill: str, options: LearnOptions) -> Document:
-    """The segmentation with those phases joined that the learner explains by one direction."""
+def _joined(
+    found: Document, demonstrations: Sequence[Demonstration], skill: str, options: LearnOptions, *, stand_ins: bool
+) -> Document:  # fmt: skip
+    """The segmentation with those phases joined that the learner explains by one direction.
+
+    What follows each other in contact may be joined before demonstrations are compared; phases that stand in for each
+    other may not, or one that stops half-way would only lack a phase.
+    """
     kind = registry().skill(skill)
     if kind.learn is None:
         return found
@@ -124,7 +132,7 @@ def _joined(found: Document, demonstrations: Sequence[Demonstration], skill: str
     touching = {k for k in range(_count(found)) if _in_contact(found, demonstrations, k)}
     candidates = [
         ((one, two), pieces(found, demonstrations, [one]) + pieces(found, demonstrations, [two]))
-        for one, two in alternatives(rows)
+        for one, two in (alternatives(rows) if stand_ins else [])
     ] + [
         ((one, two), pieces(found, demonstrations, [one, two]))
         for one, two in neighbours(rows)
@@ -132,7 +140,7 @@ def _joined(found: Document, demonstrations: Sequence[Demonstration], skill: str
     ]
     for (one, two), parts in candidates:
         if _part(kind.learn(parts, options), "translation").get("desired_direction") is not None:
-            return _joined(relabelled(found, one, two), demonstrations, skill, options)
+            return _joined(relabelled(found, one, two), demonstrations, skill, options, stand_ins=stand_ins)
     return found
 
 
