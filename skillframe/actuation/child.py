@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import signal
 import socket
 import subprocess
@@ -52,6 +53,8 @@ class Child:
             )  # fmt: skip
         finally:
             theirs.close()
+        # Up to its exec a child shares our memory, and Linux counts that peak as the child's own.
+        self._inherited_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         self._pipe = Connection(ours.detach())
         self._asked = monotonic()
 
@@ -115,7 +118,7 @@ class Child:
         self._process.returncode = code
         memory = f"having used {usage.ru_maxrss // 1024} MB of {self.limits.memory_bytes // 1024**2} MB"
         if code < 0:
-            large = usage.ru_maxrss * 1024 > TELLING * self.limits.memory_bytes
+            large = usage.ru_maxrss > max(TELLING * self.limits.memory_bytes / 1024, self._inherited_kb)
             return f"crashed ({signal.Signals(-code).name}{', ' + memory if large else ''})"
         return f"ran out of memory ({memory})" if code == 12 else f"left with code {code}"
 

@@ -77,6 +77,17 @@ def test_mischief_ends_its_own_trial_with_a_sentence(built, kind, words):
     bank.close()
 
 
+def test_a_crash_has_the_same_words_beside_a_parent_that_holds_much_memory(built):
+    """Linux counts the parent's peak, up to the child's exec, as the child's; 400 MB are above a quarter of 1500 MB."""
+    held = np.ones(50_000_000)
+    bank = pair(built, "crash")
+    run(bank)
+    words = bank.problem(1)
+    bank.close()
+    assert held[-1] == 1.0
+    assert words == "crash2 (crash2.fmu) crashed (SIGSEGV) while stepping from 0.005 s"
+
+
 def test_a_lost_instance_is_back_at_the_next_start(built):
     bank = pair(built, "crash")
     run(bank)
