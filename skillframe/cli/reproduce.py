@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from signal import Signals
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -30,8 +31,8 @@ def command(
 ) -> int:  # fmt: skip
     """Compute published results (all of them, or each ROW) and show them beside the published figures.
 
-    Rows that OUT holds already, computed with the same settings, are kept; Ctrl-C keeps what is done. Exit code 0 if
-    every verdict is the one in the docs, 1 if one has changed.
+    Rows that OUT holds already, computed with the same settings, are kept; Ctrl-C and SIGTERM keep what is done. Exit
+    code 0 if every verdict is the one in the docs, 1 if one has changed, 130 after Ctrl-C, 143 after SIGTERM.
 
     \b
     Example:
@@ -90,8 +91,11 @@ def _end(outcome: Outcome, out: Path, quick: bool, as_json: bool) -> int:
     _tell(f"table: {out / 'reproduce.json'}, page: {out / 'reproduce.html'}")
     for sentence in changed:
         _tell(f"changed: {sentence}")
-    if outcome.interrupted:
-        raise KeyboardInterrupt
+    if outcome.ended_by:
+        done = ", ".join(each["row"] for each in outcome.entries) or "none yet"
+        name = Signals(outcome.ended_by).name
+        _tell(f"ended by {name}; finished rows are kept in {out} ({done}), the same command goes on from there")
+        return 128 + outcome.ended_by
     if outcome.broken:
         raise RuntimeError("; ".join(outcome.broken))
     if outcome.refused:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 import sys
 from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection, wait
@@ -21,6 +20,7 @@ from skillframe.errors import SkillframeError
 from skillframe.records import RowRun
 from skillframe.registry import registry
 from skillframe.reproduce import store
+from skillframe.reproduce.ending import Ending, end_all, end_with_parent
 from skillframe.reproduce.jobs import Job
 
 Tell = Callable[[str], None]
@@ -37,13 +37,13 @@ class Outcome(NamedTuple):
         entries: finished rows, in the order of the jobs.
         refused: sentences about rows that refused their settings.
         broken: sentences about rows that ended in an internal error.
-        interrupted: Ctrl-C came before the end.
+        ended_by: number of the signal that came before the end (Ctrl-C, SIGTERM), 0 if none.
     """
 
     entries: list[dict[str, Any]]
     refused: list[str]
     broken: list[str]
-    interrupted: bool
+    ended_by: int
 
 
 def run(jobs: Sequence[Job], folder: Path, *, workers: int, fresh: bool, tell: Tell) -> Outcome:
@@ -62,9 +62,9 @@ def run(jobs: Sequence[Job], folder: Path, *, workers: int, fresh: bool, tell: T
     if len(missing) < len(jobs):
         tell(f"{len(jobs) - len(missing)} of {len(jobs)} rows are there already in {folder}")
     pool = _Pool(folder, max(1, workers), tell)
-    interrupted = not pool.work_off(_groups(missing))
+    ended_by = pool.work_off(_groups(missing))
     found = [entry for job in jobs if (entry := store.kept(folder, job)) is not None]
-    return Outcome(found, pool.refused, pool.broken, interrupted)
+    return Outcome(found, pool.refused, pool.broken, ended_by)
 
 
 def _groups(jobs: Sequence[Job]) -> list[list[Job]]:
@@ -91,22 +91,19 @@ class _Pool:
         self.refused: list[str] = []
         self.broken: list[str] = []
 
-    def work_off(self, groups: Sequence[Sequence[Job]]) -> bool:
-        """Do the jobs of all groups; False if Ctrl-C ended it."""
+    def work_off(self, groups: Sequence[Sequence[Job]]) -> int:
+        """Do the jobs of all groups; the number of the signal that ended it, or 0."""
         waiting = list(groups)
-        try:
-            while waiting or self._running:
-                while waiting and len(self._running) < self._workers:
-                    self._begin(waiting.pop(0))
-                wait([each.receiver for each in self._running])
-                self._collect()
-        except KeyboardInterrupt:
-            for each in self._running:
-                each.process.terminate()
-            for each in self._running:
-                each.process.join()
-            return False
-        return True
+        with Ending() as ending:
+            try:
+                while (waiting or self._running) and not ending.signal:
+                    while waiting and len(self._running) < self._workers:
+                        self._begin(waiting.pop(0))
+                    wait([*(each.receiver for each in self._running), ending.wake])
+                    self._collect()
+            finally:
+                end_all([each.process for each in self._running])
+        return ending.signal
 
     def _begin(self, jobs: Sequence[Job]) -> None:
         for job in jobs:
@@ -141,7 +138,7 @@ class _Pool:
 
 def _compute_all(described: Sequence[dict[str, Any]], folder: str, sender: Connection) -> None:
     """Compute rows one after another and keep each; runs in a process of its own."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends us
+    end_with_parent()
     sys.stdout = sys.stderr  # whatever a row prints, stdout is the command's
     for each in described:
         job = Job(**each)

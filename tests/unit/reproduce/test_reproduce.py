@@ -7,6 +7,7 @@ import subprocess
 import sys
 import textwrap
 import time
+from pathlib import Path
 
 import pytest
 
@@ -36,6 +37,7 @@ PLUGIN = """
         raise InputError("--set gain", "is odd", "make it even")
 
     def slow(job):
+        pathlib.Path(os.environ["COUNTED"] + ".process").write_text(str(os.getpid()))
         time.sleep(60.0)
 
     @hookimpl
@@ -99,16 +101,52 @@ def test_rows_that_fail_cost_themselves_only(rows, tmp_path):
     assert refused.returncode == 2 and "make it even" in refused.stderr
 
 
-def test_ctrl_c_keeps_what_is_done_and_the_next_run_goes_on(rows, tmp_path):
-    words = [sys.executable, "-m", "skillframe.cli.main", "reproduce", "901", "904", "--out", str(tmp_path)]
-    process = subprocess.Popen([*words, "--workers", "2"], stderr=subprocess.DEVNULL, start_new_session=True)
-    while not (tmp_path / "rows" / "901.json").exists():
-        assert process.poll() is None
+def runs(process):
+    """Whether a process is there and has not ended."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+def until(condition):
+    """Waits up to half a minute: this machine may be busy."""
+    for _ in range(600):
+        if condition():
+            return True
         time.sleep(0.05)
-    os.killpg(process.pid, signal.SIGINT)  # a terminal sends it to all of the group
-    assert process.wait(timeout=20) == 130
+    return False
+
+
+def started(rows, out):
+    """A run that has done row 901 and is at 904, which takes a minute, and the process that computes it."""
+    words = [sys.executable, "-m", "skillframe.cli.main", "reproduce", "901", "904", "--out", str(out)]
+    process = subprocess.Popen([*words, "--workers", "2"], stderr=subprocess.PIPE, text=True, start_new_session=True)
+    told = rows.with_name("counted.process")
+    assert until(lambda: (out / "rows" / "901.json").exists() and told.exists() and told.read_text())
+    assert process.poll() is None
+    return process, int(told.read_text())
+
+
+@pytest.mark.parametrize(("number", "all_of_the_group", "code"), [("SIGINT", True, 130), ("SIGTERM", False, 143)])
+def test_a_signal_keeps_what_is_done_and_leaves_no_process_behind(rows, tmp_path, number, all_of_the_group, code):
+    process, worker = started(rows, tmp_path)
+    if all_of_the_group:
+        os.killpg(process.pid, signal.Signals[number])  # as a terminal does
+    else:
+        process.send_signal(signal.Signals[number])
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == code and not runs(worker)
+    assert f"ended by {number}; finished rows are kept in {tmp_path} (901)" in said and "Traceback" not in said
     assert [row["row"] for row in json.loads((tmp_path / "reproduce.json").read_text())] == ["901"]
-    assert "there already" in reproduce("901", "--out", tmp_path).stderr
+    assert "there already" in reproduce("901", "--out", tmp_path).stderr and rows.read_text() == "x"
+
+
+def test_a_run_that_is_killed_leaves_no_process_behind(rows, tmp_path):
+    process, worker = started(rows, tmp_path)
+    process.kill()
+    process.communicate(timeout=30)
+    assert until(lambda: not runs(worker))
 
 
 def test_what_is_unknown_is_refused_in_a_sentence(rows, tmp_path, capsys):
