@@ -18,6 +18,7 @@ from skillframe.frames import norm
 from skillframe.prepare import load_robot_model, load_world
 from skillframe.records import Document, LearnOptions
 from skillframe.registry import registry
+from skillframe.reproduce.crane_taught import LEARN
 from skillframe.skillsource import learned
 from skillframe.teleoperation import OperatorSettings
 from skillframe.trace import Trace
@@ -26,12 +27,6 @@ SLIDE, OFF = 0.25, 0.12  # m: left to slide once landed, and from the surface at
 CORNER = np.array([0.5, 0.482])  # x, z of the tool in the world's corner [m]
 FRICTION, MASS = 0.2, 0.02
 ATTEMPTS = 5
-LEARN = {
-    "contact_only": True, "force_min_n": 1000.0, "step_m": 0.02, "speed_max_m_s": 0.1, "stiffness_n_m": 1e5,
-    "damping_min_ns_m": 5e4, "lead_force_n": 3000.0, "lead_force_max_n": 3000.0,
-    "stall_m": 0.002, "stall_rad": 0.01,
-}  # fmt: skip
-"""Settings of `skillframe learn` for a machine of this size, as the how-to page gives them."""
 
 
 class Taught(NamedTuple):

@@ -10,13 +10,14 @@ HEAD = ("row", "what", "published", "ours", "verdict", "values")
 
 def render(entries: Sequence[Mapping[str, Any]]) -> str:
     """The page; the same rows give the same text but for wall times."""
-    seconds = sum(each["wall_s"] for each in entries)
+    wall, cpu = (sum(each[key] for each in entries) / 60.0 for key in ("wall_s", "cpu_s"))
     lines = [
         "# The papers' results, row by row", "",
         "Written by `skillframe reproduce`; do not edit. [How to read it](reproduce.md).", "",
         "```text", _command(entries), "```", "",
         f"{len(entries)} rows, {_count(entries, 'pass')} pass, {_count(entries, 'fail')} fail, "
-        f"{_count(entries, 'reported')} are reported only; {seconds:.0f} s of computing.", "",
+        f"{_count(entries, 'reported')} are reported only. One after another they took {wall:.1f} minutes, and "
+        f"{cpu:.1f} minutes of processor time, which several cores share.", "",
         _row(HEAD), _row(["---"] * len(HEAD)),
     ]  # fmt: skip
     keys = ("row", "summary", "published", "ours", "verdict", "values_are")
@@ -62,7 +63,7 @@ def _details(each: Mapping[str, Any]) -> list[str]:
         f"- {origin(each)}",
     ]
     facts += [f"- difference: {_cell(each['difference'])}"] if each["difference"] else []
-    facts += [f"- `{each['command']}`, {each['wall_s']:.0f} s"]
+    facts += [f"- `{each['command']}`, {each['wall_s']:.0f} s ({each['cpu_s']:.0f} s of processor time)"]
     lines = [f"## Row {each['row']}: {_cell(each['summary'])}", "", *facts]
     table = each["table"]
     if table["rows"]:

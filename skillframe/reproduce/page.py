@@ -93,7 +93,7 @@ def _section(each: Mapping[str, Any]) -> Markup:
 
 def _effort(each: Mapping[str, Any]) -> str:
     shared = f"; the first row of {each['group']!r} bears the time of all" if each["group"] != each["row"] else ""
-    return f"{each['wall_s']:.1f} s, seed {each['seed']}{shared}"
+    return f"{each['wall_s']:.1f} s ({each['cpu_s']:.1f} s of processor time), seed {each['seed']}{shared}"
 
 
 def _picture(drawn: Mapping[str, str]) -> Markup:

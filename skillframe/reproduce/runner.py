@@ -145,15 +145,21 @@ def _compute_all(described: Sequence[dict[str, Any]], folder: str, sender: Conne
         sender.send((job.row, *_compute(job, Path(folder))))
 
 
+def _processor_time() -> float:
+    """Of this process and of its children that have ended [s]."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
 def _compute(job: Job, folder: Path) -> tuple[str, str]:
     def tell(text: str) -> None:
         print(f"row {job.row}: {text}", file=sys.stderr, flush=True)
 
     try:
-        row, began = registry().row(job.row), perf_counter()
+        row, began, spent = registry().row(job.row), perf_counter(), _processor_time()
         result = row.run(RowRun(settings=job.settings, seed=job.seed, quick=job.quick, tell=tell))
         seconds = perf_counter() - began
-        store.keep(folder, store.entry(row, job, result, seconds))
+        store.keep(folder, store.entry(row, job, result, seconds, _processor_time() - spent))
     except SkillframeError as error:
         return "refused", str(error)
     except Exception as error:  # the other rows go on; the command ends with an internal error

@@ -18,8 +18,8 @@ from skillframe.reproduce.jobs import Job
 ROWS, TABLE = "rows", "reproduce.json"
 
 
-def entry(row: RowType, job: Job, result: RowResult, wall_s: float) -> dict[str, Any]:
-    """A computed row as plain JSON values."""
+def entry(row: RowType, job: Job, result: RowResult, wall_s: float, cpu_s: float) -> dict[str, Any]:
+    """A computed row as plain JSON values, with what it took: wall time and processor time."""
     return {
         "row": row.name, "summary": row.summary, "published": row.published, "source": row.source, "bar": row.bar,
         "ours": result.ours, "verdict": result.verdict, "difference": result.difference,
@@ -28,7 +28,7 @@ def entry(row: RowType, job: Job, result: RowResult, wall_s: float) -> dict[str,
         "table": {"head": list(result.head), "rows": [list(each) for each in result.rows]},
         "pictures": [picture._asdict() for picture in result.pictures],
         "command": job.command, "seed": job.seed, "quick": job.quick, "settings": dict(job.settings),
-        "wall_s": round(wall_s, 2), "group": job.group, "key": job.key,
+        "wall_s": round(wall_s, 2), "cpu_s": round(cpu_s, 2), "group": job.group, "key": job.key,
     }  # fmt: skip
 
 

@@ -78,7 +78,7 @@ def test_a_row_is_computed_shown_and_kept_and_computed_once(rows, tmp_path):
     (row,) = json.loads(done.stdout)  # what the row printed went elsewhere
     assert row == json.loads((out / "reproduce.json").read_text())[0]
     assert (row["row"], row["published"], row["ours"], row["verdict"], row["seed"]) == ("901", "20", "20", "pass", 0)
-    assert row["command"].startswith("skillframe reproduce 901") and row["wall_s"] >= 0.0
+    assert row["command"].startswith("skillframe reproduce 901") and row["wall_s"] >= 0.0 and row["cpu_s"] >= 0.0
     assert "reproduce 901" in (out / "reproduce.md").read_text()
     again = reproduce("901", "--out", out)
     assert "there already" in again.stderr and rows.read_text() == "x"
@@ -199,7 +199,7 @@ def entries():
     result = RowResult(ours="1 <b>", head=("x",), rows=[("y | z",)], pictures=[picture], difference="why")
     registry = made(toy())
     (job,) = jobs_of(registry, [], {}, seed=0, quick=True)
-    return [store.entry(registry.row("1"), job, result, 1.0)]
+    return [store.entry(registry.row("1"), job, result, 1.0, 0.5)]
 
 
 def test_the_page_reaches_for_nothing_and_nothing_in_it_acts():
@@ -232,3 +232,12 @@ def test_a_quick_run_misses_a_share_only_where_its_counts_exclude_it():
     assert reached(54, 60, 0.9, quick=False) and not reached(53, 60, 0.9, quick=False)
     assert reached(9, 15, 0.75, quick=True) and not reached(6, 15, 0.75, quick=True)
     assert not reached(2, 3, 1.0, quick=True) and reached(3, 3, 1.0, quick=True)
+
+
+def test_the_crane_is_taught_with_the_settings_that_the_how_to_gives():
+    from skillframe.config import parse_setting
+    from skillframe.reproduce.crane_taught import LEARN
+
+    text = (Path(__file__).parents[3] / "docs" / "how-to" / "teleoperation.md").read_text(encoding="utf-8")
+    command = text.partition("skillframe learn ")[2].partition("```")[0]
+    assert dict(parse_setting(word) for word in command.split() if "=" in word) == LEARN

@@ -22,7 +22,7 @@ SETTINGS = {
     "time": 20.0, "push": 10.0, "speed": 0.015, "stiffness": 2000.0, "world.fillet": FILLET_M, "world.friction": 0.2,
 }  # fmt: skip
 CALIBRATED = "the budget of 20 s, against the published 85 % and 67 %"
-GOALS, QUICK_GOALS = 60, 15
+GOALS, QUICK_GOALS = 60, 10
 BUDGETS = (3.0, 7.0, 13.4, 20.0)
 EARLY_S = 7.0
 SHIFT = (0.006, 0.0, 0.0)
@@ -133,7 +133,7 @@ def _reached(job: RowRun, found: float, bar: float) -> bool:
 
 def _few(job: RowRun) -> RowResult:
     time = float(job.settings["time"])
-    counts = (1, 5) if job.quick else (1, 2, 3, 4, 5)
+    counts = (5,) if job.quick else (1, 2, 3, 4, 5)  # that of five is row 13's, too
     tried = {n: _of(job, "peg", "search", "sampling", n) for n in counts}
     shares = {n: share(each.seconds, time) for n, each in tried.items()}
     enough = [n for n in counts if _reached(job, shares[n], 0.75)]
