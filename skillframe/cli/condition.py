@@ -59,6 +59,8 @@ def command(
     if bias or weight:
         removed = remove_bias(demonstration, _pair("--free-air", free_air), weight)
         demonstration = removed.demonstration
+        if free_air is None:
+            _doubt(removed)
     if method != "none":
         run = smooth if method == "smoother" else filter_wrench
         demonstration = run(demonstration, _model(demonstration, _pair("--noise", noise), corner))
@@ -69,6 +71,19 @@ def command(
     else:
         _show(out, removed, said)
     return 0
+
+
+def _doubt(removed: Removed) -> None:
+    """Say on stderr where the free air that was found may be contact."""
+    from skillframe.conditioning.offline import doubtful_bias
+
+    if (force := doubtful_bias(removed)) is not None:
+        first, last = removed.stretch
+        click.echo(
+            f"warning: {force:.2f} N from {first:.2f} to {last:.2f} s were taken for bias; if the recording starts in "
+            "contact, name a stretch without (--free-air FROM,TO), or leave the bias (--no-bias)",
+            err=True,
+        )
 
 
 def _pair(name: str, text: str | None) -> tuple[float, float] | None:

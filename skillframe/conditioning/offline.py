@@ -13,10 +13,11 @@ from skillframe.conditioning.noise import model_of, noise_figures
 from skillframe.conditioning.payload import Payload, gravity_in_tool, identify_payload
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
-from skillframe.frames import Float, rotate_spatial
+from skillframe.frames import Float, norm, rotate_spatial
 
 METHODS = ("smoother", "filter", "none")
 LEAST_STRETCH = 0.2
+LEAST_DOUBT = 0.5
 
 
 class Removed(NamedTuple):
@@ -97,6 +98,13 @@ def remove_bias(
     elif "includes_tool_weight" in said or weight:
         meta = {**meta, "wrench": {**said, "includes_tool_weight": False}}
     return Removed(replace(d, wrench=wrench, meta=meta), payload, stretch)
+
+
+def doubtful_bias(removed: Removed) -> float | None:
+    """The bias force that was removed [N] where it may have been contact: above 0.5 N and five times the scatter."""
+    force, scatter = float(norm(removed.payload.bias[:3])), removed.payload.residual_force
+    known = removed.demonstration.meta.get("contact") is False
+    return None if known or force <= max(LEAST_DOUBT, 5.0 * scatter) else force
 
 
 def payload_of(demonstration: Demonstration, inside: Any) -> Payload:

@@ -9,8 +9,8 @@ import numpy as np
 
 from skillframe.demonstration import checks
 from skillframe.demonstration.columns import (
-    ALIASES,
     CANONICAL,
+    KNOWN,
     POSITION,
     QUATERNION,
     WRENCH,
@@ -70,7 +70,7 @@ def assemble(
 
 
 def _alike(columns: Columns) -> bool:
-    return any(name in columns for name in ALIASES)
+    return any(name not in KNOWN and checks.alias(name) in KNOWN for name in columns)
 
 
 def _meta_rate(source: str, meta: Mapping[str, Any], columns: Columns) -> float | None:

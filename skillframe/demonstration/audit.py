@@ -162,7 +162,11 @@ def _wrench_warnings(
             f"in {d.duration:.1f} s"
         )
     if not contacts and d.meta.get("contact") is not False:
-        result.append("contact: none found; say contact = false in the metadata if there was none on purpose")
+        result.append(
+            f"contact: none found beyond the {force:.2f} N of the first {LEVEL_TIME:g} s, which were taken for free air"
+            if force > LEAST_BIAS[0]
+            else "contact: none found; say contact = false in the metadata if there was none on purpose"
+        )
     return result
 
 

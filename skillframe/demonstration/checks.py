@@ -19,10 +19,18 @@ from skillframe.errors import InputError
 from skillframe.frames import Float, matrix_from_quaternion, norm, rotation_vector
 
 NORM_REFUSED = 0.01
+LARGEST = 1e100
+"""Beyond it squares overflow; clocks in nanoseconds are at 1e18."""
 JUMP_WINDOW, JUMP_RATE, JUMP_ANGLE = 5e-3, 10.0, np.deg2rad(2.0)
 LONE_ANGLE, LONE_RATIO, NEIGHBOURS = np.deg2rad(20.0), 10.0, 3
 GAP = 3.0
 """A step of the clock this many times the median is a gap, across which nothing is judged as one sample."""
+
+
+def alias(name: str) -> str:
+    """What a header's name is probably meant to be: a familiar other name, or capitals for small letters."""
+    small = name.strip().lower()
+    return ALIASES.get(small, small)
 
 
 def refuse_missing(columns: Columns, names: Iterable[str], what: str, advice: str = "") -> None:
@@ -30,11 +38,11 @@ def refuse_missing(columns: Columns, names: Iterable[str], what: str, advice: st
     missing = [name for name in names if name not in columns]
     if not missing:
         return
-    alike = {old: new for old, new in ALIASES.items() if old in columns and new in missing}
-    fix = advice or "correct the header, or name the columns with --columns"
-    if alike:
-        renamed = ",".join(alike.get(name, name) for name in columns)
-        fix = f"if {', '.join(f'{a} is {b}' for a, b in alike.items())}, type --columns {renamed}"
+    native = columns.rows is None and columns.source.endswith(".npz")
+    meant = {} if native else {name: alias(name) for name in columns if alias(name) in KNOWN and name not in KNOWN}
+    fix = advice or ("store them as arrays" if native else "correct the header, or name the columns with --columns")
+    if said := [f"{name} is {new}" for name, new in meant.items() if new in missing]:
+        fix = f"if {', '.join(said)}, type --columns {','.join(meant.get(name, name) for name in columns)}"
     raise InputError(columns.source, f"has no {what} ({', '.join(missing)} missing)", fix)
 
 
@@ -42,6 +50,12 @@ def refuse_not_finite(columns: Columns) -> None:
     """Refuse NaN and infinity in every column that has a meaning; other columns may hold gaps."""
     for name in (n for n in KNOWN if n in columns):
         bad = np.flatnonzero(~np.isfinite(columns[name]))
+        beyond = np.flatnonzero(np.abs(columns[name]) > LARGEST)
+        if beyond.size and not bad.size:
+            raise InputError(
+                columns.place(int(beyond[0]), name), f"is {columns[name][beyond[0]]:g}, which nothing measures",
+                f"remove or mend the row ({beyond.size} like it in this column)",
+            )  # fmt: skip
         if bad.size:
             raise InputError(
                 columns.place(int(bad[0]), name), f"is not a finite number ({columns[name][bad[0]]})",

@@ -80,13 +80,18 @@ def name_columns(table: Table, spec: str | None, units: str | None) -> Columns:
     for name, index in picks.items():
         if index in table.text:
             if name.rpartition("_")[2] in KNOWN:
-                raise InputError(
-                    f"{table.source}: row {table.text[index]}, column {name}", "is not a number", "mend that cell"
-                )
+                _refuse_words(table, index, name)
             continue
         factor = factors.get(QUANTITY.get(name.rpartition("_")[2], ""), 1.0)
         columns[name] = table.values[:, index] * factor if factor != 1.0 else table.values[:, index].copy()
     return Columns(columns, table.source, table.rows.tolist())
+
+
+def _refuse_words(table: Table, index: int, name: str) -> None:
+    row, said = table.text[index]
+    comma = said.count(",") == 1 and said.replace(",", "").replace("-", "").replace("+", "").isdigit()
+    fix = "a decimal comma is not read; write numbers with a point" if comma else "mend that cell"
+    raise InputError(f"{table.source}: row {row}, column {name}", f"is not a number ({said[:40]!r})", fix)
 
 
 def left_out(table: Table) -> list[str]:
@@ -136,10 +141,12 @@ def _column(table: Table, column: str) -> int:
 
 
 def _unique(source: str, pairs: list[tuple[str, int]]) -> dict[str, int]:
-    for i, (name, _) in enumerate(pairs):
-        if name in dict(pairs[:i]):
+    unique: dict[str, int] = {}
+    for name, index in pairs:
+        if name in unique:
             raise InputError(source, f"names column {name!r} twice", "give every column its own name")
-    return dict(pairs)
+        unique[name] = index
+    return unique
 
 
 def select_arm(columns: Columns, arm: str | None) -> Columns:

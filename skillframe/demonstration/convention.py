@@ -111,4 +111,4 @@ def _point(source: str, value: object, meta: Mapping[str, Any]) -> Float:
         raise InputError(
             f"{source}: wrench.point", f"is no point: {value!r}", 'give "tool", "x,y,z" or a frame\'s name'
         )
-    return resolve_point(value, dict(meta.get("frames", {})))
+    return resolve_point(value, dict(meta.get("frames", {})), f"{source}: wrench.point")

@@ -48,6 +48,8 @@ def _format_of(path: Path, *, reading: bool, named_columns: bool = False) -> Rea
         return max(matches, key=lambda match: match[0])[1]
     if reading and named_columns:
         return registry().reader("delimited")
+    if reading and path.is_dir():
+        raise InputError(path, "is a folder", "give a file")
     if reading and not path.exists():
         raise InputError(path, "no such file", "check the path")
     endings = ", ".join(sorted(s for r in records for s in r.suffixes))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -61,10 +62,24 @@ def check_meta(source: str, meta: Mapping[str, Any]) -> None:
             if key == "sensor" and isinstance(meta[key], str):
                 continue
             raise InputError(f"{source}: {key}", f"should be {words}, is {meta[key]!r}", "correct the metadata")
-    for name, point in (meta.get("frames") or {}).items():
+    points = {f"frames.{name}": point for name, point in (meta.get("frames") or {}).items()}
+    if meta.get("hand") is not None and not isinstance(meta["hand"], str):
+        points["hand"] = meta["hand"]
+    for name, point in points.items():
         if not _is_point(point):
             raise InputError(
-                f"{source}: frames.{name}", f"is no point: {point!r}", "give [x, y, z] in metres, in the tool frame"
+                f"{source}: {name}", f"is no point: {point!r}", "give [x, y, z] in metres, in the tool frame"
+            )
+    _check_noise(source, meta.get("sensor"))
+
+
+def _check_noise(source: str, sensor: object) -> None:
+    """Stated noise must be numbers that a filter can be made for; 0 says that nobody knows."""
+    for name in ("force_noise", "torque_noise"):
+        value = sensor.get(name) if isinstance(sensor, Mapping) else None
+        if value is not None and not (_is_number(value) and value >= 0.0):
+            raise InputError(
+                f"{source}: sensor.{name}", f"is no standard deviation: {value!r}", "give N or Nm, 0 or above"
             )
 
 
@@ -75,10 +90,11 @@ def _warn_free_choice(source: str, key: str, value: object) -> None:
 
 
 def _is_point(point: object) -> bool:
-    numbers = isinstance(point, list | tuple) and all(
-        isinstance(v, int | float) and not isinstance(v, bool) for v in point
-    )
-    return numbers and len(point) == 3  # type: ignore[arg-type]
+    return isinstance(point, list | tuple) and len(point) == 3 and all(map(_is_number, point))
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
 
 
 def toml_text(meta: Mapping[str, Any]) -> str:

@@ -73,6 +73,7 @@ def _load(path: Path) -> dict[str, Any]:
         AttributeError,
         TypeError,
         NotImplementedError,
+        MemoryError,
     ) as error:
         raise InputError(path, f"is not a readable npz file, or is truncated{_why(error)}", "write it again") from None
 
@@ -80,6 +81,8 @@ def _load(path: Path) -> dict[str, Any]:
 def _why(error: Exception) -> str:
     """The cause in brackets; numpy takes any binary file for a pickle and says how to load one, which nobody should."""
     text = str(error).strip("'\"")
+    if text.startswith("Object arrays"):
+        return " (it holds Python objects, which are never loaded)"
     return "" if "pickle" in text or not text else f" ({text})"
 
 
@@ -91,7 +94,7 @@ def _meta(path: Path, arrays: dict[str, Any]) -> dict[str, Any]:
         )
     try:
         meta = json.loads(str(arrays["meta"][()]))
-    except (ValueError, TypeError, IndexError):
+    except (ValueError, TypeError, IndexError, RecursionError):
         meta = None
     if not isinstance(meta, dict):
         raise InputError(f"{path}: meta", "is not a JSON object", "store one JSON text")
@@ -99,9 +102,11 @@ def _meta(path: Path, arrays: dict[str, Any]) -> dict[str, Any]:
     if form != FORMAT:
         raise InputError(f"{path}: meta.format", f"is {form!r}, not {FORMAT!r}", "give a demonstration")
     if not isinstance(version, int) or isinstance(version, bool) or not 1 <= version <= VERSION:
+        newer = isinstance(version, int) and version > VERSION
         raise InputError(
-            f"{path}: meta.version", f"is {version!r}; this skillframe reads up to {VERSION}", "update skillframe"
-        )
+            f"{path}: meta.version", f"is {version!r}; this skillframe reads up to {VERSION}",
+            "update skillframe" if newer else f"store the number {VERSION}",
+        )  # fmt: skip
     return meta
 
 

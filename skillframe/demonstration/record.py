@@ -105,7 +105,7 @@ class Demonstration:
         return resolve_point(name, self.meta.get("frames", {}))
 
 
-def resolve_point(text: str | None, frames: dict[str, Any]) -> Float:
+def resolve_point(text: str | None, frames: dict[str, Any], where: str = "") -> Float:
     """A point in tool coordinates [m] from "x,y,z" or a frame's name; None and "tool" are the tool point.
 
     Raises:
@@ -120,5 +120,6 @@ def resolve_point(text: str | None, frames: dict[str, Any]) -> Float:
     except ValueError:
         values = np.empty(0)
     if values.shape != (3,) or not np.all(np.isfinite(values)):
-        raise UnknownName("point", text, [*frames, "tool"], note='or give "x,y,z" in metres in the tool frame')
+        note = 'or give "x,y,z" in metres in the tool frame'
+        raise UnknownName("point", text, [*frames, "tool"], note=note, where=where)
     return values

@@ -6,6 +6,7 @@ rows; a decimal comma is not read.
 
 from __future__ import annotations
 
+import codecs
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,14 +29,14 @@ class Table:
         names: of the header; empty where there is none.
         values: (T, C) numbers, NaN where `text` says that a column holds words.
         rows: (T,) row numbers in the file, from 1.
-        text: indices of columns that are not numbers, with the first offending row.
+        text: indices of columns that are not numbers, with the first offending row and what it says.
     """
 
     source: str
     names: list[str]
     values: Float
     rows: NDArray[np.int64]
-    text: dict[int, int]
+    text: dict[int, tuple[int, str]]
 
 
 def read_text(path: Path) -> str:
@@ -54,6 +55,8 @@ def read_text(path: Path) -> str:
         raise InputError(path, f"cannot be read ({error.strerror})", "check its permissions") from None
     if not raw.strip():
         raise InputError(path, "is empty", "give a file with a header and rows")
+    if raw[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+        raise InputError(path, "is UTF-16 text", "save it as UTF-8")
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -117,8 +120,10 @@ def _is_numeric(line: str, delimiter: str | None) -> bool:
 
 
 def _number(field: str) -> float | None:
+    """The number in a cell, perhaps in quotes; what only Python calls one (1_000, other scripts' digits) is none."""
+    field = field.strip().strip('"')
     try:
-        return float(field)
+        return float(field) if field.isascii() and "_" not in field else None
     except ValueError:
         return None
 
@@ -135,18 +140,21 @@ def _refuse_ragged(path: Path, names: list[str], lines: list[tuple[int, str]], d
             )  # fmt: skip
 
 
-def _numbers(lines: list[str], delimiter: str | None, rows: NDArray[np.int64]) -> tuple[Float, dict[int, int]]:
+def _numbers(
+    lines: list[str], delimiter: str | None, rows: NDArray[np.int64]
+) -> tuple[Float, dict[int, tuple[int, str]]]:
     """The numbers, and which columns hold words: numpy's own parser first, cell by cell where it fails."""
-    try:
-        return np.loadtxt(lines, delimiter=delimiter, comments=None, ndmin=2), {}
-    except ValueError:
-        pass
-    text: dict[int, int] = {}
+    if all(line.isascii() and "_" not in line for line in lines):
+        try:
+            return np.loadtxt(lines, delimiter=delimiter, comments=None, ndmin=2), {}
+        except ValueError:
+            pass
+    text: dict[int, tuple[int, str]] = {}
     values = np.empty((len(lines), len(_split(lines[0], delimiter))))
     for i, line in enumerate(lines):
         for j, cell in enumerate(_split(line, delimiter)):
-            number = _number(cell) if cell.strip() else np.nan
+            number = _number(cell) if cell.strip().strip('"') else np.nan
             if number is None:
-                text.setdefault(j, int(rows[i]))
+                text.setdefault(j, (int(rows[i]), cell.strip()))
             values[i, j] = np.nan if number is None else number
     return values, text

@@ -67,7 +67,10 @@ def _mimic(robot: RobotModel) -> Iterator[Problem]:
         leader = element.get("joint") if element is not None else None
         if robot.mimic_fallback:
             text = f"joint {name!r} should follow {leader!r} and is independent instead ({robot.mimic_fallback})"
-            fix = "let every mimic joint follow a joint that moves and is no follower itself"
+            fix = (
+                "let every mimic joint follow a joint that moves, is no follower itself and comes before it "
+                "(branches are taken in the alphabetical order of their joints)"
+            )
             yield _warning("mimic_independent", name, text, fix)
         elif name in robot.followers:
             text = f"joint {name!r} follows {leader!r}: it has no coordinate of its own"

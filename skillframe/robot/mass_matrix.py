@@ -34,11 +34,12 @@ class Pivots(NamedTuple):
 
 def smallest_pivots(model: pin.Model, home: Float) -> Pivots:
     """Evaluate the mass matrix at home and at many random configurations within the limits."""
-    data, rng = model.createData(), np.random.default_rng(0)
+    rng = np.random.default_rng(0)
     count = int(np.clip(_WORK / max(model.nv, 1), 8, _SAMPLES))
     configurations = [home, *(random_configuration(model, rng) for _ in range(count))]
     inertia, ratio = np.full(model.nv, np.inf), np.full(model.nv, np.inf)
     for q in configurations:
+        data = model.createData()  # fresh: with joints that follow others, Pinocchio's crba adds to what it left there
         upper = np.triu(pin.crba(model, data, q))
         mass = upper + np.triu(upper, 1).T
         inertia = np.minimum(inertia, _relative(np.diag(mass), _carried(model, data)))

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +46,17 @@ def test_weight_and_bias_go_and_the_press_stays(capsys: pytest.CaptureFixture[st
 def test_nothing_asked_for_changes_nothing(demo: Demonstration) -> None:
     assert run(["condition", "demo.npz", "--no-bias", "--method", "none", "--out", "same.csv"]) == 0
     assert np.array_equal(read_demonstration("same.csv").wrench, demo.wrench)
+
+
+def test_a_push_from_the_start_is_not_taken_for_bias_in_silence(
+    demo: Demonstration, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wrench = demo.wrench - demo.wrench[:1] + 12.0 * (np.arange(6) == 2)
+    write_demonstration(replace(demo, wrench=wrench, meta={}), "pushed.npz")
+    assert run(["condition", "pushed.npz", "--free-air", "0,0.5", "--out", "clean.npz"]) == 0
+    assert capsys.readouterr().err == ""
+    assert run(["condition", "pushed.npz", "--out", "clean.npz"]) == 0
+    assert "were taken for bias; if the recording starts in contact, name a stretch" in capsys.readouterr().err
 
 
 def test_given_noise_and_corner_are_used(capsys: pytest.CaptureFixture[str]) -> None:

@@ -96,6 +96,14 @@ def test_a_recording_without_contact_on_purpose_is_audited_without_complaint(dem
     assert not any("lever" in w or "force:" in w for w in audit(free).warnings)
 
 
+def test_a_recording_in_contact_from_start_to_end_is_not_told_that_it_may_have_no_contact(demo: Demonstration) -> None:
+    rng = np.random.default_rng(0)
+    push = np.array([0.0, 0.0, 8.0, 0.0, 0.0, 0.0]) + rng.normal(size=(200, 6)) * np.repeat([1.0, 0.05], 3)
+    said = " ".join(audit(replace(demo, wrench=push)).warnings)
+    assert "none found beyond the 8." in said
+    assert "contact = false" not in said
+
+
 def test_a_clean_demonstration_has_no_warnings(demo: Demonstration) -> None:
     found = audit(demo)
     assert found.warnings == []

@@ -142,6 +142,11 @@ def test_separators_are_told_apart(rows: list[list[str]], tmp_path: Path, separa
     assert len(read_demonstration(path)) == len(rows) - 1
 
 
+def test_numbers_may_stand_in_quotes(rows: list[list[str]], write: Callable[..., Path]) -> None:
+    quoted = [[f'"{cell}"' for cell in row] for row in rows]
+    assert np.array_equal(read_demonstration(write(quoted)).wrench, read_demonstration(write(rows, "plain.csv")).wrench)
+
+
 def test_a_header_with_blanks_and_a_degree_sign_of_an_old_editor_is_read(rows: list[list[str]], tmp_path: Path) -> None:
     path = tmp_path / "demo.txt"
     names = ["time (s)", *rows[0][1:-1], "Tz (\N{DEGREE SIGN})"]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import struct
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -51,6 +53,11 @@ def scaled(rows: Cells, factor: float, row: int) -> Cells:
     return rows
 
 
+def decimal_commas(rows: Cells) -> Cells:
+    """As an office of continental Europe saves a table: one cell a row, for this test's writer joins them by commas."""
+    return [[";".join(rows[0])], *([";".join(row).replace(".", ",")] for row in rows[1:])]
+
+
 W_FIRST = [0, 1, 2, 3, 7, 4, 5, 6, 8, 9, 10, 11, 12, 13]
 CASES: dict[str, tuple[Callable[[Cells], Cells], str]] = {
     "no time column and no rate": (lambda r: drop(r, "t"), "no time column.*--rate"),
@@ -61,7 +68,15 @@ CASES: dict[str, tuple[Callable[[Cells], Cells], str]] = {
     "NaN": (lambda r: spoil(r, "fy", "nan", 12), "row 12, column fy: is not a finite number"),
     "infinity": (lambda r: spoil(r, "pz", "inf", 4), "row 4, column pz: is not a finite number"),
     "an empty cell": (lambda r: spoil(r, "qx", "", 5), "row 5, column qx: is not a finite number"),
-    "a word": (lambda r: spoil(r, "tx", "high", 6), "row 6, column tx: is not a number"),
+    "a word": (lambda r: spoil(r, "tx", "high", 6), "row 6, column tx: is not a number .'high'.; mend that cell"),
+    "a decimal comma": (decimal_commas, "row 2, column t: is not a number.*decimal comma.*with a point"),
+    "digits of another script": (lambda r: spoil(r, "px", "\u0661\u0662", 6), "row 6, column px: is not a number"),
+    "a number as Python writes it": (lambda r: spoil(r, "px", "1_0", 6), "row 6, column px: is not a number .'1_0'"),
+    "a number that overflows": (lambda r: spoil(r, "fz", "1e200", 6), "row 6, column fz: is 1e.200, which nothing"),
+    "a header in capitals": (
+        lambda r: [[name.upper() for name in r[0]], *r[1:]],
+        "no time column.*type --columns t,px,py,pz,qx",
+    ),
     "a quaternion that is no rotation": (lambda r: scaled(r, 1.02, 30), "row 30: the quaternion's norm is 1.02"),
     "a zero quaternion": (lambda r: scaled(r, 0.0, 30), "row 30: the quaternion's norm is 0.0"),
     "a w-first header": (lambda r: [[row[i] for i in W_FIRST] for row in r], "w-first"),
@@ -108,6 +123,11 @@ METADATA = {
     "an unknown key": ('wrench.frmae = "base"', "did you mean 'frame'"),
     "a point that is none": ("wrench.point = 3", "wrench.point: is no point"),
     "frames that are no points": ("frames.hand = [0.0, 1.0]", "frames.hand: is no point"),
+    "a frame that is not finite": ("frames.hand = [0.0, 0.0, nan]", "frames.hand: is no point"),
+    "a hand that is a number": ("hand = 5", "hand: is no point: 5"),
+    "a hand of two numbers": ("hand = [0.0, 1.0]", "hand: is no point"),
+    "noise that is a word": ('sensor.force_noise = "low"', "sensor.force_noise: is no standard deviation: 'low'"),
+    "noise below zero": ("sensor.torque_noise = -0.1", "sensor.torque_noise: is no standard deviation: -0.1"),
     "contact that is a word": ('contact = "no"', "contact: should be true or false"),
     "a rate that is none": ("rate = -5.0", "rate: is no sample rate"),
     "a payload that is none": (
@@ -125,7 +145,7 @@ def test_bad_metadata_are_refused(rows: Cells, write: Write, name: str) -> None:
 
 
 def test_an_unknown_wrench_point_lists_the_points_there_are(rows: Cells, write: Write) -> None:
-    with pytest.raises(UnknownName, match="hand"):
+    with pytest.raises(UnknownName, match=r"demo\.csv: wrench\.point: unknown point 'hnad'; did you mean 'hand'"):
         read_demonstration(write(rows, meta='wrench.point = "hnad"\nframes.hand = [0.0, 0.0, 0.1]\n'))
 
 
@@ -140,6 +160,8 @@ def test_a_dead_wrench_is_fine_where_the_metadata_say_that_there_was_no_contact(
         (b"\n \n", "is empty"),
         (bytes(range(256)) * 20, "binary"),
         (b"t,px\n1,\x00\n", "binary"),
+        ("t,px\n1,2\n".encode("utf-16"), "is UTF-16 text; save it as UTF-8"),
+        (",".join(f"c{i}" for i in range(20_000)).encode() + b"\n" + b",".join([b"1"] * 20_000), "no time column"),
         (b"# t,px,py\n", "no rows"),
     ],
 )
@@ -156,7 +178,7 @@ def test_a_missing_file_is_refused(tmp_path: Path, name: str) -> None:
         read_demonstration(tmp_path / name)
 
 
-@pytest.mark.parametrize("name", ["folder.csv", "folder.npz"])
+@pytest.mark.parametrize("name", ["folder.csv", "folder.npz", "folder"])
 def test_a_folder_is_refused(tmp_path: Path, name: str) -> None:
     (tmp_path / name).mkdir()
     with pytest.raises(InputError, match="is a folder"):
@@ -178,7 +200,8 @@ FORMAT = {"format": "skillframe.demonstration", "version": 1}
 NATIVE: dict[str, tuple[dict[str, Any], str]] = {
     "another format": ({"meta": {"format": "skillframe.trace", "version": 1}}, "meta.format"),
     "a newer version": ({"meta": {**FORMAT, "version": 2}}, "meta.version: is 2"),
-    "a version that is a word": ({"meta": {**FORMAT, "version": "1"}}, "meta.version"),
+    "a version that is a word": ({"meta": {**FORMAT, "version": "1"}}, "meta.version.*store the number 1"),
+    "metadata nested beyond reason": ({"meta": "[" * 100_000}, "not a JSON object"),
     "metadata that are no JSON": ({"meta": "{"}, "not a JSON object"),
     "metadata that are a list": ({"meta": "[]"}, "not a JSON object"),
     "w-first metadata": ({"meta": {**FORMAT, "quaternion": "wxyz"}}, "w-first"),
@@ -186,7 +209,7 @@ NATIVE: dict[str, tuple[dict[str, Any], str]] = {
     "an array of another shape": ({"fx": np.zeros((200, 2))}, "fx: is float64 of shape"),
     "an array of words": ({"fx": np.array(["a"] * 200)}, "fx: is <U1"),
     "a channel with NaN": ({"fx": np.full(200, np.nan)}, "row 1, column fx"),
-    "a missing channel": ({"fx": None}, "fx missing"),
+    "a missing channel": ({"fx": None}, "fx missing.*store them as arrays"),
     "missing metadata": ({"meta": None}, "holds no meta"),
 }
 
@@ -224,6 +247,14 @@ def test_a_truncated_or_foreign_native_file_is_refused(demo: Demonstration, tmp_
 
 def test_a_pickled_array_is_never_loaded(tmp_path: Path) -> None:
     np.savez(tmp_path / "demo.npz", t=np.array([{"a": 1}], dtype=object))
+    with pytest.raises(InputError, match=r"not a readable npz.*Python objects, which are never loaded"):
+        read_demonstration(tmp_path / "demo.npz")
+
+
+def test_an_array_that_claims_more_rows_than_any_memory_holds_is_refused(tmp_path: Path) -> None:
+    header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (100000000000000,), }".ljust(117) + b"\n"
+    with zipfile.ZipFile(tmp_path / "demo.npz", "w") as file:
+        file.writestr("t.npy", b"\x93NUMPY\x01\x00" + struct.pack("<H", 118) + header + bytes(80))
     with pytest.raises(InputError, match="not a readable npz"):
         read_demonstration(tmp_path / "demo.npz")
 

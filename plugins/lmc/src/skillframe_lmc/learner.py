@@ -125,9 +125,11 @@ def _frame(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Do
 
 def _hand(demonstration: Demonstration, options: LearnOptions, frames: dict[str, list[float]]) -> Float | None:
     """Where the hand holds: the option, else the demonstration's own, else None."""
+    if options.hand is not None:
+        return resolve_point(options.hand, frames)
     own = demonstration.meta.get("hand")
-    if options.hand is not None or isinstance(own, str):
-        return resolve_point(options.hand if options.hand is not None else own, frames)
+    if isinstance(own, str):
+        return resolve_point(own, frames, f"{demonstration.source or 'demonstration'}: hand")
     return None if own is None else np.array(own, dtype=float).reshape(3)
 
 
