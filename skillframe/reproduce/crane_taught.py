@@ -150,28 +150,28 @@ def _picture(job: RowRun, skill: Taught, results: list[Result]) -> Illustration:
 
     from skillframe.reproduce.drawing import BLUE, GREY, INK, RED, svg
 
-    figure = Figure(figsize=(7.4, 3.8))
+    figure = Figure(figsize=(8.6, 4.2))
     taught_on, run_on = figure.subplots(1, 2, sharex=True, sharey=True)
     home = nominal_fixture(load_robot_model(ROBOT)).position
     for i, each in enumerate(skill.demonstrations):
         x, _, z = (each.position - home).T
-        taught_on.plot(x, z, color=(BLUE, RED)[i], label=("onto the stack", "against the stop")[i])
+        taught_on.plot(x, z, color=(BLUE, RED)[i], label=("taught on the stack", "taught on the stop")[i])
     for result, colour, surface in zip(results, (INK, RED), SURFACES, strict=True):
         for i, trace in enumerate(result.traces or []):
             x, _, z = (trace.position - home).T
-            run_on.plot(x, z, color=colour, label=f"on {surface}" if i == 0 else None)
-    for canvas, title in ((taught_on, f"taught on {skill.surface}"), (run_on, "run")):
+            run_on.plot(x, z, color=colour, label=f"run on {surface}" if i == 0 else None)
+    for canvas in (taught_on, run_on):
         canvas.axhline(CORNER[1], color=GREY, lw=0.8, zorder=0)
         canvas.axvline(CORNER[0], color=GREY, lw=0.8, zorder=0)
-        canvas.set(title=title, xlabel="x [m]", aspect="equal")
-        canvas.legend(frameon=False, fontsize=8, loc="upper right")
+        canvas.set(xlabel="x [m]", aspect="equal")
+        canvas.legend(frameon=False, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     taught_on.set_ylabel("z [m]")
     taught_on.annotate("", *_arrow(radians(skill.angle)), arrowprops={"arrowstyle": "->", "color": INK})
     caption = (
-        "Middle of the tool; grey: where it touches stack and stop. Arrow: the learned push. In styrofoam the skill's "
-        "push takes the tool past the untouched surfaces."
+        f"Middle of the tool, taught on {skill.surface} and run; grey: where it touches stack and stop. Arrow: the "
+        "learned push. In styrofoam the push takes the tool deeper than the untouched surfaces."
     )
-    return Illustration("The crane taught and let go on pallets (Fig. 11)", caption, svg(figure))
+    return Illustration("The crane taught and running on pallets", caption, svg(figure))
 
 
 def _arrow(angle: float) -> tuple[Float, Float]:

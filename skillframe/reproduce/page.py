@@ -21,6 +21,9 @@ STYLE = """
 .facts { display: grid; grid-template-columns: max-content minmax(0, 1fr); gap: 0.25rem 1.2rem; margin: 0.6rem 0; }
 .facts dt { color: var(--soft); } .facts dd { margin: 0; overflow-wrap: anywhere; }
 figure img { max-height: 560px; object-fit: contain; }
+.figures { columns: 2 410px; column-gap: 1rem; margin: 1rem 0; }
+.figures figure { break-inside: avoid; margin-bottom: 1rem; }
+.figures > figure:only-child { column-span: all; max-width: 860px; }
 :root[data-theme="dark"] img.paper { filter: brightness(0.86); }
 @media (max-width: 820px) {
   .facts { grid-template-columns: minmax(0, 1fr); gap: 0 0; } .facts dd { margin-bottom: 0.5rem; }
@@ -86,13 +89,14 @@ def _section(each: Mapping[str, Any]) -> Markup:
     return tag(
         "section", tag("h2", f"{each['row']}. {each['summary']} ", _badge(each)), listed,
         table(behind["head"], behind["rows"], numeric=9) if behind["rows"] else "",
-        tag("div", *(_picture(p) for p in each["pictures"]), class_="grid") if each["pictures"] else "",
+        tag("div", *(_picture(p) for p in each["pictures"]), class_="figures") if each["pictures"] else "",
         id=f"row-{each['row']}",
     )  # fmt: skip
 
 
 def _effort(each: Mapping[str, Any]) -> str:
-    shared = f"; the first row of {each['group']!r} bears the time of all" if each["group"] != each["row"] else ""
+    alone = each["group"] == each["row"]
+    shared = "" if alone else f"; what the rows of {each['group']!r} share is in the time of the first that needs it"
     return f"{each['wall_s']:.1f} s ({each['cpu_s']:.1f} s of processor time), seed {each['seed']}{shared}"
 
 

@@ -50,12 +50,12 @@ def path_of(folder: Path, row: str) -> Path:
 
 
 def kept(folder: Path, job: Job) -> dict[str, Any] | None:
-    """A row computed earlier by an equal job, or None."""
+    """A row computed earlier by an equal job, or None; one that an older version kept without `cpu_s` is none."""
     try:
         found: dict[str, Any] = json.loads(path_of(folder, job.row).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    return found if isinstance(found, dict) and found.get("key") == job.key else None
+    return found if isinstance(found, dict) and found.get("key") == job.key and "cpu_s" in found else None
 
 
 def write_table(folder: Path, entries: Sequence[Mapping[str, Any]]) -> None:

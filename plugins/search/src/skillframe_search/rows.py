@@ -189,8 +189,8 @@ def _curves(tried: dict[tuple[str, str], Tried]) -> Illustration:
                 times = np.concatenate([[0.0], found, [22.0]])
                 canvas.step(times, [*shares, shares[-1]], where="post", color=colours[method], label=method)
         canvas.set(title=name, xlabel="time [s]", ylim=(0.0, 1.02))
-        canvas.axhline({"peg": 0.85, "socket": 0.67}[name], color="#1d2025", lw=0.8, ls=":")
+        canvas.axhline({"peg": 0.85, "socket": 0.67}[name], color="#1d2025", lw=1.2, ls=":")
     figure.axes[0].set_ylabel("share found")
-    figure.axes[0].legend(frameon=False, fontsize=8, loc="lower right")
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), frameon=False, ncols=4, loc="outside upper center")
     caption = "The same goals for every method. Dotted: the published share, whose budget of time is not known."
     return Illustration("Share found over time", caption, svg(figure))
