@@ -65,7 +65,7 @@ def simulate_arms(
         SkillframeError: the robot has one arm, or the scene nothing for a second one to hold.
         UnknownName, UnreachablePose: as `simulate`.
     """
-    check_quantities(draws)
+    check_quantities(draws, setup.robot)
     if len(setup.robot.tool_frames) < 2 or setup.scene.holder is None:
         raise SkillframeError(
             f"robot {setup.robot.spec.name} in world {setup.scene.name}: a coordinator needs a robot with two arms and "

@@ -106,7 +106,10 @@ def _coerce_sequence(value: Any, origin: type, args: tuple[Any, ...], where: str
 
 def _coerce_scalar(value: Any, hint: Any, where: str) -> Any:
     if hint is float and isinstance(value, int | float) and not isinstance(value, bool):
-        number = float(value)
+        try:
+            number = float(value)
+        except OverflowError:
+            raise InputError(where, "is too large a number", "give a finite number") from None
         if number != number:
             raise InputError(where, "is not a number (NaN)", "give a finite number")
         return number

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
+import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from skillframe.errors import InputError, UnknownName
 from skillframe.records import CoordinatorType, Document, SkillType
 from skillframe.registry import registry
 
+LARGEST = sys.float_info.max  # whole numbers in JSON may be longer
 FORMAT, VERSION = "skillframe.skill", 1
 AXES = ("base", "phase_start")
 POINTS = ("work_at", "learned_at", "center_of_compliance")
@@ -210,7 +211,7 @@ def _check_point(point: Any, where: str) -> None:
 
 
 def _not_finite(value: Any, spot: str) -> Iterator[str]:
-    if isinstance(value, float) and not math.isfinite(value):
+    if isinstance(value, float | int) and not -LARGEST <= value <= LARGEST:
         yield spot
     elif isinstance(value, dict):
         for key, item in value.items():

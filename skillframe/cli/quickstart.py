@@ -14,6 +14,8 @@ from pathlib import Path
 
 import click
 
+from skillframe.cli.numbers import SEED
+
 MARKER = ".skillframe-quickstart"
 VALLEY = """\
 # Where does the learned slide work, when the valley is shifted and tipped and nobody tells the robot?
@@ -51,9 +53,11 @@ TASKS = (("valley", "valley", VALLEY, None), ("peg", "peg_in_hole", PEG, "tip"))
 @click.command(name="quickstart")
 @click.option("--out", default="demo", show_default=True, type=click.Path(path_type=Path), help="Folder to make.")
 @click.option("--robot", default="panda", show_default=True, help="Robot to teach.")
-@click.option("--trials", default=96, show_default=True, help="Trials per skill and campaign.")
-@click.option("--workers", default=2, show_default=True, help="Worker processes of the campaigns.")
-@click.option("--seed", default=1, show_default=True, help="Seed of the demonstrations.")
+@click.option("--trials", default=96, show_default=True, type=click.IntRange(1), help="Trials per skill and campaign.")
+@click.option(
+    "--workers", default=2, show_default=True, type=click.IntRange(1), help="Worker processes of the campaigns."
+)
+@click.option("--seed", default=1, show_default=True, type=SEED, help="Seed of the demonstrations.")
 def command(out: Path, robot: str, trials: int, workers: int, seed: int) -> int:
     """Demonstrate, learn, run and prove two skills, and write a report.
 

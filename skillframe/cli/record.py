@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from skillframe.cli.numbers import NOT_NEGATIVE, POSITIVE, SEED
+
 if TYPE_CHECKING:
     from skillframe.blind_teacher import BlindSettings
     from skillframe.demonstrate import Recording
@@ -24,24 +26,30 @@ if TYPE_CHECKING:
 )
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="File; with --count N: NAME1, NAME2, ...")
 @click.option("--count", default=1, show_default=True, type=click.IntRange(1), help="Number of demonstrations.")
-@click.option("--seed", default=0, show_default=True, help="Everything random follows from it.")
-@click.option("--noise", type=float, help="Standard deviation of the person's aim [degrees]; default 8, machines 6.")
-@click.option("--delay", type=float, help="One-way delay [s]; default 0, teleoperation 0.1, of machines 0.05.")
-@click.option("--scale", type=float, help="Motion scale of teleoperation; default 1, teleoperation 2, of machines 4.")
-@click.option("--force-scale", type=float, help="Machines: force of the machine over force at the hand; default 1000.")
+@click.option("--seed", default=0, show_default=True, type=SEED, help="Everything random follows from it.")
 @click.option(
-    "--hand-stiffness", type=float, help="Machines: how stiffly the hand holds the master [N/m]; default 1200."
+    "--noise", type=NOT_NEGATIVE, help="Standard deviation of the person's aim [degrees]; default 8, machines 6."
 )
-@click.option("--stiffness", type=float, help="Machines: stiffness while they are taught [N/m]; default 1e5.")
-@click.option("--damping", type=float, help="Machines: damping while they are taught [N s/m]; default 1e5.")
+@click.option("--delay", type=NOT_NEGATIVE, help="One-way delay [s]; default 0, teleoperation 0.1, of machines 0.05.")
+@click.option(
+    "--scale", type=POSITIVE, help="Motion scale of teleoperation; default 1, teleoperation 2, of machines 4."
+)
+@click.option(
+    "--force-scale", type=POSITIVE, help="Machines: force of the machine over force at the hand; default 1000."
+)
+@click.option(
+    "--hand-stiffness", type=POSITIVE, help="Machines: how stiffly the hand holds the master [N/m]; default 1200."
+)
+@click.option("--stiffness", type=NOT_NEGATIVE, help="Machines: stiffness while they are taught [N/m]; default 1e5.")
+@click.option("--damping", type=NOT_NEGATIVE, help="Machines: damping while they are taught [N s/m]; default 1e5.")
 @click.option(
     "--feed-velocity", is_flag=True, help="Machines: feed the master's velocity as well (mind the loop gain)."
 )
-@click.option("--packet-rate", type=float, help="Machines: packets a second, held between them; default 100.")
+@click.option("--packet-rate", type=POSITIVE, help="Machines: packets a second, held between them; default 100.")
 @click.option("--angle", type=float, help="Machines: push at this angle in their plane, -90 straight down [degrees].")
 @click.option("--belief", metavar="X,Y,TURN", help="Blind: deviation of goal minus start [mm, mm, degrees].")
 @click.option("--centre", metavar="X,Y,TURN", help="Blind: mean of goal minus start [mm, mm, degrees]; default 0,0,0.")
-@click.option("--rate", type=float, help="Sample rate [Hz]; default 500, machines 100.")
+@click.option("--rate", type=POSITIVE, help="Sample rate [Hz]; default 500, machines 100.")
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="world.*, start.*, fixture.* ...")
 @click.option("--json", "as_json", is_flag=True, help="What was recorded as JSON on stdout.")
 def command(
@@ -69,8 +77,10 @@ def command(
         --angle -40 --count 2 --out push.npz
     """
     from skillframe.config import parse_setting
+    from skillframe.demonstration.files import check_writable
     from skillframe.prepare import load_robot_model, load_world, split_settings
 
+    check_writable(out)
     params, draws = split_settings(world, dict(parse_setting(text) for text in settings))
     machine, scene = load_robot_model(robot), load_world(world, params)
     common: dict[str, Any] = {"count": count, "seed": seed, "draws": draws, "progress": _progress}

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from skillframe.cli.numbers import SEED
+
 if TYPE_CHECKING:
     from skillframe.reproduce.runner import Outcome
 
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
               help="Folder for rows, reproduce.json, reproduce.html and reproduce.md.")  # fmt: skip
 @click.option("--quick", is_flag=True, help="Fewer trials: all rows in less than three minutes on two cores.")
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a row's setting.")
-@click.option("--seed", default=0, show_default=True, help="Seed of everything random.")
+@click.option("--seed", default=0, show_default=True, type=SEED, help="Seed of everything random.")
 @click.option("--workers", type=click.IntRange(min=1), help="Rows at a time [number of cores].")
 @click.option("--fresh", is_flag=True, help="Compute rows again that OUT holds already.")
 @click.option("--list", "only_list", is_flag=True, help="List rows and their settings, compute nothing.")

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from skillframe.cli.numbers import POSITIVE, SEED
 
 if TYPE_CHECKING:
     from skillframe.trace import Trace
@@ -23,9 +26,9 @@ QUIET_S = 5.0  # a run that is over by then needs no progress
 @click.option("--out", type=click.Path(path_type=Path), help="Trace file (.npz).")
 @click.option("--replay", type=click.Path(path_type=Path), help="Page with a 3-D replay and plots of the run (.html).")
 @click.option("--video", type=click.Path(path_type=Path), help="Film of the run (.mp4).")
-@click.option("--seed", default=0, show_default=True, help="Seed of the sensor noise.")
-@click.option("--duration", default=20.0, show_default=True, help="Longest run in simulated seconds.")
-@click.option("--rate", default=100.0, show_default=True, help="Rate of the trace [Hz].")
+@click.option("--seed", default=0, show_default=True, type=SEED, help="Seed of the sensor noise.")
+@click.option("--duration", default=20.0, show_default=True, type=POSITIVE, help="Longest run in simulated seconds.")
+@click.option("--rate", default=100.0, show_default=True, type=POSITIVE, help="Rate of the trace [Hz].")
 @click.option("--json", "as_json", is_flag=True, help="The outcome as JSON on stdout.")
 def command(
     skill: str, world: str, robot: str, coc: str | None, settings: tuple[str, ...], out: Path | None,
@@ -95,9 +98,14 @@ def _write_video(trace: Trace, path: Path) -> None:
         write_film(trace, path, show)
 
 
+def _known(value: Any) -> Any:
+    """Of a run that diverged, what is not a number is not known; JSON has no word for it but null."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) -> None:
     keys = ["success", "failure", "reason", "duration_s", "peak_force_n", "final_error_m", "final_error_rad"]
-    outcome = {key: meta[key] for key in keys}
+    outcome = {key: _known(meta[key]) for key in keys}
     for text in meta.get("notes") or []:
         click.echo(f"note: {text}", err=True)
     if as_json:
@@ -105,11 +113,13 @@ def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) ->
         click.echo(json.dumps({**outcome, **named}, sort_keys=True))
         return
     click.echo("success" if meta["success"] else f"failure: {meta['failure']}")
-    click.echo(
-        f"  ended after {meta['duration_s']:.2f} s ({meta['reason']}); largest contact force "
-        f"{meta['peak_force_n']:.1f} N; {meta['final_error_m'] * 1000:.2f} mm and "
-        f"{meta['final_error_rad'] * 57.29578:.2f} degrees from the goal"
-    )
+    ended = f"  ended after {meta['duration_s']:.2f} s ({meta['reason']})"
+    if None not in outcome.values():
+        ended += (
+            f"; largest contact force {meta['peak_force_n']:.1f} N; {meta['final_error_m'] * 1000:.2f} mm and "
+            f"{meta['final_error_rad'] * 57.29578:.2f} degrees from the goal"
+        )
+    click.echo(ended)
     for what, path in files.items():
         if path is not None:
             click.echo(f"  {what}: {path}")

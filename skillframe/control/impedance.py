@@ -73,21 +73,31 @@ def critical_damping(
     return damping
 
 
+def _eigen(matrix: Float) -> tuple[Float, Float]:
+    """Eigenvalues (..., n) and vectors (..., n, n); NaN for a matrix that is not finite, as of a trial that diverged.
+
+    LAPACK would refuse such a matrix, and with it every other of the batch.
+    """
+    sound = np.isfinite(matrix).all(axis=(-1, -2), keepdims=True)
+    value, vector = np.linalg.eigh(np.where(sound, matrix, np.eye(matrix.shape[-1])))
+    return np.where(sound[..., 0], value, np.nan), np.where(sound, vector, np.nan)
+
+
 def _square_roots(matrix: Float) -> tuple[Float, Float]:
-    value, vector = np.linalg.eigh(matrix)
+    value, vector = _eigen(matrix)
     root = np.sqrt(np.maximum(value, 1e-12))
     turned = np.swapaxes(vector, -1, -2)
     return (vector * root[..., None, :]) @ turned, (vector / root[..., None, :]) @ turned
 
 
 def _matrix_sqrt(matrix: Float) -> Float:
-    value, vector = np.linalg.eigh(0.5 * (matrix + np.swapaxes(matrix, -1, -2)))
+    value, vector = _eigen(0.5 * (matrix + np.swapaxes(matrix, -1, -2)))
     result: Float = (vector * np.sqrt(np.maximum(value, 0.0))[..., None, :]) @ np.swapaxes(vector, -1, -2)
     return result
 
 
 def _raise_to(matrix: Float, least: float) -> Float:
-    value, vector = np.linalg.eigh(0.5 * (matrix + np.swapaxes(matrix, -1, -2)))
+    value, vector = _eigen(0.5 * (matrix + np.swapaxes(matrix, -1, -2)))
     result: Float = (vector * np.maximum(value, least)[..., None, :]) @ np.swapaxes(vector, -1, -2)
     return result
 

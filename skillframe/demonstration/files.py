@@ -38,6 +38,15 @@ def write_demonstration(demonstration: Demonstration, path: Path | str) -> None:
     write(demonstration, path)
 
 
+def check_writable(path: Path | str) -> None:
+    """Refuse a file name that no format writes, before the work that fills the file.
+
+    Raises:
+        InputError: with the endings there are.
+    """
+    _format_of(Path(path), reading=False)
+
+
 def _format_of(path: Path, *, reading: bool, named_columns: bool = False) -> ReaderType:
     """The format of the longest matching ending; any ending is delimited text once its columns are named."""
     from skillframe.registry import registry

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from skillframe.errors import UnknownName
+from skillframe.errors import InputError, UnknownName
 from skillframe.frames import Float, Pose, matrix_from_quaternion
 from skillframe.robot.kinematics import inverse_kinematics
 from skillframe.robot.model import RobotModel
@@ -26,17 +26,34 @@ QUANTITIES = frozenset(
      "robot.payload", *_ACTUATOR, "world.friction"]
 )  # fmt: skip
 """What can differ between the trials of one batch; other `world.*` parameters need a scene of their own."""
+NOT_NEGATIVE = frozenset({"sensor.force_noise", "sensor.torque_noise", "robot.joint_friction", "world.friction"})
+LARGEST = dict.fromkeys(("start", "fixture", "grasp", "sensor", "robot", "world"), 1e6)
+"""Of any quantity in SI units, whatever it is; supply pressures alone are larger."""
 
 
-def check_quantities(draws: Mapping[str, Float]) -> None:
-    """Refuse a quantity that nothing reads.
+def check_quantities(draws: Mapping[str, Float], robot: RobotModel | None = None) -> None:
+    """Refuse a quantity that nothing reads, and values that cannot be.
+
+    Args:
+        draws: values (N,) by quantity.
+        robot: who runs; refuses quantities of actuators that it does not have.
 
     Raises:
         UnknownName: with the nearest name.
+        InputError: a negative friction or noise, no mass, or a value beyond all machines.
     """
-    for key in draws:
+    for key, values in draws.items():
         if key not in QUANTITIES:
             raise UnknownName("quantity", key, QUANTITIES)
+        if robot is not None and key in _ACTUATOR and not robot.spec.actuation:
+            raise InputError(key, f"{robot.spec.name} has no actuators of its own", "leave it out")
+        least, largest = float(np.min(values)), float(np.max(np.abs(values)))
+        if not largest <= LARGEST.get(key.partition(".")[0], np.inf):
+            raise InputError(key, f"cannot be {largest:g}", "give it in SI units, angles in radians")
+        if least < 0.0 and key in NOT_NEGATIVE:
+            raise InputError(key, f"cannot be negative, is {least:g}", "give 0 or more")
+        if least <= 0.0 and key == "robot.mass_scale":
+            raise InputError(key, f"must be positive, is {least:g}", "give 1 for the nominal masses")
 
 
 def nominal_fixture(robot: RobotModel) -> Pose:

@@ -9,8 +9,11 @@ def ratio(fast_hz: float, slow_hz: float, fast: str, slow: str) -> int:
     """How many ticks of the fast clock make one of the slow one.
 
     Raises:
-        SkillframeError: the ratio is not a whole number of at least one.
+        SkillframeError: a rate that is not positive, or a ratio that is not a whole number of at least one.
     """
+    for name, rate in ((fast, fast_hz), (slow, slow_hz)):
+        if not 0.0 < rate < float("inf"):
+            raise SkillframeError(f"{name} at {rate:g} Hz is no rate; give samples per second, above 0")
     value = fast_hz / slow_hz
     count = round(value)
     if count < 1 or abs(value - count) > 1e-9 * value:

@@ -144,9 +144,10 @@ def test_an_unknown_type_is_refused_with_the_nearest_name(tmp_path: Path) -> Non
         skillfile.load(written(tmp_path, {"type": "hodl"}))
 
 
-def test_a_number_too_large_for_a_float_is_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", ["1e999", "1" + "0" * 400])
+def test_a_number_too_large_for_a_float_is_refused(tmp_path: Path, number: str) -> None:
     path = tmp_path / "a.json"
-    path.write_text(json.dumps(document()).replace("0.02", "1e999"))
+    path.write_text(json.dumps(document()).replace("0.02", number))
     with pytest.raises(InputError, match=r"speed: is not a finite number"):
         skillfile.load(path)
 

@@ -33,3 +33,35 @@ def test_a_film_that_could_not_be_written_is_refused_before_the_run(
     assert run(["run", skill, "--world", "free", "--out", str(tmp_path / "run.npz"), "--video", "run.gif"]) == 2
     assert "not a name of a film" in capsys.readouterr().err
     assert not (tmp_path / "run.npz").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--duration", "nan"], "'--duration': nan is not a finite number"),
+        (["--duration", "-1"], "'--duration': -1.0 is not in the range"),
+        (["--rate", "0"], "'--rate': 0.0 is not in the range"),
+        (["--seed", "-1"], "'--seed': -1 is not in the range"),
+        (["--set", "start.tilt_y=1e300"], "start.tilt_y: cannot be 1e+300"),
+        (["--set", "sensor.force_noise=-1"], "sensor.force_noise: cannot be negative"),
+        (["--set", "actuator.delay=1"], "has no actuators of its own"),
+    ],
+)
+def test_numbers_that_make_no_sense_are_refused(
+    skill: str, capsys: pytest.CaptureFixture[str], options: list[str], message: str
+) -> None:
+    assert run(["run", skill, "--world", "free", *options]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_run_that_diverges_exits_1_with_time_cause_and_trace(
+    skill: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    light = ["--world", "valley", "--robot", "panda", "--set", "robot.mass_scale=1e-6"]
+    assert run(["run", skill, *light, "--out", str(tmp_path / "run.npz"), "--json"]) == 1
+    said = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    assert said["failure"].startswith("diverged: ") and said["failure"].endswith(" s)")
+    assert said["final_error_m"] is None
+    assert (tmp_path / "run.npz").exists()
+    assert run(["run", skill, *light]) == 1
+    assert "nan" not in capsys.readouterr().out

@@ -151,6 +151,17 @@ def test_a_motion_in_the_null_space_decays_at_the_stated_rate():
     np.testing.assert_allclose(acceleration, -10.0 * velocity, rtol=1e-5, atol=1e-6)
 
 
+@pytest.mark.parametrize("where", ["stiffness", "inertia"])
+def test_a_row_that_is_no_number_has_no_damping_and_leaves_the_others_theirs(where):
+    rng = np.random.default_rng(1)
+    given = {"stiffness": positive_definite(rng, 6, 3, high=1e3), "inertia": positive_definite(rng, 6, 3)}
+    whole = critical_damping(**given)
+    given[where][1] = np.nan
+    found = critical_damping(**given)
+    assert np.isnan(found[1][:3, :3]).all()
+    np.testing.assert_array_equal(found[[0, 2]], whole[[0, 2]])
+
+
 @pytest.mark.parametrize("count", [1, 5])
 def test_rows_are_worked_out_independently_and_bit_for_bit(count):
     rng = np.random.default_rng(0)

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from skillframe.demonstration.files import read_demonstration, write_demonstration
+from skillframe.demonstration.files import check_writable, read_demonstration, write_demonstration
 from skillframe.demonstration.metafile import toml_text
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
@@ -197,3 +197,9 @@ def test_unit_norms_are_kept_and_others_scaled_with_a_note(rows: list[list[str]]
     demo = read_demonstration(write(off))
     assert np.abs(norm(demo.quaternion) - 1.0).max() < 1e-12
     assert "0.9998" in demo.meta["reading"][0]
+
+
+def test_a_name_that_no_format_writes_is_refused_before_the_work(tmp_path: Path) -> None:
+    check_writable(tmp_path / "a.csv")
+    with pytest.raises(InputError, match=r"no format writes files ending in '\.xyz'"):
+        check_writable(tmp_path / "a.xyz")

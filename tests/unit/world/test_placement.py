@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
 
-from skillframe.errors import SkillframeError, UnknownName
+from skillframe.errors import InputError, SkillframeError, UnknownName
 from skillframe.frames import Pose, rotation_matrix, rotation_vector
+from skillframe.robot.model import load_model
+from skillframe.robot.spec import load_robot
 from skillframe.world.catalogue import world_types
 from skillframe.world.placement import check_quantities, fixture_poses, nominal_fixture, start_poses
 from skillframe.world.rates import ratio
@@ -57,6 +59,22 @@ def test_a_quantity_that_nothing_reads_is_refused_with_the_nearest_one():
     check_quantities({"start.tilt_y": np.zeros(1)})
     with pytest.raises(UnknownName, match=r"start\.tilt_y"):
         check_quantities({"start.tilty": np.zeros(1)})
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("world.friction", -0.1, "cannot be negative, is -0.1"),
+        ("sensor.force_noise", -1.0, "cannot be negative"),
+        ("robot.mass_scale", 0.0, "must be positive, is 0"),
+        ("start.tilt_y", 1e300, "cannot be 1e.300.*radians"),
+        ("fixture.offset_x", np.nan, "cannot be nan"),
+        ("actuator.delay", 0.1, "free_tool has no actuators of its own"),
+    ],
+)
+def test_a_quantity_that_cannot_be_is_refused_whichever_trial_has_it(key, value, message):
+    with pytest.raises(InputError, match=f"{key}: {message}"):
+        check_quantities({key: np.array([1.0, value])}, load_model(load_robot("free_tool")))
 
 
 def test_rates_that_divide_give_their_ratio_and_others_are_refused_in_words():

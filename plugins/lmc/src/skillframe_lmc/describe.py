@@ -56,7 +56,7 @@ def _details(phase: Phase) -> list[str]:
             f"stiffness {np.linalg.eigvalsh(part.stiffness).max():.4g} {k} at most",
         ]
         seen = part.evidence
-        if not seen.get("held") and "work_teacher_j" in seen:
+        if not seen.get("held") and "work_teacher_j" in seen and "work_environment_j" in seen:
             facts.append(f"work of the teacher {seen['work_teacher_j']:.3g} {unit}, of the environment "
                          f"{seen['work_environment_j']:.3g} {unit}")  # fmt: skip
         lines.append(f"{name}: {'; '.join(facts)}")

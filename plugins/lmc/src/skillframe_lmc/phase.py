@@ -12,6 +12,7 @@ from skillframe.config import build, coerce
 from skillframe.errors import InputError
 from skillframe.frames import Float, norm
 from skillframe.records import Document
+from skillframe_lmc.kept import check_evidence
 
 Vector = tuple[float, float, float]
 
@@ -115,7 +116,7 @@ def _part(values: dict[str, Any], where: str) -> Part:
         fully_compliant=_get(values, "fully_compliant", bool, where),
         stiffness=_gain(values, "stiffness", where),
         damping=_gain(values, "damping", where),
-        evidence=_get(values, "evidence", dict[str, Any], where),
+        evidence=check_evidence(_get(values, "evidence", dict[str, Any], where), f"{where}.evidence"),
     )
 
 
