@@ -23,6 +23,7 @@ SETTINGS = {
 }  # fmt: skip
 CALIBRATED = "the budget of 20 s, against the published 85 % and 67 %"
 GOALS, QUICK_GOALS = 60, 10
+GIVEN = 5  # demonstrations
 BUDGETS = (3.0, 7.0, 13.4, 20.0)
 EARLY_S = 7.0
 SHIFT = (0.006, 0.0, 0.0)
@@ -72,15 +73,15 @@ def _task(key: Key, name: str) -> Task:
 
 
 @cache
-def _tried(key: Key, seed: int, count: int, name: str, kind: str, algorithm: str = "sampling", given: int = 5) -> Tried:
+def _tried(key: Key, seed: int, count: int, name: str, kind: str, how: str = "sampling", given: int = GIVEN) -> Tried:
     """A method learned from the first `given` demonstrations, on `count` goals."""
     values, task = dict(key), _task(key, name)
     if name == OFF:
         values["time"] = min(EARLY_S, values["time"])  # planned for what is looked at
     settings: dict[str, Any] = {k: values[k] for k in ("time", "push", "speed", "stiffness")}
     if kind == "search":
-        settings["algorithm"] = algorithm
-    learned = document(kind, task, demonstrations(task, 5, 1 + seed)[:given], **settings)
+        settings["algorithm"] = how
+    learned = document(kind, task, demonstrations(task, GIVEN, 1 + seed)[:given], **settings)
     where = goals(count, task, 100 + seed)
     _, seconds = search(learned, task.scene, where, duration_s=values["time"] + 2.0, seed=5 + seed)
     return Tried(seconds, learned)
@@ -134,7 +135,7 @@ def _reached(job: RowRun, found: float, bar: float) -> bool:
 def _few(job: RowRun) -> RowResult:
     time = float(job.settings["time"])
     counts = (5,) if job.quick else (1, 2, 3, 4, 5)  # that of five is row 13's, too
-    tried = {n: _of(job, "peg", "search", "sampling", n) for n in counts}
+    tried = {n: _of(job, "peg", "search", "sampling", *([] if n == GIVEN else [n])) for n in counts}
     shares = {n: share(each.seconds, time) for n, each in tried.items()}
     enough = [n for n in counts if _reached(job, shares[n], 0.75)]
     return RowResult(
