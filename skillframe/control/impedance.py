@@ -78,9 +78,9 @@ def _eigen(matrix: Float) -> tuple[Float, Float]:
 
     LAPACK would refuse such a matrix, and with it every other of the batch.
     """
-    sound = np.isfinite(matrix).all(axis=(-1, -2), keepdims=True)
-    value, vector = np.linalg.eigh(np.where(sound, matrix, np.eye(matrix.shape[-1])))
-    return np.where(sound[..., 0], value, np.nan), np.where(sound, vector, np.nan)
+    sound = np.asarray(np.isfinite(matrix).all(axis=(-1, -2)))
+    value, vector = np.linalg.eigh(np.where(sound[..., None, None], matrix, np.eye(matrix.shape[-1])))
+    return np.where(sound[..., None], value, np.nan), np.where(sound[..., None, None], vector, np.nan)
 
 
 def _square_roots(matrix: Float) -> tuple[Float, Float]:
