@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from skillframe_segmenter.learning import _one_push, neighbours
+from skillframe_segmenter.merge import _leaning
 
 
 def learned(degrees, **rotation):
@@ -34,3 +35,16 @@ def test_a_phase_without_a_direction_stays_on_its_own():
 
 def test_phases_that_follow_each_other_in_any_demonstration_are_looked_at():
     assert neighbours([{"labels": [0, 1, 0]}, {"labels": [0, 2]}]) == [(0, 1), (0, 2)]
+
+
+def test_what_a_phase_shows_elsewhere_outweighs_one_short_look_and_not_a_long_one():
+    says = np.array([1.0, 1.0, 0.0])[:, None, None]
+    short, long = (_leaning(says, np.array([40.0, 40.0, n]))[2, 0, 0] for n in (4.0, 400.0))
+    assert short > 0.6 and long < 0.01
+
+
+def test_shares_that_agree_and_a_phase_seen_once_stay_as_they_are():
+    alike = np.full((3, 2, 5), 0.4)
+    np.testing.assert_allclose(_leaning(alike, np.array([5.0, 10.0, 20.0])), alike, rtol=1e-12)
+    once = np.linspace(0.0, 1.0, 10).reshape(1, 2, 5)
+    np.testing.assert_array_equal(_leaning(once, np.array([6.0])), once)

@@ -14,9 +14,11 @@ with 5 mm.
 
 The votes of a group of phases are the largest share of windows that one D finds, in the worst phase and demonstration
 (of four windows or more); the smaller of translation and rotation counts. The best pair is joined as long as its votes
-are at least max(0.6, min(0.78, base - 0.05)), base being the worse of the two alone. All constants are ours; the angle
-is the delicate one: at 20 degrees one motion stays in parts when the person's aim wavers, at 30 lowering and sliding
-become one.
+are at least max(0.6, min(0.78, base - 0.05)), base being the worse of the two alone. A person's aim wanders in about
+half a second, so that a shorter interval is one look at it, and one look must not have a veto: the shares of a
+demonstration's windows are drawn to those of the whole phase by as much as 10 windows weigh. All constants are ours;
+the angle is the delicate one: at 20 degrees one motion stays in parts when the person's aim wavers, at 30 lowering and
+sliding become one.
 """
 
 from __future__ import annotations
@@ -31,6 +33,7 @@ from skillframe.frames import Float, norm, unit
 from skillframe_segmenter.emission import Observed
 
 DIRECTIONS, FEWEST, MOST = 600, 4, 150
+WANDERING = 10.0  # windows
 MOVING, ALONG, BESIDE, STILL = 0.5, 0.38, 0.3, 0.5
 BEST_BAR, SLACK = 0.78, 0.05
 HELD = (5e-3, float(np.deg2rad(2.5)))  # m, rad
@@ -68,7 +71,7 @@ def _shares(
     first = np.concatenate([[0], np.cumsum([len(x) for x in labels])])
     result = []
     for k in range(phases):
-        cells = []
+        cells, sizes = [], []
         for each, offset in zip(labels, first[:-1], strict=True):
             mine = offset + np.flatnonzero(each == k)
             if len(mine) < FEWEST:
@@ -77,7 +80,18 @@ def _shares(
             some = mine[np.linspace(0, len(mine) - 1, min(len(mine), MOST)).astype(int)]
             u = seen.motion[some].reshape(-1, 2, 3)
             cells.append([_accepted(u[:, p], seen.free[some, p], angle, bool(held[p])) for p in range(2)])
-        result.append(np.array(cells).reshape(-1, 2, DIRECTIONS + 1))
+            sizes.append(len(mine))
+        result.append(_leaning(np.array(cells).reshape(-1, 2, DIRECTIONS + 1), np.array(sizes, dtype=float)))
+    return result
+
+
+def _leaning(shares: Float, sizes: Float) -> Float:
+    """Shares (cells, 2, D + 1) of a phase, each drawn to their mean by `WANDERING` windows; sizes (cells,)."""
+    if len(sizes) < 2:
+        return shares
+    weight = sizes[:, None, None]
+    mean = (weight * shares).sum(axis=0) / sizes.sum()
+    result: Float = (weight * shares + WANDERING * mean) / (weight + WANDERING)
     return result
 
 
