@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from skillframe.actuation.delay import CommandDelay
 from skillframe.conditioning.momentum import Estimate
+from skillframe.conditioning.valve import ValveIdentification
 from skillframe.control.force_compiled import CompiledEstimator
 from skillframe.control.hydraulic import Demand, HydraulicGains, Measured, Reference, plane_task
 from skillframe.control.hydraulic_compiled import CompiledLaw
@@ -46,6 +47,7 @@ __all__ = ["CALIBRATION_S", "MachineLoop", "simulate_machine"]
 CALIBRATION_S, SETTLE_S, SWING_M = 6.0, 1.0, (0.10, 0.10, 0.05)
 """Swing in the air before a run, two or three reversals of every cylinder, and a moment to come to rest (ours)."""
 IMPEDANCE_RATE, LEAST_DAMPING = 2.0, 5e4  # 1/s and N s/m; D where a skill leaves it open, from teleoperation trials
+VALVE_TICKS = 500
 RESIDUAL_LIMIT, RESIDUAL_ENERGY, RESIDUAL_TICKS = 1e-2, 200.0, 100
 """Relative bond residual that ends a trial, once so many joules were exchanged; looked at every 100 ticks."""
 
@@ -95,6 +97,7 @@ class MachineLoop(Loop):
         known = cylinders(spec.actuation, spec.folder / "robot.toml")
         self.law = CompiledLaw(self.chain, known, HydraulicGains(), self.count, self.dt)
         self.estimator = CompiledEstimator(self.chain, known, self.count, self.dt)
+        self.valves = ValveIdentification(known, self.count, self.dt)
         self.coupled = CoupledPlant(self.plant, self.chain.actuated)
         self.bank = banks(spec, self.count)
         self.master = Master(self.coupled, self.bank, CosimSettings(step=self.dt))
@@ -183,6 +186,7 @@ class MachineLoop(Loop):
             stiff = LEAST_DAMPING * np.broadcast_to(np.eye(2), (self.count, 2, 2))
             zero = np.zeros((self.count, 2))
             self._sense(force_counts=False)
+            self._look_at_valves(tick)
             self._valve(
                 Reference(
                     self.home + position, zero + velocity, 6.0 * stiff, stiff, zero, self.joint + joint,
@@ -195,6 +199,13 @@ class MachineLoop(Loop):
         self.estimator.calibrate(False)
         self._hold()
         self.bill.start()
+
+    def _look_at_valves(self, tick: int) -> None:
+        """Identify them, and let the law go by what is known so far: what it learns of inertias hangs on it."""
+        self.valves.step(self.demand.valve, self._seen, self.terms)
+        if tick >= VALVE_TICKS and tick % VALVE_TICKS == 0:
+            self.valves.solve()
+            self.law.deadband[:], self.law.supply[:] = self.valves.compensated, self.valves.supply
 
     def _hold(self) -> None:
         """Let the law compensate the friction that was found, and hold what it has learned of the inertias."""

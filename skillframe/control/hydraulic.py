@@ -24,6 +24,9 @@ from skillframe.control.vdc import Bodies, bodies, net_forces, parameters, pisto
 from skillframe.control.vdc_actuator import (
     CylinderGains,
     Cylinders,
+    across_deadband,
+    bristle_after,
+    coulomb_shape,
     flow_demand,
     friction_parameters,
     friction_regressor,
@@ -109,6 +112,7 @@ class HydraulicGains:
             Published: 1e5 of both.
         friction_share: bounds, +- of each.
         joint: lambda of the joints that the tool's plane leaves open [1/s].
+        touch: f_0, force on the tool from which on friction goes by the velocity alone [N]; sliding: v_s of that [m/s].
         force_corner: of the filter that gives the required force's rate [Hz]; published.
     """
 
@@ -121,6 +125,8 @@ class HydraulicGains:
     friction_share: float = 0.5
     joint: float = 3.0
     force_corner: float = 8.0
+    touch: float = 1e3
+    sliding: float = 2e-2
 
 
 class Demand(NamedTuple):
@@ -191,6 +197,7 @@ class HydraulicLaw:
     Attributes:
         theta: (N, B, 10) estimated inertial parameters of every moving body.
         friction: (N, 2, k) estimated Coulomb [N] and viscous friction [N s/m]; may be set to what is found otherwise.
+        deadband, supply: (N, k) of the valves, share of their travel, and the pressure before them [Pa]; likewise.
     """
 
     def __init__(self, chain: ClosedChain, cylinders: Cylinders, gains: HydraulicGains, count: int, dt: float) -> None:
@@ -202,6 +209,9 @@ class HydraulicLaw:
         rub = friction_parameters(cylinders)
         self.friction: Float = np.tile(rub, (count, 1, 1))
         self._friction_bounds = relative_bounds(rub, gains.friction_share)
+        self.deadband: Float = np.tile(cylinders.deadband, (count, 1))
+        self.supply: Float = np.tile(cylinders.supply_pressure, (count, 1))
+        self._bristle: Float = np.zeros_like(self.deadband)
         self._gain: Float = gains.body * np.eye(6)
         self._cylinder_gains = CylinderGains(velocity=np.array(gains.velocity), force=np.array(gains.force))
         self._force_rate = RateFilter(gains.force_corner, dt)
@@ -210,6 +220,7 @@ class HydraulicLaw:
     def start(self) -> None:
         """Forget the past; the required force's filter begins at the first required force."""
         self._fresh = True
+        self._bristle[:] = 0.0
 
     def adapt(self, on: bool) -> None:
         """Learn, as at first, or hold what was learned: in contact with stiff things learning rings (our trials)."""
@@ -231,9 +242,10 @@ class HydraulicLaw:
             rate_r[i] = motion.tree_required[self.chain.driven]
             piston[i], speed[i] = state.piston
             self._learn(i, motion)
-        force = required + np.sum(friction_regressor(rate_r) * self.friction, axis=-2)
+        shape = self._slide(rate_r, measured.force, ids)
+        force = required + np.sum(shape * self.friction, axis=-2)
         if self.learning:
-            self._rub(rate_r, rate_r - speed, ids)
+            self._rub(shape, rate_r - speed, ids)
         return self._valves(measured, force, (piston, speed, rate_r))
 
     def _required(self, measured: Measured, reference: Reference, i: int) -> tuple[ChainState, Bodies]:
@@ -260,8 +272,14 @@ class HydraulicLaw:
             drive = np.einsum("bij,bi->bj", motion.regressor, motion.error)
             self.theta[i] = adapt(self.theta[i], drive, self.gains.adaptation, self._bounds, self._dt)
 
-    def _rub(self, rate_r: Float, error: Float, ids: NDArray[np.int64]) -> None:
-        drive = np.array(self.gains.friction)[:, None] * friction_regressor(rate_r) * error[:, None, :]
+    def _slide(self, rate_r: Float, force: Float, ids: NDArray[np.int64]) -> Float:
+        """Y_f (N, 2, k)."""
+        self._bristle[ids] = bristle_after(self.cylinders, self._bristle[ids], rate_r[ids], self._dt)
+        shape = coulomb_shape(self._bristle, rate_r, force, self.gains.sliding, self.gains.touch)
+        return friction_regressor(rate_r, shape)
+
+    def _rub(self, shape: Float, error: Float, ids: NDArray[np.int64]) -> None:
+        drive = np.array(self.gains.friction)[:, None] * shape * error[:, None, :]
         moved = adapt(self.friction, drive, 1.0, self._friction_bounds, self._dt)
         self.friction[ids] = moved[ids]
 
@@ -272,5 +290,6 @@ class HydraulicLaw:
         rate = self._force_rate.step(force)
         pressures = (measured.pressure_a, measured.pressure_b)
         demand = flow_demand(self.cylinders, self._cylinder_gains, motion, (force, rate), pressures)
-        valve = np.clip(inverse_valve(self.cylinders, demand, motion[0], pressures), -1.0, 1.0)
+        opening = inverse_valve(self.cylinders, demand, motion[0], pressures, self.supply)
+        valve = np.clip(across_deadband(self.deadband, opening), -1.0, 1.0)
         return Demand(valve, force, pressure_force(self.cylinders, *pressures))

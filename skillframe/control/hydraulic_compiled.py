@@ -18,7 +18,7 @@ from skillframe.control.vdc_adaptation import relative_bounds
 from skillframe.frames import Float
 from skillframe.robot.loops import ClosedChain
 
-_SHARED = tuple(range(16, 24))  # inputs of the law that are one for all trials: bounds, cylinders, gains, scalars
+_SHARED = tuple(range(18, 26))  # inputs of the law that are one for all trials: bounds, cylinders, gains, scalars
 
 
 class CompiledLaw:
@@ -35,6 +35,7 @@ class CompiledLaw:
     Attributes:
         theta: (N, B, 10) estimated inertial parameters of every moving body.
         friction: (N, 2, k) estimated Coulomb [N] and viscous friction [N s/m]; write into it what is found otherwise.
+        deadband, supply: (N, k) of the valves, share of their travel, and the pressure before them [Pa]; likewise.
         notes: a sentence where there is no compiler.
     """
 
@@ -52,9 +53,12 @@ class CompiledLaw:
         )  # fmt: skip
         self.theta, self._learned = (np.tile(nominal, (count, 1, 1)) for _ in range(2))
         self.friction, self._rubbed = (np.tile(friction_parameters(cylinders), (count, 1, 1)) for _ in range(2))
-        self._memory, self._next = zeros((count, 2, k)), zeros((count, 2, k))
+        self._memory, self._next = zeros((count, 3, k)), zeros((count, 3, k))
+        self.deadband: Float = np.tile(cylinders.deadband, (count, 1))
+        self.supply: Float = np.tile(cylinders.supply_pressure, (count, 1))
         self._scalars = np.array(
-            [gains.body, gains.adaptation, *gains.friction, gains.joint, gains.force_corner, dt, 1.0]
+            [gains.body, gains.adaptation, *gains.friction, gains.joint, gains.force_corner, gains.touch, gains.sliding,
+             dt, 1.0]
         )  # fmt: skip
         self._bind(nominal, count, use_compiler)
 
@@ -70,7 +74,8 @@ class CompiledLaw:
             cylinder_table(self.cylinders), np.array(gains.velocity), np.array(gains.force), self._scalars,
         )  # fmt: skip
         given = [part for part in self._reference if part is not None]
-        inputs = [*self._measured, *given, self.theta, self.friction, self._memory, *knowledge]
+        own = [self.theta, self.friction, self._memory, self.deadband, self.supply]
+        inputs = [*self._measured, *given, *own, *knowledge]
         law, terms = law_function(self.chain, axes), terms_function(self.chain, axes)
         self._steps = [
             Batch(law, inputs, [*out, self._learned, self._rubbed, self._next], _SHARED, use_compiler=use_compiler)

@@ -13,15 +13,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from skillframe.control.vdc_actuator import Cylinders
+from skillframe.control.vdc_actuator import ACROSS, Cylinders
 from skillframe.control.vdc_body import PARAMETERS
 from skillframe.frames import Float
 from skillframe.robot.loops import ClosedChain
 from skillframe.robot.symbolic import BodyMotion, Expression, SymbolicChain, Twist
 
-SLIDING = 5e-3  # m/s, as in `vdc_actuator`
 CYLINDER = tuple(Cylinders.__dataclass_fields__)
-SCALARS = ("body", "adaptation", "coulomb", "viscous", "joint", "corner", "dt", "fresh")
+SCALARS = ("body", "adaptation", "coulomb", "viscous", "joint", "corner", "touch", "sliding", "dt", "fresh")
 
 
 def terms_function(chain: ClosedChain, axes: tuple[int, int]) -> ca.Function:
@@ -45,9 +44,9 @@ def law_function(chain: ClosedChain, axes: tuple[int, int]) -> ca.Function:
     """One sample of the law for one trial.
 
     Inputs: z, zd, pressure_a, pressure_b, force; position, velocity, stiffness, damping, push, joint, joint_rate,
-    acceleration; theta, friction (2, k), filter (2, k), lower and upper bounds of theta and of friction, cylinders
-    (13, k), k_x, k_f, the scalars of `SCALARS`.
-    Outputs: valve, required and present force, theta, friction, filter.
+    acceleration; theta, friction (2, k), memory (3, k), deadband, supply, lower and upper bounds of theta and of
+    friction, cylinders (15, k), k_x, k_f, the scalars of `SCALARS`.
+    Outputs: valve, required and present force, theta, friction, memory: the required force's filter and the bristles.
     """
     s = SymbolicChain(chain)
     n, k, count = len(chain.independent), len(chain.driven), chain.model.njoints - 1
@@ -57,12 +56,12 @@ def law_function(chain: ClosedChain, axes: tuple[int, int]) -> ca.Function:
     gain = dict(zip(SCALARS, ca.vertsplit(scalars), strict=True))
     theta, rows = _rows("theta", count, PARAMETERS)
     rub, friction = _rows("friction", 2, k)
-    memory, filtered = _rows("memory", 2, k)
+    memory, kept = _rows("memory", 3, k)
     bounds = [_rows(name, count, PARAMETERS) for name in ("lower", "upper")]
     rub_bounds = [_rows(f"friction_{name}", 2, k) for name in ("lower", "upper")]
     table, cylinder = _rows("cylinder", len(CYLINDER), k)
-    k_x, k_f = ca.SX.sym("k_x", k), ca.SX.sym("k_f", k)
-    c = {name: cylinder[i, :].T for i, name in enumerate(CYLINDER)}
+    k_x, k_f, deadband, supply = (ca.SX.sym(name, k) for name in ("k_x", "k_f", "deadband", "supply"))
+    c = {name: cylinder[i, :].T for i, name in enumerate(CYLINDER)} | {"supply_pressure": supply, "deadband": deadband}
 
     tip = s.frame(chain.robot.tool_frames[0]).origin[list(axes)]
     rate, acceleration = _required(s, tip, reference, force, gain["joint"])
@@ -72,18 +71,36 @@ def law_function(chain: ClosedChain, axes: tuple[int, int]) -> ca.Function:
     piston = s.q[chain.driven.tolist()]
     arms = ca.jacobian(piston, s.z)
     speed, speed_r = arms @ s.zd, arms @ rate
-    shape = ca.horzcat(ca.tanh(speed_r / SLIDING), speed_r).T
+    coulomb, bristle = _slid(c, kept, speed_r, force, gain)
+    shape = ca.horzcat(coulomb, speed_r).T
     f_pr = ca.solve(arms.T, needed) + ca.sum1(shape * friction).T
-    value, slope = _filtered(f_pr, filtered, gain)
+    value, slope = _filtered(f_pr, kept, gain)
     valve = _valve(c, (p_a, p_b), (piston, speed, speed_r), (f_pr, slope), (k_x, k_f))
     learned = _adapted(rows, gain["adaptation"] * ca.horzcat(*drive).T, [b[1] for b in bounds], gain["dt"])
     speeds = ca.vertcat(gain["coulomb"], gain["viscous"])
     drive_f = ca.repmat(speeds, 1, k) * shape * ca.repmat((speed_r - speed).T, 2, 1)
     rubbed = _adapted(friction, drive_f, [b[1] for b in rub_bounds], gain["dt"])
     limits = (b[0] for b in (*bounds, *rub_bounds))
-    inputs = (s.z, s.zd, p_a, p_b, force, *reference, theta, rub, memory, *limits, table, k_x, k_f, scalars)
+    inputs = (
+        s.z,
+        s.zd,
+        p_a,
+        p_b,
+        force,
+        *reference,
+        theta,
+        rub,
+        memory,
+        deadband,
+        supply,
+        *limits,
+        table,
+        k_x,
+        k_f,
+        scalars,
+    )
     present = c["area_a"] * p_a - c["area_b"] * p_b
-    return _function("law", inputs, (valve, f_pr, present, learned, rubbed, ca.vertcat(value.T, slope.T)))
+    return _function("law", inputs, (valve, f_pr, present, learned, rubbed, ca.vertcat(value.T, slope.T, bristle.T)))
 
 
 def _rows(name: str, rows: int, columns: int) -> tuple[Expression, Expression]:
@@ -181,6 +198,17 @@ def _filtered(force: Expression, memory: Expression, gain: dict[str, Expression]
     return value + gain["dt"] * slope, slope
 
 
+def _slid(
+    c: dict[str, Expression], kept: Expression, speed: Expression, force: Expression, gain: dict[str, Expression]
+) -> tuple[Expression, Expression]:
+    """Shape y and the bristles of `vdc_actuator`."""
+    way, before = ca.sign(speed), ca.if_else(gain["fresh"] > 0, ca.SX(*speed.shape), kept[2, :].T)
+    bristle = way + (before - way) * ca.exp(-ca.fabs(speed) * gain["dt"] / c["presliding_length"])
+    square = ca.sumsqr(force)
+    share = square / (square + gain["touch"] ** 2)
+    return bristle + share * (ca.tanh(speed / gain["sliding"]) - bristle), bristle
+
+
 def _valve(
     c: dict[str, Expression], pressures: tuple[Any, ...], motion: tuple[Any, ...], force: tuple[Any, ...],
     gains: tuple[Any, ...],
@@ -198,7 +226,9 @@ def _valve(
     high, low = c["supply_pressure"], c["return_pressure"]
     extend = root(high - p_a) * a + root(p_b - low) * b
     retract = root(high - p_b) * b + root(p_a - low) * a
-    return ca.fmin(ca.fmax(flow / (c["edge"] * ca.if_else(flow > 0, extend, retract)), -1.0), 1.0)
+    opening = flow / (c["edge"] * ca.if_else(flow > 0, extend, retract))
+    overlap = c["deadband"]
+    return ca.fmin(ca.fmax((1.0 - overlap) * opening + overlap * ca.tanh(opening / ACROSS), -1.0), 1.0)
 
 
 def _adapted(rows: Expression, rate: Expression, bounds: list[Expression], dt: Expression) -> Expression:
@@ -208,5 +238,5 @@ def _adapted(rows: Expression, rate: Expression, bounds: list[Expression], dt: E
 
 
 def cylinder_table(cylinders: Cylinders) -> Float:
-    """(13, k) in the order of `CYLINDER`."""
+    """(15, k) in the order of `CYLINDER`."""
     return np.array([getattr(cylinders, name) for name in CYLINDER], dtype=float)

@@ -1,15 +1,24 @@
 r"""Virtual Decomposition Control, one hydraulic cylinder: from a required piston force to a valve command.
 
-    f_pr = f_cr + Y_f(xd_r) theta_f,    Y_f = (tanh(v / v_s), v),    theta_f' = rho_f Y_f^T (xd_r - xd) within bounds
+    f_pr = f_cr + Y_f theta_f,    Y_f = (y, xd_r),    theta_f' = rho_f Y_f^T (xd_r - xd) within bounds
+    y = z + c (tanh(xd_r / v_s) - z),    z' = (xd_r - |xd_r| z) / z_ss,    c = f^2 / (f^2 + f_0^2)
     u_f = k_x (xd_r - xd) + k_f (f_pr - f_p) + f_pr'/B + A_a xd/(V_a/A_a + x) + A_b xd/(V_b/A_b + s - x)
           + c_l (1/(V_a/A_a + x) + 1/(V_b/A_b + s - x)) (p_a - p_b),    f_p = A_a p_a - A_b p_b
-    u = u_f / (c sqrt(p_S - p_a)/(V_a/A_a + x) + c sqrt(p_b - p_R)/(V_b/A_b + s - x))    for u_f > 0,
-    u = u_f / (c sqrt(p_S - p_b)/(V_b/A_b + s - x) + c sqrt(p_a - p_R)/(V_a/A_a + x))    for u_f < 0,
+    u_e = u_f / (c sqrt(p_S - p_a)/(V_a/A_a + x) + c sqrt(p_b - p_R)/(V_b/A_b + s - x))    for u_f > 0,
+    u_e = u_f / (c sqrt(p_S - p_b)/(V_b/A_b + s - x) + c sqrt(p_a - p_R)/(V_a/A_a + x))    for u_f < 0,
+    u = (1 - b) u_e + b tanh(u_e / w)
 
 J. Koivumaki and J. Mattila's cylinder subsystem as published with the data set of Petrovic and Mattila, Mech. Mach.
 Theory 170 (2022) 104680. With the exact inverse, (f_pr - f_p)'/B = -k_x (xd_r - xd) - k_f (f_pr - f_p), so
 (f_pr - f_p)^2 / (2 B k_x) + (theta_f - theta_f^)^2 / (2 rho_f) is the accompanying function of a cylinder. Pressure
-drops below `laminar_pressure` are raised to it (our choice): the published inverse divides by a root that vanishes.
+drops below `laminar_pressure` are raised to it (our choice): the published inverse divides by a root that vanishes. The
+last line steps over the spool's overlap b; it is ours, and smooth over w = 0.2 % of the travel, because there the noise
+of u_e would throw a spool to and fro (an exact inverse has a step of 2 b).
+
+Friction in air (c = 0) has a bristle's state z, as published (Zhu and Piedboeuf, 2005): a piston that stops keeps the
+friction it had, and turns it round over z_ss. In contact it is a function of the required velocity alone (our choice).
+There xd_r hangs on the measured force f; a bristle answers that a quarter of a period late, and a steep tanh too
+strongly, so that the machine swung by 1 kN where it should have stood. In air a tanh of 5 mm/s did the same by 1 mm.
 """
 
 from __future__ import annotations
@@ -24,7 +33,8 @@ from skillframe.errors import InputError
 from skillframe.frames import Float
 from skillframe.robot.spec import Actuation
 
-_SLIDING = 5e-3  # m/s at which the published friction law has risen to tanh(1)
+_SLIDING = 5e-3  # m/s at which friction without a state has risen to tanh(1)
+ACROSS = 2e-3  # w, share of the valve's travel
 _NAMES = (
     "bore", "rod", "stroke", "dead_volume_a", "dead_volume_b", "bulk_modulus", "rated_flow", "rated_pressure_drop",
     "leakage", "coulomb_friction", "viscous_friction", "supply_pressure", "return_pressure",
@@ -37,7 +47,8 @@ class Cylinders:
 
     Attributes:
         area_a, area_b: piston and rod side [m^2]; edge: conductance of a valve edge [m^3/(s sqrt(Pa))].
-        arm_a, arm_b: dead volume over area [m].
+        arm_a, arm_b: dead volume over area [m]. deadband: nominal overlap b of the spool, share of its travel.
+        presliding_length: z_ss [m].
     """
 
     area_a: Float
@@ -53,6 +64,8 @@ class Cylinders:
     supply_pressure: Float
     return_pressure: Float
     laminar_pressure: Float
+    deadband: Float
+    presliding_length: Float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,6 +98,8 @@ def cylinders(actuation: Sequence[Actuation], where: object = "robot.toml") -> C
         area_a=area_a, area_b=area_b, arm_a=p["dead_volume_a"] / area_a, arm_b=p["dead_volume_b"] / area_b,
         edge=p["rated_flow"] / np.sqrt(per_edge * p["rated_pressure_drop"]),
         laminar_pressure=np.array([row.get("laminar_pressure", 1e5) for row in rows], dtype=float),
+        deadband=np.array([row.get("deadband", 0.0) for row in rows], dtype=float),
+        presliding_length=np.array([row.get("presliding_length", 5e-4) for row in rows], dtype=float),
         **{name: p[name] for name in (*kept, *pressures)},
     )  # fmt: skip
 
@@ -104,9 +119,24 @@ def friction_parameters(c: Cylinders) -> Float:
     return np.stack([c.coulomb_friction, c.viscous_friction])
 
 
-def friction_regressor(velocity: Float) -> Float:
-    """Y_f (..., 2, n) of velocities (..., n): friction is the sum of Y_f theta_f over the second axis from the end."""
-    return np.stack([np.tanh(velocity / _SLIDING), velocity], axis=-2)
+def friction_regressor(velocity: Float, shape: Float | None = None) -> Float:
+    """Y_f (..., 2, n) of velocities (..., n): friction is the sum of Y_f theta_f over the second axis from the end.
+
+    shape: y (..., n); tanh(v / 5 mm/s) where it is not given.
+    """
+    return np.stack([np.tanh(velocity / _SLIDING) if shape is None else shape, velocity], axis=-2)
+
+
+def bristle_after(c: Cylinders, bristle: Float, velocity: Float, dt: float) -> Float:
+    """Bristles z (..., n) after a sample of dt [s] at one velocity, exactly."""
+    way = np.sign(velocity)
+    return np.asarray(way + (bristle - way) * np.exp(-np.abs(velocity) * dt / c.presliding_length))
+
+
+def coulomb_shape(bristle: Float, velocity: Float, force: Float, sliding: float, touch: float) -> Float:
+    """Shape y (..., n) of bristles and velocities (..., n), with the force (..., 2) on the tool, v_s and f_0."""
+    square = np.sum(np.square(force), axis=-1, keepdims=True)
+    return np.asarray(bristle + square / (square + touch**2) * (np.tanh(velocity / sliding) - bristle))
 
 
 def pressure_rates(
@@ -114,13 +144,9 @@ def pressure_rates(
 ) -> tuple[Float, Float]:
     """Rates of both chamber pressures with a valve that follows at once; the model that the law inverts."""
     p_a, p_b = pressures
-    out = command > 0.0
-    q_a = (
-        command * c.edge * np.sqrt(np.where(out, _drop(c, c.supply_pressure - p_a), _drop(c, p_a - c.return_pressure)))
-    )
-    q_b = (
-        command * c.edge * np.sqrt(np.where(out, _drop(c, p_b - c.return_pressure), _drop(c, c.supply_pressure - p_b)))
-    )
+    out, u_e = command > 0.0, opening(c.deadband, command)
+    q_a = u_e * c.edge * np.sqrt(np.where(out, _drop(c, c.supply_pressure - p_a), _drop(c, p_a - c.return_pressure)))
+    q_b = u_e * c.edge * np.sqrt(np.where(out, _drop(c, p_b - c.return_pressure), _drop(c, c.supply_pressure - p_b)))
     leak = c.leakage * (p_a - p_b)
     rate_a = c.bulk_modulus / (c.area_a * (c.arm_a + x)) * (q_a - leak - c.area_a * xd)
     rate_b = c.bulk_modulus / (c.area_b * (c.arm_b + c.stroke - x)) * (leak + c.area_b * xd - q_b)
@@ -147,13 +173,25 @@ def flow_demand(
     return np.asarray(feedback + rate / c.bulk_modulus + (c.area_a * a + c.area_b * b) * xd + leak)
 
 
-def inverse_valve(c: Cylinders, demand: Float, x: Float, pressures: tuple[Float, Float]) -> Float:
-    """Valve command (..., n), not limited, that makes the flow demand."""
-    p_a, p_b = pressures
+def inverse_valve(
+    c: Cylinders, demand: Float, x: Float, pressures: tuple[Float, Float], supply: Float | None = None
+) -> Float:  # fmt: skip
+    """Opening u_e (..., n) of the edges, not limited, that makes the flow demand; supply: p_S, nominal if not given."""
+    (p_a, p_b), high = pressures, c.supply_pressure if supply is None else supply
     a, b = 1.0 / (c.arm_a + x), 1.0 / (c.arm_b + c.stroke - x)
-    extend = np.sqrt(_drop(c, c.supply_pressure - p_a)) * a + np.sqrt(_drop(c, p_b - c.return_pressure)) * b
-    retract = np.sqrt(_drop(c, c.supply_pressure - p_b)) * b + np.sqrt(_drop(c, p_a - c.return_pressure)) * a
+    extend = np.sqrt(_drop(c, high - p_a)) * a + np.sqrt(_drop(c, p_b - c.return_pressure)) * b
+    retract = np.sqrt(_drop(c, high - p_b)) * b + np.sqrt(_drop(c, p_a - c.return_pressure)) * a
     return np.asarray(demand / (c.edge * np.where(demand > 0.0, extend, retract)))
+
+
+def opening(deadband: Float, command: Float) -> Float:
+    """u_e (..., n) that a command opens; the overlap opens nothing."""
+    return np.asarray(np.copysign(np.maximum(np.abs(command) - deadband, 0.0) / (1.0 - deadband), command))
+
+
+def across_deadband(deadband: Float, opening: Float) -> Float:
+    """Command u (..., n) that opens a valve of overlap b as wanted, u_e."""
+    return np.asarray((1.0 - deadband) * opening + deadband * np.tanh(opening / ACROSS))
 
 
 def _drop(c: Cylinders, drop: Float) -> Float:

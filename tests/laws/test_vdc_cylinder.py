@@ -41,6 +41,51 @@ def test_the_inverse_valve_makes_the_piston_forces_rate_what_the_law_asks_for(se
 
 
 @given(SEEDS)
+def test_across_a_deadband_the_edges_open_as_asked_and_never_further(seed):
+    """Exactly beyond ten times the width of the smooth step, tanh(10) = 1 - 4e-9; nearer to zero less is opened."""
+    rng = np.random.default_rng(seed)
+    deadband, asked = rng.uniform(0.0, 0.1, 3), rng.uniform(-1.0, 1.0, 3) * 10.0 ** rng.uniform(-4.0, 0.0, 3)
+    opened = act.opening(deadband, act.across_deadband(deadband, asked))
+    far = np.abs(asked) > 10.0 * act.ACROSS
+    np.testing.assert_allclose(opened[far], asked[far], atol=1e-9)
+    assert np.all(np.abs(opened) <= np.abs(asked) + 1e-15)
+    assert np.all(opened * asked >= 0.0)
+
+
+@given(SEEDS)
+def test_the_inverse_with_its_deadband_makes_the_force_rate_of_a_valve_that_has_it(seed):
+    rng, x, xd, pressures = random_cylinders(seed)
+    worn = dataclasses.replace(CYLINDERS, deadband=rng.uniform(0.0, 0.05, 3))
+    demand = rng.choice([-1.0, 1.0], 3) * rng.uniform(3e-4, 3e-3, 3)
+    plain = act.inverse_valve(worn, demand, x, pressures)
+    fresh = act.pressure_rates(CYLINDERS, pressures, x, xd, plain)
+    rates = act.pressure_rates(worn, pressures, x, xd, act.across_deadband(worn.deadband, plain))
+    clear = np.abs(plain) > 10.0 * act.ACROSS
+    np.testing.assert_allclose(np.array(rates)[:, clear], np.array(fresh)[:, clear], rtol=1e-6)
+
+
+@given(SEEDS)
+def test_a_bristle_turns_over_its_length_whatever_the_speed_and_the_samples(seed):
+    """z = 1 - 2 exp(-s / z_ss) after a way s from -1, the solution of z' = (v - |v| z) / z_ss; at rest it is held."""
+    rng = np.random.default_rng(seed)
+    speed, bristle = rng.uniform(1e-3, 0.1, 3), np.full(3, -1.0)
+    steps = rng.uniform(1e-4, 1e-2, 20)
+    for dt in steps:
+        bristle = act.bristle_after(CYLINDERS, bristle, speed, dt)
+    way = speed * steps.sum()
+    np.testing.assert_allclose(bristle, 1.0 - 2.0 * np.exp(-way / CYLINDERS.presliding_length), atol=1e-12)
+    np.testing.assert_array_equal(act.bristle_after(CYLINDERS, bristle, 0.0 * speed, 1.0), bristle)
+
+
+def test_in_air_friction_is_the_bristles_and_in_contact_the_velocitys():
+    bristle, velocity = np.array([[0.9, -0.9, 0.2]]), np.array([[-0.1, 0.1, 0.0]])
+    in_air = act.coulomb_shape(bristle, velocity, np.zeros((1, 2)), 0.01, 1e3)
+    touching = act.coulomb_shape(bristle, velocity, np.array([[1e6, 0.0]]), 0.01, 1e3)
+    np.testing.assert_array_equal(in_air, bristle)
+    np.testing.assert_allclose(touching, np.tanh(velocity / 0.01), atol=1e-5)  # (f_0 / f)^2 = 1e-6 is left
+
+
+@given(SEEDS)
 def test_friction_takes_power_from_a_velocity_error(seed):
     """(xd_r - xd) (F(xd_r) - F(xd)) >= 0: the law is monotone, so that its difference never feeds the machine."""
     rng = np.random.default_rng(seed)

@@ -53,6 +53,9 @@ def close(found, expected):
 def test_the_generated_law_is_the_readable_law_sample_after_sample(use_compiler):
     rng, count, everyone = np.random.default_rng(3), 3, np.arange(3)
     laws = [HydraulicLaw(*machine(), count, DT), CompiledLaw(*machine(), count, DT, use_compiler=use_compiler)]
+    deadband, supply = 0.02 * rng.random((count, 3)), 190e5 + 20e5 * rng.random((count, 3))
+    for law in laws:
+        law.deadband[:], law.supply[:] = deadband, supply
     for _ in range(4):
         measured, reference = draw(rng, count)
         readable, generated = (law.step(measured, reference, everyone) for law in laws)
