@@ -20,6 +20,7 @@ from skillframe.config import build, read_toml
 from skillframe.errors import InputError
 
 DURATION_S = 20.0
+MOST_TRIALS = 10_000_000  # more are a slip of the keyboard, and would fill the memory before the first one runs
 """Simulated time after which a trial has failed; our choice, several times what an insertion takes."""
 
 
@@ -168,7 +169,7 @@ def _check_numbers(file: _File, path: Path) -> None:
     width, rate = file.stop.interval_width, file.expect.rate
     checks = [
         ("seed", file.seed, file.seed >= 0, "give zero or more"),
-        ("trials", file.trials, file.trials >= 1, "give at least 1"),
+        ("trials", file.trials, 1 <= file.trials <= MOST_TRIALS, f"give 1 to {MOST_TRIALS}"),
         ("duration_s", file.duration_s, 0.0 < file.duration_s < math.inf, "give seconds above zero"),
         ("stop.interval_width", width, width is None or 0.0 < width < 1.0, "give a number between 0 and 1"),
         ("expect.rate", rate, rate is None or 0.0 <= rate <= 1.0, "give a number from 0 to 1"),

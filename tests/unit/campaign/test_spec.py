@@ -89,6 +89,7 @@ def test_what_is_wrong_in_a_campaign_file_is_refused_with_file_and_key(campaign,
 
 TOP = {
     ("trials = {trials}", "trials = 0"): "trials: is 0",
+    ("trials = {trials}", "trials = 99999999999999"): "trials: is 99999999999999; give 1 to 10000000",
     ("trials = {trials}", "trials = 1.5"): "expected int",
     ("trials = {trials}", "trails = 3"): "did you mean 'trials'?",
     ("seed = 7", "seed = -1"): "seed: is -1",
