@@ -2,7 +2,8 @@ r"""The hydraulic cylinder's equations over arrays of cylinders: the readable tw
 
 States \(x_s, \dot x_s, p_a, p_b, p_S, z\): spool, its velocity, gauge pressures of both chambers and of the supply
 line, deflection of the seals. Equation numbers are those of fmus/hydraulic_cylinder/README.md, which names the sources.
-Every quantity is an array (n,) or a float; nothing here knows about steps, files or the standard.
+Every quantity is an array (n,), a float, or a casadi expression (`either`); nothing here knows about steps, files or
+the standard.
 """
 
 from __future__ import annotations
@@ -12,9 +13,10 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from skillframe.actuation.actuator import Float
+from skillframe.actuation.either import absolute, clip, copysign, exp, maximum, minimum, sqrt, stack, where
+
 AMBIENT = 101325.0
 POLYTROPIC = 1.4
 LEAST_ABSOLUTE = 100.0
@@ -56,7 +58,7 @@ def derive(values: dict[str, Any]) -> SimpleNamespace:
 
 def edge_flow(dp: Float, transition: Float) -> Float:
     """Eq. 3: flow of an edge per unit conductance, linear for small drops and a square root for large ones."""
-    result: Float = dp / np.sqrt(np.sqrt(dp * dp + transition * transition))
+    result: Float = dp / sqrt(sqrt(dp * dp + transition * transition))
     return result
 
 
@@ -65,17 +67,17 @@ def bulk_modulus(pressure: Float, p: SimpleNamespace) -> Float:
     oil: Float = p.bulk_modulus + p.bulk_modulus_slope * pressure
     if not p.has_air:
         return oil
-    absolute = np.maximum(pressure + AMBIENT, LEAST_ABSOLUTE)
-    bubbles = p.air_fraction * (AMBIENT / absolute) ** (1 / POLYTROPIC)
+    gas = maximum(pressure + AMBIENT, LEAST_ABSOLUTE)
+    bubbles = p.air_fraction * (AMBIENT / gas) ** (1 / POLYTROPIC)
     pure = 1.0 - p.air_fraction
-    result: Float = (pure + bubbles) / (pure / oil + bubbles / (POLYTROPIC * absolute))
+    result: Float = (pure + bubbles) / (pure / oil + bubbles / (POLYTROPIC * gas))
     return result
 
 
 def opening(spool: Float, deadband: Float) -> Float:
     """Eq. 2: opening of the edges from the spool's position, -1 to 1; the overlap opens nothing."""
-    x = np.minimum(np.maximum(spool, -1.0), 1.0)
-    result: Float = np.copysign(np.maximum(np.abs(x) - deadband, 0.0) / (1.0 - deadband), x)
+    x = clip(spool, -1.0, 1.0)
+    result: Float = copysign(maximum(absolute(x) - deadband, 0.0) / (1.0 - deadband), x)
     return result
 
 
@@ -84,16 +86,16 @@ def _throttled(conductance: Float, room: Float, drop: Float, p: SimpleNamespace)
     if not p.has_cushion:
         return conductance
     with np.errstate(divide="ignore", invalid="ignore"):
-        closing = np.where(p.cushion_length > 0, np.clip(1.0 - room / p.cushion_length, 0.0, 1.0), 0.0)
-    q = np.where(drop > 0.0, conductance * closing / p.cushion, 0.0)
-    result: Float = conductance / np.sqrt(1.0 + q * q)
+        closing = where(p.cushion_length > 0, clip(1.0 - room / p.cushion_length, 0.0, 1.0), 0.0)
+    q = where(drop > 0.0, conductance * closing / p.cushion, 0.0)
+    result: Float = conductance / sqrt(1.0 + q * q)
     return result
 
 
 def valve_flows(p: SimpleNamespace, spool: Float, pa: Float, pb: Float, ps: Float, position: Float) -> Flows:
     """Flows of the four edges: supply to a and b to return when the spool is positive, the other way round if not."""
     u = p.edge * opening(spool, p.deadband)
-    extend, retract = np.maximum(u, 0.0), np.maximum(-u, 0.0)
+    extend, retract = maximum(u, 0.0), maximum(-u, 0.0)
     drop_a, drop_b, tr = pa - p.return_pressure, pb - p.return_pressure, p.laminar_pressure
     into_a, into_b = extend * edge_flow(ps - pa, tr), retract * edge_flow(ps - pb, tr)
     out_a = _throttled(retract, position, drop_a, p) * edge_flow(drop_a, tr)
@@ -103,8 +105,8 @@ def valve_flows(p: SimpleNamespace, spool: Float, pa: Float, pb: Float, ps: Floa
 
 def port_flow(p: SimpleNamespace, pressure: Float) -> Float:
     """Eq. 7: into a chamber, from the anti-cavitation check (positive) or through port relief (negative)."""
-    relief = p.relief_conductance * np.maximum(pressure - p.relief_pressure, 0.0)
-    result: Float = p.check_conductance * np.maximum(p.return_pressure - pressure, 0.0) - relief
+    relief = p.relief_conductance * maximum(pressure - p.relief_pressure, 0.0)
+    result: Float = p.check_conductance * maximum(p.return_pressure - pressure, 0.0) - relief
     return result
 
 
@@ -114,8 +116,8 @@ def sliding_deflection(p: SimpleNamespace, velocity: Float) -> Float:
         length: Float = p.presliding_length + 0.0 * velocity
         return length
     with np.errstate(divide="ignore", invalid="ignore"):
-        excess = np.where(p.coulomb_friction > 0, np.maximum(p.static_friction / p.coulomb_friction - 1.0, 0.0), 0.0)
-    result: Float = p.presliding_length * (1.0 + excess * np.exp(-((velocity / p.stribeck_velocity) ** 2)))
+        excess = where(p.coulomb_friction > 0, maximum(p.static_friction / p.coulomb_friction - 1.0, 0.0), 0.0)
+    result: Float = p.presliding_length * (1.0 + excess * exp(-((velocity / p.stribeck_velocity) ** 2)))
     return result
 
 
@@ -129,8 +131,8 @@ def end_stop_force(p: SimpleNamespace, position: Float, velocity: Float) -> Floa
     """Eq. 9: force of the end stops on the piston [N]; they push and never pull."""
     low, high = -position, position - p.stroke
     k, d = p.endstop_stiffness, p.endstop_damping
-    push = np.where(low > 0, np.maximum(k * low - d * velocity, 0.0), 0.0)
-    result: Float = push - np.where(high > 0, np.maximum(k * high + d * velocity, 0.0), 0.0)
+    push = where(low > 0, maximum(k * low - d * velocity, 0.0), 0.0)
+    result: Float = push - where(high > 0, maximum(k * high + d * velocity, 0.0), 0.0)
     return result
 
 
@@ -151,23 +153,22 @@ def pressure_rates(p: SimpleNamespace, y: Float, motion: Motion) -> Float:
     net_b = flows.b + port_flow(p, pb) + p.area_b * motion.velocity + leak
     volume_a = p.dead_volume_a + p.area_a * motion.position
     volume_b = p.dead_volume_b + p.area_b * (p.stroke - motion.position)
-    result = np.zeros((3, *np.shape(net_a)))
-    result[0] = bulk_modulus(pa, p) / volume_a * net_a
-    result[1] = bulk_modulus(pb, p) / volume_b * net_b
+    rate_a, rate_b = bulk_modulus(pa, p) / volume_a * net_a, bulk_modulus(pb, p) / volume_b * net_b
+    rate_s: Float | float = 0.0
     if p.has_pump:
-        pump = np.minimum(p.pump_slope * (p.supply_pressure - ps), p.pump_flow)
-        sag = np.where(p.pump_flow > 0, pump - flows.supply - motion.other_flow, 0.0)
-        result[2] = p.bulk_modulus / p.supply_volume * sag
+        pump = minimum(p.pump_slope * (p.supply_pressure - ps), p.pump_flow)
+        sag = where(p.pump_flow > 0, pump - flows.supply - motion.other_flow, 0.0)
+        rate_s = p.bulk_modulus / p.supply_volume * sag
+    result: Float = stack([rate_a, rate_b, rate_s])
     return result
 
 
 def rates(p: SimpleNamespace, y: Float, motion: Motion) -> Float:
     """Rates of all states (6, n): eq. 2 for the spool, eq. 4 for the pressures, eq. 8 for the seals."""
-    result = np.empty_like(y)
-    result[0] = y[1]
-    result[1] = p.omega**2 * (motion.demand - y[0]) - 2 * p.spool_damping * p.omega * y[1]
-    result[2:5] = pressure_rates(p, y, motion)
-    result[5] = motion.velocity - np.abs(motion.velocity) * y[5] / sliding_deflection(p, motion.velocity)
+    pull = p.omega**2 * (motion.demand - y[0]) - 2 * p.spool_damping * p.omega * y[1]
+    pressures = pressure_rates(p, y, motion)
+    slip = motion.velocity - absolute(motion.velocity) * y[5] / sliding_deflection(p, motion.velocity)
+    result: Float = stack([y[1], pull, pressures[0], pressures[1], pressures[2], slip])
     return result
 
 

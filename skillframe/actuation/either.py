@@ -1,0 +1,75 @@
+"""Functions that mean the same for numbers and for casadi expressions, so that an equation stands once.
+
+Arrays go to numpy and expressions to casadi; arithmetic, comparison and slices of rows need no help. Whatever is not a
+number stays so in either (casadi's own fmin and fmax would hide it). `where` computes both sides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+__all__ = ["absolute", "ceil", "clip", "copysign", "exp", "expm1", "maximum", "minimum", "sqrt", "stack", "where"]
+
+
+def absolute(x: Any) -> Any:
+    """|x|."""
+    return ca.fabs(x) if isinstance(x, ca.SX) else np.abs(x)
+
+
+def ceil(x: Any) -> Any:
+    """The next whole number."""
+    return ca.ceil(x) if isinstance(x, ca.SX) else np.ceil(x)
+
+
+def sqrt(x: Any) -> Any:
+    """Square root."""
+    return ca.sqrt(x) if isinstance(x, ca.SX) else np.sqrt(x)
+
+
+def exp(x: Any) -> Any:
+    """e^x."""
+    return ca.exp(x) if isinstance(x, ca.SX) else np.exp(x)
+
+
+def expm1(x: Any) -> Any:
+    """e^x - 1, exact for small x."""
+    return ca.expm1(x) if isinstance(x, ca.SX) else np.expm1(x)
+
+
+def copysign(x: Any, sign: Any) -> Any:
+    """Size of x with a sign."""
+    return ca.copysign(x, sign) if isinstance(x, ca.SX) or isinstance(sign, ca.SX) else np.copysign(x, sign)
+
+
+def where(condition: Any, one: Any, other: Any) -> Any:
+    """One where the condition holds, the other where not."""
+    return ca.if_else(condition, one, other) if isinstance(condition, ca.SX) else np.where(condition, one, other)
+
+
+def maximum(x: Any, y: Any) -> Any:
+    """The larger; x where x is not a number."""
+    return ca.if_else(x < y, y, x) if isinstance(x, ca.SX) or isinstance(y, ca.SX) else np.maximum(x, y)
+
+
+def minimum(x: Any, y: Any) -> Any:
+    """The smaller; x where x is not a number."""
+    return ca.if_else(y < x, y, x) if isinstance(x, ca.SX) or isinstance(y, ca.SX) else np.minimum(x, y)
+
+
+def clip(x: Any, low: Any, high: Any) -> Any:
+    """Hold x between two bounds."""
+    return minimum(maximum(x, low), high)
+
+
+def stack(parts: Sequence[Any]) -> Any:
+    """One row for each part; a part that is one number serves all columns."""
+    if any(isinstance(part, ca.SX) for part in parts):
+        return ca.vertcat(*parts)
+    result = np.empty((len(parts), *np.broadcast(*parts).shape))
+    for row, part in zip(result, parts, strict=True):
+        row[...] = part
+    return result
