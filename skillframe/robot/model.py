@@ -76,6 +76,7 @@ def load_model(spec: RobotSpec) -> RobotModel:
     for link in spec.inertia:
         if link not in urdf.links:
             raise UnknownName("link", link, urdf.links, f"named in {spec.name}'s [inertia]")
+    _check_machine(spec, urdf)
     wanted = mimic_joints(urdf) if spec.mimic else ()
     model, fallback = _build(urdf, spec, bool(wanted))
     _free_missing_limits(model)
@@ -90,6 +91,16 @@ def load_model(spec: RobotSpec) -> RobotModel:
         followers=followers,
         mimic_fallback=fallback,
     )
+
+
+def _check_machine(spec: RobotSpec, urdf: Urdf) -> None:
+    """Names in [[loop]] and [[actuation]], so that a slip is found by `robots check` and not by the first run."""
+    for name in (frame for loop in spec.loop for frame in (loop.frame_a, loop.frame_b)):
+        if name not in urdf.links and name not in urdf.joints:
+            raise UnknownName("frame", name, urdf.links, f"named in {spec.name}'s [[loop]]")
+    for actuation in spec.actuation:
+        if actuation.joint not in urdf.joints:
+            raise UnknownName("joint", actuation.joint, urdf.joints, f"named in {spec.name}'s [[actuation]]")
 
 
 def mimic_joints(urdf: Urdf) -> tuple[str, ...]:

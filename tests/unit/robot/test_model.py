@@ -60,6 +60,8 @@ def test_joints_without_a_home_stand_at_neutral_or_at_the_nearest_limit(save, ur
         ("[[arm]]\nname = 'arm'\ntool_frame = 'j'", "unknown tool_frame 'j'"),
         ("[[arm]]\nname = 'arm'\ntool_frame = 'bb'", "did you mean 'b'"),
         ("[inertia]\nc = { mass = 1, inertia = [1, 1, 1, 0, 0, 0] }", "unknown link 'c'"),
+        ("[[loop]]\nframe_a = 'a'\nframe_b = 'bb'", "unknown frame 'bb'; did you mean 'b'.*\\[\\[loop"),
+        ("[[actuation]]\njoint = 'jj'\nfmu = 'x'", "unknown joint 'jj'; did you mean 'j'.*\\[\\[actuation"),
     ],
 )
 def test_a_robot_toml_that_does_not_fit_its_urdf_is_refused(save, urdf, toml, sentence):
