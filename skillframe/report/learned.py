@@ -47,7 +47,7 @@ def skill_block(name: str, document: Mapping[str, Any]) -> Markup:
     return tag(
         "article", tag("h3", name, " ", tag("span", f"type {document.get('type', 'unknown')}", class_="badge")),
         note(trouble) if trouble else "", words, _origin(document), note(more_trouble) if more_trouble else "",
-        tag("div", *pictures, class_="grid") if pictures else "", folded, class_="skill",
+        tag("div", *pictures, class_="grid stacked") if pictures else "", folded, class_="skill",
     )  # fmt: skip
 
 

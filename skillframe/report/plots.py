@@ -50,10 +50,9 @@ def time_plot(
     names = [(c.name, c.stroke) for c in curves if c.name]
     content = [
         axes.frame(),
-        _event_marks(axes, events),
         *(axes.line(*envelope(time, c.values), c.stroke) for c in curves),
     ]
-    content += [legend(axes, names), _limit_line(axes, limit, unit), _cursor(axes)]
+    content += [legend(axes, names), _limit_line(axes, limit, unit), _event_marks(axes, events), _cursor(axes)]
     svg = picture(axes, title, *content, class_="time", data_width=axes.width, data_left=LEFT, data_right=axes.right,
                   data_start=float(axes.x[0]), data_stop=float(axes.x[1]))  # fmt: skip
     return figure(title, caption, svg, class_="plot")
@@ -120,7 +119,8 @@ def _read_off(trace: Trace) -> list[tuple[float, str]]:
     touching = np.flatnonzero(np.nan_to_num(norm(trace.wrench_true[:, :3])) > CONTACT_N)
     events = [(float(time[touching[0]]), "first contact")] if len(touching) else []
     if force.max() > CONTACT_N:
-        events.append((float(time[np.argmax(force)]), f"highest force of these samples, {force.max():.0f} N"))
+        how = "estimated" if trace.machine else "measured"
+        events.append((float(time[np.argmax(force)]), f"highest {how} force, {force.max():.0f} N"))
     reason = str(trace.meta.get("reason") or trace.meta.get("failure") or "")
     return [*events, (float(time[-1]), f"the end: {reason}" if reason else "the end")]
 

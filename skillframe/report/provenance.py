@@ -16,7 +16,11 @@ SHOWN_ELSEWHERE = ("skills", "comparisons", "format")
 def provenance_section(chapter: Chapter) -> Markup:
     """Facts, files, commands."""
     facts = _facts(chapter)
-    parts = [tag("h3", "Repeat it"), tag("pre", "\n".join(commands(chapter)))]
+    parts = [
+        tag("h3", "Repeat it"),
+        tag("pre", "\n".join(commands(chapter))),
+        tag("p", _place(chapter), class_="caption"),
+    ]
     if facts:
         parts += [tag("h3", "What it depends on"), table(("", "value"), facts, numeric=9)]
     if chapter.hashes:
@@ -50,6 +54,13 @@ def _trace_facts(meta: Mapping[str, Any]) -> dict[str, Any]:
 
 def _label(key: str) -> str:
     return {"wall_s": "wall time [s]"}.get(key, key.replace("_", " "))
+
+
+def _place(chapter: Chapter) -> str:
+    """Where the commands are typed: the page knows names of files and not where they lie, so that it can be moved."""
+    if chapter.folder:
+        return f"Typed in the folder that holds {chapter.folder}."
+    return "Typed in the folder that holds the traces."
 
 
 def commands(chapter: Chapter) -> list[str]:

@@ -67,7 +67,7 @@ def _title(run: Run) -> str:
 
 def _story(meta: Mapping[str, Any]) -> str:
     where = " in ".join(str(meta[k]) for k in ("robot", "world") if meta.get(k))
-    facts = [where, str(meta.get("reason") or meta.get("failure") or "")]
+    facts = [where, str((not meta.get("success") and meta.get("failure")) or meta.get("reason") or "")]
     for key, what, unit, factor in (
         ("duration_s", "took", "s", 1.0),
         ("peak_force_n", "peak force", "N", 1.0),

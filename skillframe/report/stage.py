@@ -12,13 +12,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from skillframe.frames import Float, matrix_from_quaternion, norm, rotate
+from skillframe.frames import Float, matrix_from_quaternion, norm, rotate, unit
 from skillframe.report.shapes import Mesh, merge, mesh_of, section
 from skillframe.trace import Trace
 
 CUT_NORMAL = np.array([0.0, -1.0, 0.0])
 STILL_MM, STILL_QUATERNION = 1e-6, 1e-6
 AZIMUTH, ELEVATION, FIELD_OF_VIEW = np.radians(-62.0), np.radians(24.0), np.radians(32.0)
+ASPECT, MARGIN = 4.0 / 3.0, 1.12
+"""Width over height of the picture, and how much larger than the scene it is."""
 CLOSE = 0.13
 """How far from the tip [m] things belong to the close view."""
 
@@ -114,12 +116,7 @@ class Stage:
     @cached_property
     def far(self) -> Camera:
         """The whole scene."""
-        seen = self._everything()
-        low, high = seen.min(axis=0), seen.max(axis=0)
-        radius = float(np.clip(0.5 * norm(high - low), 0.05, 8.0))
-        return Camera(
-            0.5 * (low + high), 1.05 * radius / np.sin(0.5 * FIELD_OF_VIEW), elevation=float(np.radians(18.0))
-        )
+        return fitted(self._everything(), Camera(np.zeros(3), 1.0, elevation=float(np.radians(18.0))))
 
     @cached_property
     def cut(self) -> tuple[Mesh | None, ...]:
@@ -136,6 +133,19 @@ class Stage:
         back = np.swapaxes(matrix_from_quaternion(self.quaternion[0, body]), -1, -2)
         point = rotate(back, self.tip[-1] - self.position[0, body])
         return merge([section(mesh, point, rotate(back, CUT_NORMAL)) for mesh in self.whole[body]])
+
+
+def fitted(points: Float, view: Camera) -> Camera:
+    """The camera at a view's angles that has all points (N, 3) [m] in a picture of `ASPECT`, with a margin."""
+    back = view.backward
+    right = unit(np.cross([0.0, 0.0, 1.0], back))
+    axes = np.stack([right, np.cross(back, right), back])
+    seen = points @ axes.T
+    middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
+    slope = np.tan(0.5 * view.field_of_view) * np.array([ASPECT, 1.0])
+    x, y, depth = (seen - middle).T
+    reach = float(np.max(depth + MARGIN * np.maximum(np.abs(x) / slope[0], np.abs(y) / slope[1])))
+    return view._replace(target=middle @ axes, distance=float(np.clip(reach, 0.2, 40.0)))
 
 
 def stage_of(trace: Trace) -> Stage | None:

@@ -6,7 +6,7 @@ import numpy as np
 import report_fakes
 
 from skillframe.report.machine import machine_plots
-from skillframe.report.plots import run_plots
+from skillframe.report.plots import events_of, run_plots
 
 NAMES = ["lift_piston", "tilt_piston"]
 
@@ -41,6 +41,13 @@ def test_what_the_supply_gave_is_drawn_only_where_it_is_known():
     assert ">from the supply<" in known
     assert ">from the supply<" not in unknown
     assert ">by the pistons<" in unknown
+
+
+def test_the_highest_force_is_called_an_estimate_where_no_sensor_measures_it():
+    traces = [replace(t, meta={**t.meta, "events": []}) for t in (report_fakes.trace(), machine_trace())]
+    measured, estimated = (" ".join(what for _, what in events_of(trace)) for trace in traces)
+    assert "highest measured force" in measured
+    assert "highest estimated force" in estimated
 
 
 def test_a_machines_run_shows_no_torque_that_nobody_measures():

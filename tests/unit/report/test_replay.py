@@ -5,7 +5,7 @@ from report_fakes import PLACE, trace
 
 from skillframe.frames import matrix_from_quaternion, norm, quaternion_from_matrix, rotation_matrix
 from skillframe.report.replay import MOST_FRAMES, continuous, frame_times, run_data, scene_data, scene_key
-from skillframe.report.stage import stage_of
+from skillframe.report.stage import Camera, fitted, stage_of
 
 
 def floats(text):
@@ -52,6 +52,18 @@ def test_the_close_view_looks_at_the_tip_from_near():
     stage = stage_of(trace())
     assert norm(stage.close.target - stage.tip[-1]) < 0.1
     assert stage.close.distance < 0.5 * stage.far.distance
+
+
+def test_the_view_of_the_whole_scene_holds_all_of_it_and_wastes_little():
+    points = np.random.default_rng(0).normal(size=(200, 3)) * [3.0, 0.4, 1.0] + [5.0, -2.0, 1.0]
+    camera = fitted(points, Camera(np.zeros(3), 1.0))
+    right = np.cross([0.0, 0.0, 1.0], camera.backward)
+    right /= norm(right)
+    seen = (points - camera.eye) @ np.stack([right, np.cross(camera.backward, right), -camera.backward]).T
+    share = np.abs(seen[:, :2]) / seen[:, 2:] / (np.tan(0.5 * camera.field_of_view) * np.array([4 / 3, 1.0]))
+    assert share.max() <= 1.0
+    # The nearest point to an edge lies at 1 / 1.12 of the half picture at its own depth, so a little further in.
+    assert share.max() > 0.75
 
 
 def test_a_trace_without_bodies_has_no_stage():

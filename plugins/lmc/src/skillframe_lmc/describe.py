@@ -99,5 +99,6 @@ def _stops(phase: Phase) -> str:
 
 def _frame(frame: dict[str, Any]) -> str:
     axes = "base axes" if frame["axes"] == "base" else "axes of the tool's attitude at the start of the phase"
-    points = [f"{what} {frame[key]}" for what, key in (("learned at", "learned_at"), ("hand at", "work_at"))]
-    return f"{axes}; {', '.join(points)}, centre of compliance {frame['center_of_compliance']} (m, tool frame)"
+    named = (("learned at", "learned_at"), ("hand at", "work_at"), ("centre of compliance", "center_of_compliance"))
+    points = [f"{what} ({', '.join(f'{x:g}' for x in frame[key])})" for what, key in named]
+    return f"{axes}; {', '.join(points)} (m, tool frame)"

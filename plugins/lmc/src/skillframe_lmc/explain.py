@@ -54,11 +54,12 @@ def _held(part: Part) -> bool:
 def _directions(name: str, part: Part, axes: str) -> Illustration:
     drawing = _svg(lambda: pictures.directions(name, part, axes))
     angle = degrees(part.evidence["pyramid_angle_rad"])
+    opening = f"{angle:.0f} degrees" if angle < 90.0 else "more than 90 degrees"
     what, load = ("push", "force") if name == "translation" else ("turning push", "torque")
     if part.desired_direction is None:
         end = (
-            f"The pyramids would have to open to {angle:.0f} degrees before one direction explained everything, so no "
-            f"desired direction exists."
+            f"The pyramids would have to open to {opening} before one direction explained everything, so no desired "
+            "direction exists."
         )
     else:
         end = (

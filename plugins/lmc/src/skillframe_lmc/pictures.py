@@ -112,7 +112,7 @@ def _legend(canvas: Axes, count: int, part: Part) -> None:
 
 def axes(name: str, part: Part, frame: str) -> Figure:
     """Mean directions, principal axes and the criterion (Fig. 14)."""
-    figure = Figure(figsize=(8.6, 4.2), layout="constrained")
+    figure = Figure(figsize=(6.4, 3.6), layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=(1.25, 1.0))
     _means(left, part, frame)
     criterion = part.evidence["criterion"]
@@ -152,7 +152,8 @@ def _means(canvas: Axes, part: Part, frame: str) -> None:
     canvas.set_xticks((-1.0, -0.5, 0.0, 0.5, 1.0))
     canvas.set_xlabel(f"along {_triple(first)} ({frame})")
     canvas.set_ylabel(f"along {_triple(second)}")
-    canvas.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False, fontsize=9)
+    canvas.legend(loc="lower center", bbox_to_anchor=(0.45, 1.0), ncols=2, frameon=False, fontsize=8.5,
+                  columnspacing=1.0, handlelength=1.4)  # fmt: skip
 
 
 def _triple(axis: Float) -> str:
