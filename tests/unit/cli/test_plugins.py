@@ -84,7 +84,9 @@ def test_a_plugin_made_by_new_is_found_and_passes_its_checks(made, capsys):
     assert "skill:glide_slowly: passes" in capsys.readouterr().out
 
 
-def test_a_plugin_made_by_new_passes_its_own_tests(made):
+def test_a_plugin_made_by_new_passes_its_own_tests_wherever_it_lies(made):
+    (made.parent / "conftest.py").write_text("raise ImportError('of another project')\n")
+    (made.parent / "pyproject.toml").write_text("[tool.pytest.ini_options]\n")
     code = f"import sys; sys.path[:0] = {[str(made / 'src'), str(made.parent / 'site')]}\nimport pytest\n"
     code += "sys.exit(pytest.main(['-q', '-p', 'no:cacheprovider', 'tests']))"
     done = subprocess.run([sys.executable, "-c", code], cwd=made, capture_output=True, text=True, check=False)
