@@ -16,8 +16,9 @@ _FREE = "it counts as free within +-2 pi rad or +-10 m"
 
 def joint_warnings(robot: RobotModel) -> Iterator[Problem]:
     """Limits that are missing or make no sense, mimic and continuous joints, meshes that are not there."""
+    passive = _passive(robot)
     for joint in robot.urdf.joints.values():
-        yield from _effort(joint, robot.followers)
+        yield from _effort(joint, passive)
         yield from _position(joint)
         if joint.type == "continuous":
             text = f"joint {joint.name!r} is continuous: it has two coordinates in q (cosine, sine) and one in v"
@@ -31,14 +32,20 @@ def joint_warnings(robot: RobotModel) -> Iterator[Problem]:
     if robot.model.nv == 0:
         text = "nothing moves: there is no joint but fixed ones, and the base is fixed"
         yield _warning("no_moving_joints", robot.urdf.root, text, 'write base = "free" in robot.toml for a free body')
-    for key in ("loop", "actuation"):
-        if getattr(robot.spec, key):
-            text = f"[[{key}]] is read but not simulated yet"
-            yield _warning("not_simulated", "robot.toml", text, "the robot can be checked and shown, not run")
+    if robot.spec.loop and not robot.spec.actuation:
+        text = "it has [[loop]] and no [[actuation]]: nothing drives its loops, so it can be checked and shown, not run"
+        yield _warning("not_driven", "robot.toml", text, "say in [[actuation]] which joints of the loops are driven")
 
 
-def _effort(joint: Joint, followers: tuple[str, ...]) -> Iterator[Problem]:
-    if joint.type not in _ACTUATED or joint.name in followers:
+def _passive(robot: RobotModel) -> tuple[str, ...]:
+    """Joints without a motor: followers and, of a machine whose actuators are named, all that carry none."""
+    driven = {actuation.joint for actuation in robot.spec.actuation}
+    rest = [name for name in robot.urdf.joints if driven and name not in driven]
+    return (*robot.followers, *rest)
+
+
+def _effort(joint: Joint, passive: tuple[str, ...]) -> Iterator[Problem]:
+    if joint.type not in _ACTUATED or joint.name in passive:
         return
     if not _limit(joint, "effort") > 0.0:
         text = f"joint {joint.name!r} has no effort limit; its motor counts as unlimited"
