@@ -133,20 +133,24 @@ def matrix_from_quaternion(quaternion: ArrayLike) -> Float:
     return result
 
 
+# where the off-diagonal elements of 4 q q^T are in a flat rotation matrix; its diagonal is computed apart
+_FIRST = np.array([0, 1, 2, 7, 1, 0, 5, 2, 2, 5, 0, 3, 7, 2, 3, 0])
+_SECOND = np.array([0, 3, 6, 5, 3, 0, 7, 6, 6, 7, 0, 1, 5, 6, 1, 0])
+_SIGN = np.array([1.0, 1, 1, -1, 1, 1, 1, -1, 1, 1, 1, -1, -1, -1, -1, 1])
+
+
 def quaternion_from_matrix(rotation: ArrayLike) -> Float:
     """Unit quaternions (..., 4), x, y, z, w with w >= 0, from rotation matrices (..., 3, 3) (Shepperd's method)."""
     r = np.asarray(rotation, dtype=float)
-    trace = r[..., 0, 0] + r[..., 1, 1] + r[..., 2, 2]
-    diagonal = np.stack([r[..., 0, 0], r[..., 1, 1], r[..., 2, 2], trace], axis=-1)
-    outer = np.empty((*r.shape[:-2], 4, 4))  # 4 q q^T, row of the largest element is best conditioned
-    for i in range(3):
-        outer[..., i, i] = 1.0 + 2.0 * r[..., i, i] - trace
-        outer[..., i, 3] = outer[..., 3, i] = r[..., (i + 2) % 3, (i + 1) % 3] - r[..., (i + 1) % 3, (i + 2) % 3]
-        for j in range(i + 1, 3):
-            outer[..., i, j] = outer[..., j, i] = r[..., i, j] + r[..., j, i]
-    outer[..., 3, 3] = 1.0 + trace
-    best = np.argmax(diagonal, axis=-1)[..., None, None]
-    q = unit(np.take_along_axis(outer, best, axis=-2)[..., 0, :])
+    flat = r.reshape(*r.shape[:-2], 9)
+    main = flat[..., ::4]
+    trace = (main[..., 0] + main[..., 1] + main[..., 2])[..., None]
+    outer = flat.take(_FIRST, axis=-1) + _SIGN * flat.take(_SECOND, axis=-1)  # 4 q q^T, row by row
+    outer[..., :15:5] = 1.0 + 2.0 * main - trace
+    outer[..., 15:] = 1.0 + trace
+    best = np.argmax(np.concatenate([main, trace], axis=-1), axis=-1)  # its row is best conditioned
+    rows = outer.reshape(-1, 4, 4)
+    q = unit(rows[np.arange(len(rows)), best.ravel()]).reshape(*r.shape[:-2], 4)
     result: Float = np.where(q[..., 3:] < 0.0, -q, q)
     return result
 

@@ -32,6 +32,7 @@ class LimitGuard:
         self._saturated = np.zeros(count, dtype=np.int64)
         self.energy = np.zeros(count)
         """(N,) work of the controller on the tool so far [J]."""
+        self._centre, self._squares, self._bounds = _glance(limits)
 
     def rate_limited(self, torque: Float) -> Float:
         """Joint torques (N, nv) held to the torque rate of the limits."""
@@ -60,6 +61,9 @@ class LimitGuard:
             rows: indices of the trials that still run.
         """
         self.energy += np.vecdot(command, twist) * self._dt
+        values = np.concatenate([position, twist, wrench, command], axis=-1)
+        if self._surely_fine(values):
+            return []
         force, torque, speed = norm(wrench[:, :3]), norm(wrench[:, 3:]), norm(twist[:, :3])
         limits = self._limits
         fine = self._inside(position) & (speed <= SPEED_CEILING) & (self._saturated < RATE_PERSISTENCE)
@@ -67,11 +71,21 @@ class LimitGuard:
         fine &= (self.energy <= _or_largest(limits.energy_j)) & (norm(command) <= WRENCH_CEILING)
         if fine.all():
             return []
-        values = np.concatenate([position, twist, wrench, command], axis=-1)
         return [
             (int(i), self._cause(int(i), values[i], float(force[i]), float(torque[i]), float(speed[i])))
             for i in rows[~fine[rows]]
         ]
+
+    def _surely_fine(self, values: Float) -> bool:
+        """Are all trials well inside all limits? One look for the many ticks in which nothing happens."""
+        with np.errstate(invalid="ignore", over="ignore"):
+            from_centre = values - self._centre
+            sums = (from_centre * from_centre) @ self._squares
+        if self._limits.energy_j is not None and not (self.energy <= self._limits.energy_j).all():
+            return False
+        if self._torque is not None and self._saturated.any():
+            return False
+        return bool((sums <= self._bounds).all())
 
     def _inside(self, position: Float) -> NDArray[np.bool_]:
         if self._limits.workspace_m is None:
@@ -103,3 +117,21 @@ class LimitGuard:
 def _or_largest(limit: float | None) -> float:
     """A limit, or the largest finite number, so that what is infinite or not a number is above every limit."""
     return sys.float_info.max if limit is None else limit
+
+
+def _glance(limits: Limits) -> tuple[Float, Float, Float]:
+    """For position, twist, wrench, command (21): what to subtract, which squares to sum, and bounds of the sums.
+
+    The bounds are below the limits by more than rounding. What is not finite makes every sum not a number.
+    """
+    low, high = (np.array(corner) for corner in limits.workspace_m or ((-1e100,) * 3, (1e100,) * 3))
+    centre, squares = np.zeros(21), np.zeros((21, 7))
+    centre[:3] = 0.5 * (low + high)
+    half = 0.5 * (high - low)
+    squares[[0, 1, 2], [0, 1, 2]] = 1.0
+    for sum_, values in enumerate((slice(3, 6), slice(9, 12), slice(12, 15), slice(15, 21)), start=3):
+        squares[values, sum_] = 1.0
+    most = (SPEED_CEILING, limits.force_n, limits.torque_n_m, WRENCH_CEILING)
+    bounds = np.array([*half, *(1e100 if limit is None else limit for limit in most)])
+    inside = bounds * (1.0 - 1e-9) - 1e-9 * np.abs(np.append(centre[:3], np.zeros(4)))
+    return centre, squares, np.square(np.maximum(inside, 0.0))

@@ -40,6 +40,7 @@ class CoupledPlant:
         self.count = self.trials * len(self.joints)
         self._qpos = np.array([plant.model.joint(name).qposadr[0] for name in joints])
         self._dofs = np.array([plant.model.joint(name).dofadr[0] for name in joints])
+        self._timestep = float(plant.model.opt.timestep)
         self._spread: Float = np.eye(plant.model.nv)[self._dofs]
         self.active: NDArray[np.int64] = np.arange(self.trials)
         self.load: Float = np.zeros((self.trials, plant.model.nv))
@@ -67,8 +68,8 @@ class CoupledPlant:
         Raises:
             SkillframeError: another step is asked for.
         """
-        if abs(step - self.plant.model.opt.timestep) > 1e-12:
-            own = self.plant.model.opt.timestep
+        if abs(step - self._timestep) > 1e-12:
+            own = self._timestep
             raise SkillframeError(f"the simulated machine steps by {own:g} s and not by {step:g} s; make the two equal")
         self.plant.step(self._torque(0.5 * (begin + end)), self.active)
 

@@ -34,6 +34,7 @@ class Layout:
         self.sprung = model.jnt_dofadr[sprung].astype(np.int64)
         self._set_chain(model)
         self._rows, self._columns = _sparse_indices(model)
+        self._ordered: tuple[Any, list[tuple[int, int, int]]] = (None, [])
 
     def _set_chain(self, model: mujoco.MjModel) -> None:
         ancestors, body = set(), self.sensor
@@ -84,15 +85,21 @@ class Layout:
         result[:, self._columns, self._rows] = sparse
         return result
 
+    def _order(self, model: Any) -> list[tuple[int, int, int]]:
+        """Of every joint its size and its place in Pinocchio's and in MuJoCo's configuration; found once."""
+        if self._ordered[0] is not model:
+            joints = [(model.joints[i], model.names[i]) for i in range(1, model.njoints)]
+            places = [(j.nq, j.idx_q, int(self.model.joint(name).qposadr[0])) for j, name in joints]
+            self._ordered = model, places
+        return self._ordered[1]
+
     def to_mujoco(self, model: Any, configuration: Float) -> Float:
         """Pinocchio's configuration (N, nq) in MuJoCo's order: quaternions w first, continuous joints as angles."""
         qpos = np.zeros((len(configuration), self.model.nq))
-        for index in range(1, model.njoints):
-            joint, start = model.joints[index], model.joints[index].idx_q
-            address = int(self.model.joint(model.names[index]).qposadr[0])
-            if joint.nq == 7:
+        for size, start, address in self._order(model):
+            if size == 7:
                 qpos[:, address : address + 7] = configuration[:, start + np.array([0, 1, 2, 6, 3, 4, 5])]
-            elif joint.nq == 2:
+            elif size == 2:
                 qpos[:, address] = np.arctan2(configuration[:, start + 1], configuration[:, start])
             else:
                 qpos[:, address] = configuration[:, start]
@@ -101,12 +108,10 @@ class Layout:
     def to_pinocchio(self, model: Any, qpos: Float) -> Float:
         """The inverse of `to_mujoco`."""
         configuration = np.zeros((len(qpos), model.nq))
-        for index in range(1, model.njoints):
-            joint, start = model.joints[index], model.joints[index].idx_q
-            address = int(self.model.joint(model.names[index]).qposadr[0])
-            if joint.nq == 7:
+        for size, start, address in self._order(model):
+            if size == 7:
                 configuration[:, start : start + 7] = qpos[:, address + np.array([0, 1, 2, 4, 5, 6, 3])]
-            elif joint.nq == 2:
+            elif size == 2:
                 angle = qpos[:, address]
                 configuration[:, start], configuration[:, start + 1] = np.cos(angle), np.sin(angle)
             else:

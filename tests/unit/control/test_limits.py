@@ -125,3 +125,24 @@ def test_trials_that_have_ended_are_not_reported_again():
 
 def test_no_limit_is_no_limit():
     assert check(guard(), position=(9, 9, 9), wrench=np.full(6, 1e6), command=np.full(6, 1e3), twist=np.ones(6)) == []
+
+
+@pytest.mark.parametrize("box", [None, ((0.5, -1.0, 0.0), (0.6, 1.0, 2.0))])
+def test_the_quick_look_never_passes_what_the_limits_stop(box, monkeypatch):
+    limits = {"force_n": 80.0, "torque_n_m": 5.0, "energy_j": 10.0, "workspace_m": box, "torque_rate_nm_s": 1000.0}
+    rng, shapes, stopped = np.random.default_rng(0), ((1, 3), (1, 6), (1, 6), (1, 6)), 0
+    values = np.array([0.0, 0.0, 0.3, 0.55, 0.6, 4.9, 5.0, 5.1, 20.0, 79.9, 80.0, np.nextafter(80.0, 90.0), 1e6, 2e6])
+    for k in range(2000):
+        quick, full = guard(**limits), guard(**limits)
+        monkeypatch.setattr(full, "_surely_fine", lambda values: False, raising=True)
+        given = [np.zeros(shape) for shape in shapes]
+        if box is not None:
+            given[0] = rng.choice([0.5, 0.55, 0.6, 0.6 + 1e-9], (1, 3))
+        for _ in range(k % 3):
+            part = given[rng.integers(4)]
+            part[0, rng.integers(part.shape[1])] = rng.choice([*values, *-values, np.nan, np.inf])
+        with np.errstate(invalid="ignore"):
+            found = quick.violations(*given, np.arange(1))
+            assert found == full.violations(*given, np.arange(1))
+        stopped += bool(found)
+    assert 200 < stopped < 1900  # both outcomes are looked at
