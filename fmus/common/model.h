@@ -1,7 +1,7 @@
 /* What a model gives to the FMI faces (face2.c, face3.c), and what they give to it.
  *
- * A model is one C file with the functions below, a header own.h with its private memory, and a table of variables,
- * fmu.toml, from which variables.h and modelDescription.xml are generated. Everything a model remembers lies in
+ * A model is one C file with the functions below, a header own.h with its private memory if it has any, and a table of
+ * variables, fmu.toml, from which variables.h and modelDescription.xml are generated. Everything a model remembers lies in
  * `Model`, plain numbers without padding, so that a copy of it is the FMU state and a repeat is exact to the bit.
  */
 #ifndef SKILLFRAME_MODEL_H
@@ -18,7 +18,11 @@ typedef struct {
     double start, nominal;
 } Variable;
 
+#if __has_include("own.h")
 #include "own.h"
+#else
+typedef struct { double nothing; } Own;                    /* a model that remembers nothing */
+#endif
 #include "variables.h"
 
 typedef struct {

@@ -18,12 +18,14 @@ def block(language, word=""):
     return next(b for b in re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL) if word in b)
 
 
-def test_the_fmu_of_the_page_builds_and_checks(tmp_path):
+@pytest.mark.parametrize("remembers", [False, True])
+def test_the_fmu_of_the_page_builds_and_checks(tmp_path, remembers):
     folder = tmp_path / "fmus" / "winch"
     folder.mkdir(parents=True)
     (folder / "fmu.toml").write_text(block("toml", "winch"))
     (folder / "winch.c").write_text(block("c"))
-    (folder / "own.h").write_text(re.search(r"`(typedef struct .*? Own;)`", PAGE).group(1))
+    if remembers:
+        (folder / "own.h").write_text(re.search(r"`(typedef struct .*? Own;)`", PAGE).group(1))
     env = {**os.environ, "SKILLFRAME_PATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache")}
     for command in (["build", "winch"], ["check", "winch"]):
         program = [sys.executable, "-m", "skillframe.cli.main", "fmu", *command]
