@@ -13,7 +13,7 @@ does the same in C (`hydraulic_compiled`) and is tested against it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from skillframe.conditioning.rates import RateFilter
 from skillframe.control.vdc import Bodies, bodies, net_forces, parameters, piston_forces
 from skillframe.control.vdc_actuator import (
+    ContactFriction,
     CylinderGains,
     Cylinders,
     across_deadband,
@@ -112,7 +113,7 @@ class HydraulicGains:
             Published: 1e5 of both.
         friction_share: bounds, +- of each.
         joint: lambda of the joints that the tool's plane leaves open [1/s].
-        touch: f_0, force on the tool from which on friction goes by the velocity alone [N]; sliding: v_s of that [m/s].
+        contact: friction there, see `vdc_actuator`.
         force_corner: of the filter that gives the required force's rate [Hz]; published.
     """
 
@@ -125,8 +126,7 @@ class HydraulicGains:
     friction_share: float = 0.5
     joint: float = 3.0
     force_corner: float = 8.0
-    touch: float = 1e3
-    sliding: float = 2e-2
+    contact: ContactFriction = field(default_factory=ContactFriction)
 
 
 class Demand(NamedTuple):
@@ -273,10 +273,9 @@ class HydraulicLaw:
             self.theta[i] = adapt(self.theta[i], drive, self.gains.adaptation, self._bounds, self._dt)
 
     def _slide(self, rate_r: Float, force: Float, ids: NDArray[np.int64]) -> Float:
-        """Y_f (N, 2, k)."""
+        """Y_f (N, 2, k) at required velocities (N, k)."""
         self._bristle[ids] = bristle_after(self.cylinders, self._bristle[ids], rate_r[ids], self._dt)
-        shape = coulomb_shape(self._bristle, rate_r, force, self.gains.sliding, self.gains.touch)
-        return friction_regressor(rate_r, shape)
+        return friction_regressor(rate_r, coulomb_shape(self._bristle, rate_r, force, self.gains.contact))
 
     def _rub(self, shape: Float, error: Float, ids: NDArray[np.int64]) -> None:
         drive = np.array(self.gains.friction)[:, None] * shape * error[:, None, :]

@@ -56,9 +56,9 @@ class CompiledLaw:
         self._memory, self._next = zeros((count, 3, k)), zeros((count, 3, k))
         self.deadband: Float = np.tile(cylinders.deadband, (count, 1))
         self.supply: Float = np.tile(cylinders.supply_pressure, (count, 1))
+        contact = (gains.contact.force, gains.contact.sliding)
         self._scalars = np.array(
-            [gains.body, gains.adaptation, *gains.friction, gains.joint, gains.force_corner, gains.touch, gains.sliding,
-             dt, 1.0]
+            [gains.body, gains.adaptation, *gains.friction, gains.joint, gains.force_corner, *contact, dt, 1.0]
         )  # fmt: skip
         self._bind(nominal, count, use_compiler)
 

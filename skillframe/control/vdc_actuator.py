@@ -16,8 +16,8 @@ last line steps over the spool's overlap b; it is ours, and smooth over w = 0.2 
 of u_e would throw a spool to and fro (an exact inverse has a step of 2 b).
 
 Friction in air (c = 0) has a bristle's state z, as published (Zhu and Piedboeuf, 2005): a piston that stops keeps the
-friction it had, and turns it round over z_ss. In contact it is a function of the required velocity alone (our choice).
-There xd_r hangs on the measured force f; a bristle answers that a quarter of a period late, and a steep tanh too
+friction it had, and turns it round over z_ss. In contact it is a flat function of the required velocity (our choice):
+there xd_r hangs on the measured force f, which a bristle answers a quarter of a period late and a steep tanh too
 strongly, so that the machine swung by 1 kN where it should have stood. In air a tanh of 5 mm/s did the same by 1 mm.
 """
 
@@ -133,10 +133,19 @@ def bristle_after(c: Cylinders, bristle: Float, velocity: Float, dt: float) -> F
     return np.asarray(way + (bristle - way) * np.exp(-np.abs(velocity) * dt / c.presliding_length))
 
 
-def coulomb_shape(bristle: Float, velocity: Float, force: Float, sliding: float, touch: float) -> Float:
-    """Shape y (..., n) of bristles and velocities (..., n), with the force (..., 2) on the tool, v_s and f_0."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactFriction:
+    """From which force on it is that of contact, f_0 [N], and how flat it then is, v_s [m/s]."""
+
+    force: float = 1e3
+    sliding: float = 1e-2
+
+
+def coulomb_shape(bristle: Float, velocity: Float, force: Float, contact: ContactFriction) -> Float:
+    """Shape y (..., n) of bristles and required velocities (..., n), and the force (..., 2) on the tool."""
     square = np.sum(np.square(force), axis=-1, keepdims=True)
-    return np.asarray(bristle + square / (square + touch**2) * (np.tanh(velocity / sliding) - bristle))
+    share = square / (square + contact.force**2)
+    return np.asarray(bristle + share * (np.tanh(velocity / contact.sliding) - bristle))
 
 
 def pressure_rates(

@@ -77,12 +77,13 @@ def test_a_bristle_turns_over_its_length_whatever_the_speed_and_the_samples(seed
     np.testing.assert_array_equal(act.bristle_after(CYLINDERS, bristle, 0.0 * speed, 1.0), bristle)
 
 
-def test_in_air_friction_is_the_bristles_and_in_contact_the_velocitys():
-    bristle, velocity = np.array([[0.9, -0.9, 0.2]]), np.array([[-0.1, 0.1, 0.0]])
-    in_air = act.coulomb_shape(bristle, velocity, np.zeros((1, 2)), 0.01, 1e3)
-    touching = act.coulomb_shape(bristle, velocity, np.array([[1e6, 0.0]]), 0.01, 1e3)
-    np.testing.assert_array_equal(in_air, bristle)
-    np.testing.assert_allclose(touching, np.tanh(velocity / 0.01), atol=1e-5)  # (f_0 / f)^2 = 1e-6 is left
+def test_friction_is_the_bristles_in_air_and_in_contact_that_of_the_required_velocity():
+    """(f_0 / f)^2 = 1e-6 of the bristle is left there."""
+    bristle, required = np.array([[0.9, -0.9, 0.2]]), np.array([[-0.1, 0.1, 0.0]])
+    far, contact = np.array([[1e6, 0.0]]), act.ContactFriction()
+    np.testing.assert_array_equal(act.coulomb_shape(bristle, required, 0.0 * far, contact), bristle)
+    touching = act.coulomb_shape(bristle, required, far, contact)
+    np.testing.assert_allclose(touching, np.tanh(required / contact.sliding), atol=1e-5)
 
 
 @given(SEEDS)
