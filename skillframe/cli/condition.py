@@ -58,9 +58,9 @@ def command(
     removed = None
     if bias or weight:
         removed = remove_bias(demonstration, _pair("--free-air", free_air), weight)
-        demonstration = removed.demonstration
         if free_air is None:
-            _doubt(removed)
+            _doubt(demonstration, removed)
+        demonstration = removed.demonstration
     if method != "none":
         run = smooth if method == "smoother" else filter_wrench
         demonstration = run(demonstration, _model(demonstration, _pair("--noise", noise), corner))
@@ -73,11 +73,11 @@ def command(
     return 0
 
 
-def _doubt(removed: Removed) -> None:
+def _doubt(demonstration: Demonstration, removed: Removed) -> None:
     """Say on stderr where the free air that was found may be contact."""
     from skillframe.conditioning.offline import doubtful_bias
 
-    if (force := doubtful_bias(removed)) is not None:
+    if (force := doubtful_bias(demonstration, removed)) is not None:
         first, last = removed.stretch
         click.echo(
             f"warning: {force:.2f} N from {first:.2f} to {last:.2f} s were taken for bias; if the recording starts in "

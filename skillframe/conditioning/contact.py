@@ -3,8 +3,10 @@ r"""Where a recording touches and where it does not, with thresholds from its ow
 The force is in contact where it leaves its free-air level by more than \(\max(6 \sigma, 1\,N, 0.1 F_{99})\), \(\sigma\)
 being the typical scatter of the force vector and \(F_{99}\) its 99th percentile (inertia and what is left of the weight
 count in proportion to how hard the task presses), until it falls below half of that; intervals closer than 50 ms are
-one, shorter ones are spikes. The free-air level is the mean of the first 0.25 s, that is, a recording is taken to
-start in free air unless another stretch is named. All of this is our choice.
+one, shorter ones are spikes. Where the noise alone sets the bound, the force is averaged first, over as many samples as
+bring it down to the others, 50 ms at most: else a noisy sensor's contact would count as free air. The free-air level is
+the mean of the first 0.25 s, that is, a recording is taken to start in free air unless another stretch is named. All of
+this is our choice.
 """
 
 from __future__ import annotations
@@ -36,8 +38,36 @@ class Contact(NamedTuple):
 
 def contact_threshold(noise: NoiseFigures, strength: Float) -> float:
     """Force above the free-air level that counts as contact [N], from the noise and all strengths (T,) [N]."""
-    scatter = float(np.sqrt((noise.typical[:3] ** 2).sum()))
-    return max(SIGMAS * scatter, LEAST_FORCE, SHARE * float(np.quantile(strength, 0.99)))
+    return max(SIGMAS * _scatter(noise), _least(strength))
+
+
+def _scatter(noise: NoiseFigures) -> float:
+    return float(np.sqrt((noise.typical[:3] ** 2).sum()))
+
+
+def _least(strength: Float) -> float:
+    return max(LEAST_FORCE, SHARE * float(np.quantile(strength, 0.99)))
+
+
+def contact_strength(time: Float, wrench: Float, noise: NoiseFigures, level: Float) -> tuple[Float, float]:
+    """Force above the free-air level (T,), averaged where noise asks for it, and the bound of contact [N].
+
+    Args:
+        time: (T,) [s].
+        wrench: (T, 6) [N, Nm].
+        noise: of the same recording.
+        level: (6,) free-air level.
+    """
+    force = wrench[:, :3] - level[:3]
+    strength = norm(force)
+    most = max(1, round(HOLD / float(np.median(np.diff(time)))))
+    width = int(np.clip(np.ceil((SIGMAS * _scatter(noise) / _least(strength)) ** 2), 1, min(most, len(time))))
+    if width == 1:
+        return strength, contact_threshold(noise, strength)
+    total = np.concatenate([np.zeros((1, 3)), np.cumsum(force, axis=0)])
+    first = np.clip(np.arange(len(time)) - width // 2, 0, len(time) - width)
+    strength = norm((total[first + width] - total[first]) / width)
+    return strength, max(SIGMAS * _scatter(noise) / np.sqrt(width), _least(strength))
 
 
 def free_air_level(time: Float, wrench: Float, stretch: tuple[float, float] | None = None) -> Float:
@@ -57,8 +87,7 @@ def contact_intervals(time: Float, wrench: Float, noise: NoiseFigures, level: Fl
         noise: of the same recording.
         level: (6,) free-air level.
     """
-    strength = norm(wrench[:, :3] - level[:3])
-    threshold = contact_threshold(noise, strength)
+    strength, threshold = contact_strength(time, wrench, noise, level)
     pieces = _runs(strength > 0.5 * threshold)
     merged: list[tuple[int, int]] = []
     for first, last in pieces:

@@ -100,11 +100,22 @@ def remove_bias(
     return Removed(replace(d, wrench=wrench, meta=meta), payload, stretch)
 
 
-def doubtful_bias(removed: Removed) -> float | None:
-    """The bias force that was removed [N] where it may have been contact: above 0.5 N and five times the scatter."""
-    force, scatter = float(norm(removed.payload.bias[:3])), removed.payload.residual_force
-    known = removed.demonstration.meta.get("contact") is False
-    return None if known or force <= max(LEAST_DOUBT, 5.0 * scatter) else force
+def doubtful_bias(demonstration: Demonstration, removed: Removed) -> float | None:
+    """The bias force that was removed [N] where it may have been contact.
+
+    That is, above 0.5 N, if the free air that was found reaches to the end of the recording or scatters by more than
+    twice the noise.
+
+    Args:
+        demonstration: as recorded.
+        removed: what `remove_bias` made of it without being told the stretch.
+    """
+    d, force = demonstration, float(norm(removed.payload.bias[:3]))
+    if d.meta.get("contact") is False or force <= LEAST_DOUBT:
+        return None
+    noise = float(np.sqrt((noise_figures(d.time, d.wrench).quiet[:3] ** 2).mean()))
+    steady = removed.payload.residual_force <= 2.0 * noise and removed.stretch[1] < d.time[-1]
+    return None if steady else force
 
 
 def payload_of(demonstration: Demonstration, inside: Any) -> Payload:

@@ -16,7 +16,7 @@ from skillframe.conditioning.contact import (
     LEVEL_TIME,
     Contact,
     contact_intervals,
-    contact_threshold,
+    contact_strength,
     free_air_level,
 )
 from skillframe.conditioning.noise import LEAST_SAMPLES, NoiseFigures, noise_figures
@@ -114,7 +114,7 @@ def audit(demonstration: Demonstration) -> Audit:
         bias=level.tolist(), noise=noise.quiet.tolist(), noise_typical=noise.typical.tolist(),
         drift=None if drift is None else drift.tolist(), spikes=len(spike_indices(d.wrench[:, :3])),
         peak_force_n=float(norm(d.wrench[:, :3]).max()),
-        contact_threshold_n=contact_threshold(noise, norm(d.wrench[:, :3] - level[:3])),
+        contact_threshold_n=contact_strength(d.time, d.wrench, noise, level)[1],
         contacts=[list(contact) for contact in contacts], notes=list(d.meta.get(NOTES, [])), warnings=warnings,
         usable=usable,
     )  # fmt: skip

@@ -9,7 +9,8 @@ Two signatures, both our choice:
   contact force that turns with the tool is no contradiction. A weight that is declared to be in the wrench must also
   turn in tool axes (and not in base axes).
 - Work. A passive environment cannot push the tool along. Over the motion in contact, with
-  \(c = \int F \cdot dx / \int |F| |dx|\), the declared frame is refused if its c is above 0.3, the other's below -0.3.
+  \(c = \int F \cdot dx / \int |F| |dx|\), the declared frame is refused if its c is above 0.3, the other's below -0.3,
+  for the wrench as it is and less its mean of the first 0.25 s: it may hold a bias that nobody has removed yet.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ LEAST_TURN = np.deg2rad(20.0)
 LEAST_RESIDUAL, RESIDUAL_RATIO = 0.5, 5.0
 LEAST_PATH, WORK_COSINE, WORK_RATE, WORK_FORCE = 0.02, 0.3, 20.0, 3.0
 LEAST_WEIGHT = 2.0
+LEVEL_TIME = 0.25
 
 
 def refuse_contradiction(columns: Columns, rotation: Float, declared: Mapping[str, Any]) -> None:
@@ -128,13 +130,16 @@ def work_cosine(position: Float, force: Float, time: Float) -> tuple[float, floa
 
 
 def _work_evidence(position: Float, force: Float, rotation: Float, time: Float, frame: str) -> str | None:
-    turned = rotate(rotation, force)
-    in_base, wrong = (force, turned) if frame == "base" else (turned, force)
-    ours, path = work_cosine(position, in_base, time)
-    theirs, _ = work_cosine(position, wrong, time)
-    if path > LEAST_PATH and ours > WORK_COSINE and theirs < -WORK_COSINE:
-        return (
+    evidence = None
+    for level in (force[time <= time[0] + LEVEL_TIME].mean(axis=0), np.zeros(3)):
+        turned = rotate(rotation, force - level)
+        in_base, wrong = (force - level, turned) if frame == "base" else (turned, force - level)
+        ours, path = work_cosine(position, in_base, time)
+        theirs, _ = work_cosine(position, wrong, time)
+        if not (path > LEAST_PATH and ours > WORK_COSINE and theirs < -WORK_COSINE):
+            return None
+        evidence = (
             f"it would push the tool along (work {ours:+.0%} of |F||dx| over {path * 1e3:.0f} mm), "
             f"otherwise oppose it ({theirs:+.0%})"
         )
-    return None
+    return evidence

@@ -53,7 +53,7 @@ class Groove:
         local = [[np.sin(left), 0.0, np.cos(left)], [-np.sin(right), 0.0, np.cos(right)]]
         downhill = [[np.cos(left), 0.0, -np.sin(left)], [-np.cos(right), 0.0, -np.sin(right)]]
         self.normals, self.downhill = np.array(local) @ self.attitude.T, np.array(downhill) @ self.attitude.T
-        self.across, self.down = self.attitude[:, 0], -self.attitude[:, 2]
+        self.down = -self.attitude[:, 2]
         self.rate = float(self.rng.choice(RATES))
         self.noise = self.rng.uniform(0.02, 1.0)
 
@@ -63,6 +63,14 @@ class Groove:
             load = max(0.0, -push @ normal)
             slide = push + load * normal
             if np.linalg.norm(slide) <= self.friction * load or slide @ downhill <= 0.0:
+                return False
+        return True
+
+    def gives_way(self, push, axis):
+        """Whether a tool that is free along one axis follows both walls downhill: w = push + c axis with w.n = 0."""
+        for normal, downhill in zip(self.normals, self.downhill, strict=True):
+            way = push - (push @ normal) / (axis @ normal) * axis
+            if way @ downhill < np.cos(np.deg2rad(45.0)) * np.linalg.norm(way):
                 return False
         return True
 
@@ -105,6 +113,19 @@ class Groove:
         if size <= self.friction * load:
             return np.zeros(3), -force * push
         return speed * slide / size, force * load * (normal - self.friction * slide / size)
+
+
+def unconditioned(recording, noise, rng):
+    """The same as the sensor alone has it: with a bias of some newtons, after a second of rest in free air."""
+    step, turn = float(np.median(np.diff(recording["time"]))), rotation_of(recording["quaternion"])
+    rest = round(1.0 / step)
+    time = recording["time"][0] + step * np.arange(rest + len(recording["time"]))
+    place = np.vstack([np.repeat(recording["position"][:1], rest, axis=0), recording["position"]])
+    loads = {}
+    for name, bias, scatter in (("force", 3.0, noise), ("torque", 0.2, noise / 15.0)):
+        quiet = scatter * rng.normal(size=(rest, 3))
+        loads[name] = np.vstack([quiet, recording[name]]) + turn @ (bias * rng.normal(size=3))
+    return {**recording, "time": time, "position": place, **loads}
 
 
 def any_style(rng):

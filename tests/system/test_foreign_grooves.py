@@ -9,37 +9,46 @@ import numpy as np
 import pytest
 
 from skillframe.cli.main import run
-from tests.oracle.grooves import Groove, any_style, write
+from tests.oracle.grooves import Groove, any_style, unconditioned, write
 
 pytestmark = pytest.mark.needs_plugins
 
 
-def learned(groove: Groove, folder: Path) -> dict:
+def learned(groove: Groove, folder: Path, *, biased: bool) -> dict:
     rng = np.random.default_rng([5, groove.seed])
     style, files = any_style(rng), []
     for i, recording in enumerate(groove.show()):
+        if biased:
+            recording = unconditioned(recording, groove.noise, rng)
+            style["frame"] = "tool"
         path = write(recording, folder, f"demo{i}", style, rng)
         if style["millimetres"] and path.suffix == ".csv":
             assert run(["demonstration", "convert", str(path), "--units", "mm", "--out", str(folder / f"{i}.npz")]) == 0
             path = folder / f"{i}.npz"
+        if biased:
+            assert run(["condition", str(path), "--out", str(folder / f"clean{i}.npz")]) == 0
+            path = folder / f"clean{i}.npz"
         files.append(str(path))
     assert run(["demonstration", "check", *files]) == 0
     assert run(["learn", *files, "--out", str(folder / "skill.json")]) == 0
     return json.loads((folder / "skill.json").read_text())["phases"][0]["translation"]
 
 
-SEEDS = [*range(12), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(12, 72))]
+SEEDS = [*range(10), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(10, 70))]
 
 
+@pytest.mark.parametrize("biased", [False, True])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_groove_of_any_shape_attitude_and_file_is_learned_as_a_push_that_slides_down_both_walls(
-    seed: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    seed: int, biased: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     groove = Groove(seed)
-    found = learned(groove, tmp_path)
+    found = learned(groove, tmp_path, biased=biased)
     assert found["desired_direction"] is not None, found["evidence"]["message"]
-    assert groove.feasible(np.array(found["desired_direction"]))
-    assert len(found["compliant_axes"]) == 1
-    # 25 degrees: two demonstrations of unequal slopes lean the mean motion across the groove
-    assert abs(np.dot(found["compliant_axes"][0], groove.across)) > np.cos(np.deg2rad(25.0))
-    assert "Warning" not in capsys.readouterr().err
+    push, axes = np.array(found["desired_direction"]), np.array(found["compliant_axes"])
+    assert groove.feasible(push)
+    assert len(axes) == 1
+    assert groove.gives_way(push, axes[0])
+    said = capsys.readouterr().err
+    assert "Warning" not in said  # of numpy
+    assert "were taken for bias" not in said

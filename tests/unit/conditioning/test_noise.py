@@ -81,6 +81,16 @@ def test_contact_is_found_between_its_true_ends(seed: int) -> None:
     assert first_free_air(time, wrench, noise) == pytest.approx((0.0, 2.4), abs=0.005)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_a_contact_that_every_sample_drowns_is_found_by_averaging(seed: int) -> None:
+    time, wrench = recording(seed)
+    wrench[:, 2] *= 0.3  # a press of 6 N
+    wrench[:, :3] += np.random.default_rng(seed).normal(size=(len(time), 3))
+    found = contact_intervals(time, wrench, noise_figures(time, wrench), free_air_level(time, wrench))
+    # 25 ms: half of what is averaged over, at most
+    assert [c[:2] for c in found] == [pytest.approx((2.5, 4.5), abs=0.025)]
+
+
 def test_a_spike_is_no_contact_and_two_presses_are_two() -> None:
     time, wrench = recording(0)
     wrench[300, 2] = 277.0

@@ -128,6 +128,18 @@ def test_a_declared_frame_in_which_the_environment_would_push_the_tool_along_is_
         read_demonstration(write(cells_of(demo, wrench)), wrench_frame="tool")
 
 
+def test_a_bias_that_is_still_there_is_no_reason_to_call_the_frame_wrong(write: Write) -> None:
+    rng = np.random.default_rng(6)
+    s = np.linspace(0.0, 1.0, 400)
+    wrench = rng.normal(size=(400, 6)) * 0.05 + [4.0, 0.0, -8.0, 0.0, 0.0, 0.0]  # of the sensor, tool axes
+    wrench[100:, :3] += [9.0, 0.0, -4.0]  # against the motion, seen from the tool
+    demo = Demonstration(
+        time=s * 4.0, position=np.stack([0.02 * s, 0 * s, -0.2 * s], axis=-1),
+        quaternion=np.tile([0.0, 1.0, 0.0, 0.0], (400, 1)), wrench=wrench,
+    )  # fmt: skip
+    assert len(read_demonstration(write(cells_of(demo, wrench)), wrench_frame="tool")) == 400
+
+
 def test_a_contact_force_that_turns_with_the_tool_is_no_contradiction(write: Write) -> None:
     demo, _, _ = turning(0, mass=0.9)
     wiping = np.random.default_rng(2).normal(size=(300, 6)) * 0.05
