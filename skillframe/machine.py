@@ -23,6 +23,7 @@ from skillframe.conditioning.valve import ValveIdentification
 from skillframe.control.force_compiled import CompiledEstimator
 from skillframe.control.hydraulic import Demand, HydraulicGains, Measured, Reference, plane_task
 from skillframe.control.hydraulic_compiled import CompiledLaw
+from skillframe.control.vdc import parameters
 from skillframe.control.vdc_actuator import cylinders, friction_parameters
 from skillframe.control.vdc_adaptation import relative_bounds
 from skillframe.cosim.coupling import coupling_numbers, require_stable
@@ -208,13 +209,23 @@ class MachineLoop(Loop):
             self.law.deadband[:], self.law.supply[:] = self.valves.compensated, self.valves.supply
 
     def _hold(self) -> None:
-        """Let the law compensate the friction that was found, and hold what it has learned of the inertias."""
+        """Let the law compensate the friction and the payload that were found.
+
+        What its adaptation has come to by then is dropped: it makes the swing follow, and goes on wandering with the
+        friction of pistons that stand, by a tenth of the load's mass.
+        """
         found, known = self.estimator.identification, self.law.cylinders
         nominal = friction_parameters(known)
         lower, upper = relative_bounds(nominal, self.law.gains.friction_share)
         errors = np.stack([found.coulomb, found.viscous], axis=1)
         self.law.adapt(False)
         self.law.friction[:] = np.clip(nominal + errors, lower, upper)
+        theta, share = parameters(self.chain.model), self.law.gains.share
+        payload = self.setup.robot.spec.payload
+        assert payload is not None  # else the estimate has refused the robot
+        load = self.chain.model.frames[self.chain.model.getFrameId(payload.link)].parentJoint - 1
+        self.law.theta[:] = theta
+        self.law.theta[:, load] *= 1.0 + np.clip(found.payload / theta[load, 0], -share, share)[:, None]
 
     def _sense(self, force_counts: bool = True) -> None:
         """Sample the sensors, and estimate the force from them; in the air it is known to be zero."""
