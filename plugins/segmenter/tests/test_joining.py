@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from skillframe_segmenter.learning import _one_push, neighbours
+from skillframe_segmenter.learning import _one_push, alternatives, neighbours
 from skillframe_segmenter.merge import _leaning
 
 
@@ -48,3 +48,15 @@ def test_shares_that_agree_and_a_phase_seen_once_stay_as_they_are():
     np.testing.assert_allclose(_leaning(alike, np.array([5.0, 10.0, 20.0])), alike, rtol=1e-12)
     once = np.linspace(0.0, 1.0, 10).reshape(1, 2, 5)
     np.testing.assert_array_equal(_leaning(once, np.array([6.0])), once)
+
+
+def test_a_detour_is_looked_at_where_another_demonstration_does_without_it():
+    there_and_back, twice, without = {"labels": [0, 1, 0, 2]}, {"labels": [0, 1, 0, 1, 2]}, {"labels": [0, 2]}
+    assert alternatives([there_and_back, twice, without]) == [(0, 1)]
+    assert alternatives([there_and_back, twice]) == []
+
+
+def test_a_peg_that_is_aligned_between_approach_and_insertion_makes_no_detour():
+    one_way, other_way = {"labels": [0, 1, 0]}, {"labels": [0, 2, 0]}
+    assert (0, 1) not in alternatives([one_way, one_way])
+    assert alternatives([one_way, other_way]) == [(1, 2)]

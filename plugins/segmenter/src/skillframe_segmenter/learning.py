@@ -2,17 +2,18 @@
 
 Two phases may be one skill shown from two sides: if they never share a demonstration and stand at the same place in
 the sequence (after the same phases, before the same phases), if demonstrations begin with the one and with the other
-(a policy has one beginning), or if one is what another demonstration leaves out on its way from the other. They are
-joined if the learner finds one desired direction for both, which is the definition itself. So are two that follow each
-other, both in contact and with the attitude held, and were learned as pushes less than 35 degrees apart: a box that
-touches a wall on its way into a corner is still pushed the same way. What the tool does in free air is another matter,
-since a push that leans on the friction cone explains both. Our choice; the papers join phases by their model alone.
+(a policy has one beginning), or if one is what another demonstration leaves out on its way from the other, or a detour
+from it, without which a demonstration is like another. They are joined if the learner finds one desired direction for
+both, which is the definition itself. So are two that follow each other, both in contact and with the attitude held, and
+were learned as pushes less than 35 degrees apart: a box that touches a wall on its way into a corner is still pushed
+the same way. What the tool does in free air is another matter, since a push that leans on the friction cone explains
+both. Our choice; the papers join phases by their model alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from itertools import groupby, pairwise
 from math import cos, inf, radians
 from typing import Any
 
@@ -190,9 +191,15 @@ def alternatives(rows: Sequence[Mapping[str, Any]]) -> list[tuple[int, int]]:
         before, after = neighbours(two)
         return before == {one} and after <= neighbours(one)[1]
 
+    def detour(one: int, two: int) -> bool:
+        """Whether `two` comes after `one` only, and demonstrations are like others once it is taken out of them."""
+        taken_out = [[k for k, _ in groupby(k for k in each if k != two)] for each in labels if two in each]
+        return neighbours(two)[0] == {one} and all(each in labels for each in taken_out)
+
     def alike(one: int, two: int) -> bool:
         same_place = apart(one, two) and neighbours(one) == neighbours(two)
-        return {one, two} <= firsts or same_place or optional(one, two) or optional(two, one)
+        left_out = any(optional(*pair) or detour(*pair) for pair in ((one, two), (two, one)))
+        return {one, two} <= firsts or same_place or left_out
 
     return [(one, two) for i, one in enumerate(phases) for two in phases[i + 1 :] if alike(one, two)]
 
