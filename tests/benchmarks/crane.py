@@ -71,7 +71,7 @@ def uncompiled():
 
 
 def reference_actuators():
-    """The loop as it is without a compiler and without a built FMU: interpreter, the reference cylinder in numpy."""
+    """The loop as it is without a compiler and without a built FMU: interpreter, law and reference cylinders."""
     stack = fresh_banks()
     for module in ("build", "opening"):
         stack.enter_context(mock.patch(f"skillframe.actuation.{module}.find_compiler", return_value=None))
@@ -128,7 +128,7 @@ def rows(show):
     show("crane, no compiler, FMUs built elsewhere: real time, mean", mean, "x")
     with reference_actuators():
         best, _ = timed(1)
-    show("crane, no compiler, cylinders in numpy: real time, fastest", best, "x", 3.0, below=False)
+    show("crane, no compiler, reference cylinders: real time, fastest", best, "x", 3.0, below=False)
     best, mean = timed(COUNT, 3.5)
     show(f"crane, batch of {COUNT}: simulated seconds of all trials per second, mean", mean, "x", 8.0, below=False)
     show("crane: starting its cylinders again in the same process", 1e3 * second_run(), "ms", 5.0)
