@@ -58,6 +58,9 @@ def _required(field: dataclasses.Field[Any]) -> bool:
     return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
 
 
+WORDS = {float: "a number", int: "a whole number", str: "text", bool: "true or false", Path: "a path"}
+
+
 def coerce(value: Any, hint: Any, where: str) -> Any:
     """A plain value as the annotated type, or `InputError` that says what was expected."""
     origin, args = typing.get_origin(hint), typing.get_args(hint)
@@ -117,7 +120,7 @@ def _coerce_scalar(value: Any, hint: Any, where: str) -> Any:
         return Path(value)
     if hint in (int, str, bool) and type(value) is hint:
         return value
-    raise InputError(where, f"expected {getattr(hint, '__name__', hint)}, got {value!r}")
+    raise InputError(where, f"expected {WORDS.get(hint, getattr(hint, '__name__', hint))}, got {value!r}")
 
 
 def parse_setting(text: str) -> tuple[str, Any]:

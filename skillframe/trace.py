@@ -97,8 +97,10 @@ class Trace:
             meta = json.loads(str(arrays.pop("meta")))
         except FileNotFoundError:
             raise InputError(path, "no such file", "check the path") from None
-        except Exception as error:
-            raise InputError(path, f"is not a trace file ({error})", "give a .npz written by skillframe run") from None
+        except Exception:
+            raise InputError(
+                path, "is no trace file, or a damaged one", "give a .npz written by skillframe run"
+            ) from None
         if not isinstance(meta, dict) or meta.get("format") != FORMAT:
             said = meta.get("format") if isinstance(meta, dict) else meta
             raise InputError(path, f"has format {said!r}, not {FORMAT!r}", "give a trace file")

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from skillframe.cli.endings import TRACE
+
 if TYPE_CHECKING:
     from skillframe.campaign.runner import Options, Progress
     from skillframe.campaign.spec import CampaignSpec
@@ -118,7 +120,7 @@ def status(folder: Path, as_json: bool) -> int:
 @click.argument("folder", type=_FOLDER)
 @click.argument("trial", type=click.IntRange(min=0))
 @click.option("--skill", help="Skill as in results.csv, or its beginning [the first].")
-@click.option("--out", type=_FOLDER, help="Trace file (.npz).")
+@click.option("--out", type=TRACE, help="Trace file (.npz).")
 def replay(folder: Path, trial: int, skill: str | None, out: Path | None) -> int:
     """Run TRIAL of the campaign in FOLDER again, alone, and compare it with its row bit by bit.
 

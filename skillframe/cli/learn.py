@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+
+from skillframe.cli.endings import SKILL
+
+if TYPE_CHECKING:
+    from skillframe.demonstration.record import Demonstration
 
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--out", required=True, type=click.Path(path_type=Path), help="Skill file to write (.json).")
+@click.option("--out", required=True, type=SKILL, help="Skill file to write (.json).")
 @click.option("--skill", default="lmc", show_default=True, help="Kind of skill to learn.")
 @click.option(
     "--at", help='Where it is learned: a frame\'s name or "x,y,z" [m] in the tool frame; default: tool point.'
@@ -44,8 +51,10 @@ def command(
 
     kind = registry().behaviour(skill)
     options = LearnOptions(at=at, hand=hand, axes=axes, settings=dict(parse_setting(text) for text in settings))
-    document = learned(kind, [read_demonstration(path) for path in files], options)
+    demonstrations = [read_demonstration(path) for path in files]
+    document = learned(kind, demonstrations, options)
     save(document, out)
+    _warn(demonstrations)
     lines = kind.describe(document) if kind.describe is not None else [kind.summary]
     for line in [f"{out}: {kind.name} from {len(files)} demonstration{'s' * (len(files) != 1)}", *lines]:
         click.echo(line, err=as_json)
@@ -54,3 +63,12 @@ def command(
 
         emit_json(document)
     return 0
+
+
+def _warn(demonstrations: Sequence[Demonstration]) -> None:
+    """What looks wrong in the recordings, on stderr: a skill learned from a biased wrench is learned from the bias."""
+    from skillframe.demonstration.audit import audit, odd_ones
+
+    for found in odd_ones(list(demonstrations), [audit(d) for d in demonstrations]):
+        for text in found.warnings:
+            click.echo(f"warning: {found.file}: {text}", err=True)

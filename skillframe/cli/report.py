@@ -6,10 +6,12 @@ from pathlib import Path
 
 import click
 
+from skillframe.cli.endings import PAGE
+
 
 @click.command()
 @click.argument("inputs", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="DIR|TRACE...")
-@click.option("--out", required=True, type=click.Path(path_type=Path, dir_okay=False), help="The HTML file to write.")
+@click.option("--out", required=True, type=PAGE, help="The HTML file to write.")
 def command(inputs: tuple[Path, ...], out: Path) -> None:
     """Make a report from campaign folders, trace files, or both: one HTML file that needs nothing else.
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from skillframe.cli.endings import PAGE, TRACE
 from skillframe.cli.numbers import POSITIVE, SEED
 
 if TYPE_CHECKING:
@@ -23,8 +24,8 @@ QUIET_S = 5.0  # a run that is over by then needs no progress
 @click.option("--robot", default="free_tool", show_default=True, help="Robot name, robot.toml or URDF.")
 @click.option("--coc", help='Centre of compliance: "x,y,z" in the tool frame, or a frame (tip, wrist) [as learned].')
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="world.*, start.*, fixture.*, grasp.* ...")
-@click.option("--out", type=click.Path(path_type=Path), help="Trace file (.npz).")
-@click.option("--replay", type=click.Path(path_type=Path), help="Page with a 3-D replay and plots of the run (.html).")
+@click.option("--out", type=TRACE, help="Trace file (.npz).")
+@click.option("--replay", type=PAGE, help="Page with a 3-D replay and plots of the run (.html).")
 @click.option("--video", type=click.Path(path_type=Path), help="Film of the run (.mp4).")
 @click.option("--seed", default=0, show_default=True, type=SEED, help="Seed of the sensor noise.")
 @click.option("--duration", default=20.0, show_default=True, type=POSITIVE, help="Longest run in simulated seconds.")

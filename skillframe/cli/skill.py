@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from skillframe.cli.endings import PAGE
 from skillframe.cli.output import emit_json
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ def _maker(created_by: dict[str, str]) -> str:
 
 @command.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--out", required=True, type=click.Path(path_type=Path), help="HTML file to write.")
+@click.option("--out", required=True, type=PAGE, help="HTML file to write.")
 def explain(file: Path, out: Path) -> None:
     """Draw why a skill is as it is: one self-contained HTML page.
 

@@ -69,18 +69,18 @@ def test_a_missing_key_is_named():
 @pytest.mark.parametrize(
     ("values", "said"),
     [
-        ({"friction": "high"}, "friction: expected float"),
-        ({"friction": True}, "friction: expected float"),
+        ({"friction": "high"}, "friction: expected a number"),
+        ({"friction": True}, "friction: expected a number"),
         ({"friction": float("nan")}, "not a number"),
-        ({"flag": 1}, "flag: expected bool"),
+        ({"flag": 1}, "flag: expected true or false"),
         ({"base": "fre"}, "did you mean 'free'?"),
         ({"limits": [1.0]}, "expected 2 values, got 1"),
         ({"limits": 3.0}, "expected a list"),
-        ({"names": ["a", 1]}, "names[1]: expected str"),
+        ({"names": ["a", 1]}, "names[1]: expected text"),
         ({"inner": 3}, "expected a table"),
         ({"table": [1]}, "expected a table"),
-        ({"inner": {"segments": 2.5}}, "inner.segments: expected int"),
-        ({"note": 3}, "note: expected str"),
+        ({"inner": {"segments": 2.5}}, "inner.segments: expected a whole number"),
+        ({"note": 3}, "note: expected text"),
     ],
 )
 def test_a_value_of_the_wrong_type_says_where_and_what_was_expected(values, said):
