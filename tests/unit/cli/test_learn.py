@@ -1,11 +1,13 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from skillframe.cli.main import run
 from skillframe.conformance.examples import example_demonstrations
-from skillframe.demonstration.files import write_demonstration
+from skillframe.demonstration.files import read_demonstration, write_demonstration
 from skillframe.skillfile import load
 
 pytestmark = pytest.mark.needs_plugins
@@ -89,6 +91,16 @@ def test_bad_requests_exit_2_with_a_sentence_and_write_nothing(
     assert run(["learn", *demos, "--out", str(out), *arguments]) == 2
     assert message in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_what_looks_wrong_in_a_recording_is_said_when_it_is_learned_from(
+    demos: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    demo = read_demonstration(demos[0])
+    biased = tmp_path / "biased.npz"
+    write_demonstration(replace(demo, wrench=demo.wrench + 7.0 * (np.arange(6) == 0)), biased)
+    assert run(["learn", str(biased), "--out", str(tmp_path / "a.json")]) == 0
+    assert f"warning: {biased}: bias: 6.99 N" in capsys.readouterr().err
 
 
 def test_a_missing_demonstration_exits_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
