@@ -142,7 +142,7 @@ def test_learning_twice_gives_the_same_numbers(documents, kind):
         ({"stifness": 1.0}, "stiffness"),
         ({"stiffness_rotation": 0.0}, "must be positive"),
         ({"blend": -1.0}, "must be positive"),
-        ({"feedforward": "yes"}, "expected bool"),
+        ({"feedforward": "yes"}, "expected true or false"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(kind, settings, said):

@@ -203,7 +203,7 @@ def test_averaging_before_decimation_halves_the_noise_of_a_fast_recording():
         ({"stifness": 1.0}, "did you mean 'stiffness"),
         ({"stiffness_rotation": 0.0}, "must be positive"),
         ({"blend": -1.0}, "must be positive"),
-        ({"feedforward": "yes"}, "expected bool"),
+        ({"feedforward": "yes"}, "expected true or false"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(settings, said):

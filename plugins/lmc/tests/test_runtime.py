@@ -237,7 +237,7 @@ def test_a_learned_document_survives_json_and_runs_the_same() -> None:
         (("translation", "desired_direction"), [0.0, 0.0], "expected 3 values"),
         (("translation", "desired_direction"), [0.0, 0.0, -2.0], "should be a unit vector"),
         (("translation", "speed"), -0.1, "should not be negative"),
-        (("translation", "speed"), "fast", "expected float"),
+        (("translation", "speed"), "fast", "expected a number"),
         (("rotation", "compliant_axes"), [[0.0, 0.0, 0.0]], r"compliant_axes\[0\]: should be a unit vector"),
         (("rotation", "stiffness"), [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]], "positive semi-definite"),
         (("rotation", "stiffness"), [[1.0, 2.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], "symmetric"),
