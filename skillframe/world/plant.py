@@ -43,6 +43,13 @@ class Kinematics(NamedTuple):
     velocity: Float
 
 
+def _leave_no_log_file() -> None:
+    """MuJoCo would write MUJOCO_LOG.TXT where the user stands whenever a trial diverges, which the limits tell."""
+    config = mujoco.MjLogConfig.get()
+    config.logto_file = False
+    mujoco.MjLogConfig.set(config)
+
+
 class Plant:
     """N copies of one robot in one scene.
 
@@ -57,6 +64,7 @@ class Plant:
     def __init__(
         self, robot: RobotModel, scene: Scene, count: int, fixture: Pose, draws: Draws, timestep: float = TIMESTEP
     ) -> None:
+        _leave_no_log_file()
         self.robot, self.scene, self.count = robot, scene, count
         self.model = build_spec(robot, scene, timestep).compile()
         self.batch = mujoco.batch.Batch(self.model, count, nthread=1, persistent=True)

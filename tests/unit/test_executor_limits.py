@@ -110,12 +110,14 @@ def test_a_diverging_run_is_stopped_with_the_cause_and_its_trace(push, text):
     assert run(tame, setup(world="free"), duration_s=0.2).reason[0].startswith("time limit")
 
 
-def test_a_trial_that_diverges_before_its_start_is_stopped_and_its_neighbour_runs_on():
+def test_a_trial_that_diverges_before_its_start_is_stopped_and_its_neighbour_runs_on(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     light = {"robot.mass_scale": np.array([1e-6, 1.0])}  # the controller's nominal torques throw an arm of 18 mg
     both = run(Hold(VALLEY), setup("panda", world="free"), count=2, draws=light, duration_s=0.2, trace_hz=1000)
     assert both.reason[0].startswith("diverged")
     assert both.success[1]
     assert len(both.traces[0].time) >= 1
+    assert not list(tmp_path.iterdir())  # the engine leaves no log where the user stands
 
 
 def test_one_trial_that_diverges_leaves_its_neighbours_alone():
