@@ -15,6 +15,7 @@ UNITS: tuple[tuple[str, str, float], ...] = (
     ("pressure", "bar", 1e-5),
     ("payload|mass", "kg", 1.0),
     ("delay", "ms", 1e3),
+    ("deadband", "%", 1e2),
     ("offset|position|clearance|depth|radius|length|width|height|gap|tolerance|fillet", "mm", 1e3),
 )
 """Words of a name, the unit for people, and its factor; the first that fits counts."""
