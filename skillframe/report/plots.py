@@ -22,6 +22,8 @@ LEAST_RANGE = {"N": 1.0, "Nm": 0.05, "mm": 0.5, "°": 0.5}
 MOST_EVENTS = 12
 CONTACT_N = 0.5
 LABEL_GAP = 12.0
+HEADROOM = 0.06
+"""Share of a plot's height that is left above the curves, for the numbers of events."""
 FORCE_CAPTION = "What the environment does to the tool, filtered; x, y, z are the robot's base axes."
 POSITION_CAPTION = (
     "Of the centre of compliance, from the start. Dashed: asked for by the skill; where they part, the environment led."
@@ -70,7 +72,8 @@ def _value_range(curves: Sequence[Curve], unit: str, limit: float | None) -> tup
     low, high = float(values.min()), float(values.max())
     if limit is not None and high > 0.5 * limit:
         high = max(high, limit)
-    return padded(low, high, least=LEAST_RANGE.get(unit, 1e-6))
+    low, high = padded(low, high, least=LEAST_RANGE.get(unit, 1e-6))
+    return low, high + HEADROOM * (high - low)
 
 
 def _limit_line(axes: Axes, limit: float | None, unit: str) -> Markup:
