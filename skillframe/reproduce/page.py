@@ -53,7 +53,7 @@ def _style() -> Markup:
 def _hero(entries: Sequence[Mapping[str, Any]]) -> Markup:
     count = {verdict: sum(each["verdict"] == verdict for each in entries) for verdict in BADGES}
     lead = (
-        f"{len(entries)} published results, computed anew: {count['pass']} pass their bar, {count['fail']} do not, "
+        f"Published results, computed anew: {count['pass']} pass their bar, {count['fail']} do not, "
         f"{count['reported']} are reported without one. A row that does not reproduce is a result, too."
     )
     quick = any(each["quick"] for each in entries)
