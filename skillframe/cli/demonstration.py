@@ -198,7 +198,7 @@ def _show(found: Audit) -> None:
         ("bias", six(found.bias)),
         ("noise", f"{six(found.noise)} at rest; {six(found.noise_typical)} typically"),
         ("drift", six(found.drift) if found.drift else "not seen (it does not end in free air)"),
-        ("peak", f"{found.peak_force_n:.2f} N, {found.spikes} spikes"),
+        ("peak", f"{found.peak_force_n:.2f} N, {counted(found.spikes, 'spike')}"),
         ("contact", _contacts(found)),
     ]
     for name, text in lines:
@@ -207,7 +207,7 @@ def _show(found: Audit) -> None:
         click.echo(f"  note     {text}")
     for text in found.warnings:
         click.echo(f"  warning  {text}")
-    click.echo("  " + ("usable" if found.usable else "NOT usable") + f", {len(found.warnings)} warnings")
+    click.echo("  " + ("usable" if found.usable else "NOT usable") + f", {counted(len(found.warnings), 'warning')}")
 
 
 def _declared(found: Audit) -> str:
@@ -219,6 +219,11 @@ def _declared(found: Audit) -> str:
 def six(values: list[float]) -> str:
     """Force and torque with their units."""
     return f"({', '.join(f'{v:.3f}' for v in values[:3])}) N, ({', '.join(f'{v:.4f}' for v in values[3:])}) Nm"
+
+
+def counted(count: int, what: str) -> str:
+    """How many of something, in words."""
+    return f"{count} {what}{'s' * (count != 1)}"
 
 
 def _contacts(found: Audit) -> str:

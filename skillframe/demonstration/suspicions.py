@@ -103,7 +103,8 @@ def spikes(d: Demonstration) -> Iterator[str]:
     if found.size:
         strength = norm(d.wrench[found, :3])
         worst = int(found[np.argmax(strength)])
-        yield f"spikes: {found.size} samples, the largest {strength.max():.1f} N at t = {d.time[worst]:.3f} s"
+        count = f"{found.size} sample{'s' * (found.size != 1)}"
+        yield f"spikes: {count}, the largest {strength.max():.1f} N at t = {d.time[worst]:.3f} s"
 
 
 def spike_indices(force: Float) -> np.ndarray[tuple[int], np.dtype[np.intp]]:

@@ -72,7 +72,7 @@ WARNINGS: dict[str, tuple[Callable[[Demonstration], Demonstration], str]] = {
     "held values": (lambda d: with_wrench(d, held), "rate is about 19.6"),
     "forces of 1e6 N": (lambda d: with_wrench(d, lambda w: w * 1e5), "force: up to 1.0"),
     "torques in Nmm": (lambda d: with_wrench(d, lambda w: np.add(w, [0, 0, 0, 0, 90.0, 0])), "lever arm of"),
-    "a spike": (lambda d: with_wrench(d, spiked), "spikes: 1 samples, the largest 277.0 N at t = 0.300 s"),
+    "a spike": (lambda d: with_wrench(d, spiked), "spikes: 1 sample, the largest 277.0 N at t = 0.300 s"),
     "bias": (lambda d: with_wrench(d, lambda w: np.add(w, [1.0, -2.0, 20.0, 0, 0, 0])), "bias: 20.1"),
     "drift": (lambda d: with_wrench(d, drifted), "drift: the free-air level moved by 1.0"),
     "no contact": (lambda d: with_wrench(d, lambda w: 0.05 * w), "contact: none found"),

@@ -14,8 +14,8 @@ WAYS = {
     "random_walk": "a random walk around the start, steps of {step:.2g} mm",
 }
 NAMES = {
-    "across_1": "along the surface", "across_2": "across it", "tilt_1": "tilt", "tilt_2": "tilt the other way",
-    "turn": "turn about the push",
+    "across_1": "one way along the surface", "across_2": "the other way along it",
+    "tilt_1": "tilt", "tilt_2": "tilt the other way", "turn": "turn about the push",
 }  # fmt: skip
 
 
@@ -24,7 +24,7 @@ def describe(document: Document) -> list[str]:
     phase = read_phase(document)
     x, y, z = phase.push.direction
     return [
-        f"press along {x:+.3f}, {y:+.3f}, {z:+.3f} with {phase.push.force:.1f} N",
+        f"press along ({x:.3f}, {y:.3f}, {z:.3f}) with {phase.push.force:.1f} N",
         *_where(phase),
         _way(phase),
         _forces(phase),
@@ -42,14 +42,14 @@ def _where(phase: Phase) -> list[str]:
     for name, mean, spread in zip(found.coordinates, found.mean, deviation, strict=True):
         metric = name.startswith("across")
         factor, unit = (1e3, "mm") if metric else (np.rad2deg(1.0), "degrees")
-        lines.append(f"look {NAMES[name]}: {factor * mean:+.2f} {unit} from the start, +-{factor * spread:.2f} {unit}")
+        lines.append(f"look {NAMES[name]}: {factor * mean:+.2f} {unit} from the start, ±{factor * spread:.2f} {unit}")
     return lines
 
 
 def _way(phase: Phase) -> str:
     path = phase.path
     way = WAYS[path.kind].format(pitch=1e3 * path.pitch, step=1e3 * path.step)
-    bounds = f"at most {1e3 * path.speed:.3g} mm/s and {path.acceleration:.3g} m/s^2"
+    bounds = f"at most {1e3 * path.speed:.3g} mm/s and {path.acceleration:.3g} m/s²"
     return f"follow {way}, {bounds}, stiffness {phase.stiffness.translation:g} N/m across the push and none along it"
 
 

@@ -14,6 +14,7 @@ from matplotlib.patches import Ellipse
 from skillframe.frames import Float, norm
 from skillframe.records import Document, Illustration
 from skillframe_search.contact import surface_axes
+from skillframe_search.describe import NAMES
 from skillframe_search.exploration import COORDINATES
 from skillframe_search.phase import Phase, read_phase
 from skillframe_search.plan import Plan, exerted, keyed, plan
@@ -64,7 +65,7 @@ def _panel(canvas: Axes, phase: Phase, trajectory: Plan, first: int, second: int
             wide, high = 2.0 * size * np.sqrt(value[::-1])
             canvas.add_patch(Ellipse(tuple(mean), wide, high, angle=angle, fill=False, ec=INK, lw=1.2))
     canvas.plot(0.0, 0.0, "+", color=RED, ms=12, mew=2)
-    labels = [f"{phase.searched[i]} [{'degrees' if _turns(phase, i) else 'mm'}]" for i in pair]
+    labels = [f"{NAMES[phase.searched[i]]} [{'degrees' if _turns(phase, i) else 'mm'}]" for i in pair]
     canvas.set(xlabel=labels[0], ylabel=labels[1])
     if not any(_turns(phase, i) for i in pair):
         canvas.set_aspect("equal")
