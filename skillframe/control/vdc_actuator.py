@@ -15,10 +15,11 @@ drops below `laminar_pressure` are raised to it (our choice): the published inve
 last line steps over the spool's overlap b; it is ours, and smooth over w = 0.2 % of the travel, because there the noise
 of u_e would throw a spool to and fro (an exact inverse has a step of 2 b).
 
-Friction in air (c = 0) has a bristle's state z, as published (Zhu and Piedboeuf, 2005): a piston that stops keeps the
-friction it had, and turns it round over z_ss. In contact it is a flat function of the required velocity (our choice):
-there xd_r hangs on the measured force f, which a bristle answers a quarter of a period late and a steep tanh too
-strongly, so that the machine swung by 1 kN where it should have stood. In air a tanh of 5 mm/s did the same by 1 mm.
+Where no force is fed back (c = 0) friction has a bristle's state z, as published (Zhu and Piedboeuf, 2005): a piston
+that stops keeps the friction it had, and turns it round over z_ss. Where one is, it is a flat function of the required
+velocity (our choice): there xd_r hangs on the estimated force f, which a bristle answers a quarter of a period late and
+a steep tanh too strongly, so that the machine swung by 1 kN where it should have stood. f_0 is small, so that the two
+do not change places while a tool lands: with 1 kN it hopped.
 """
 
 from __future__ import annotations
@@ -137,7 +138,7 @@ def bristle_after(c: Cylinders, bristle: Float, velocity: Float, dt: float) -> F
 class ContactFriction:
     """From which force on it is that of contact, f_0 [N], and how flat it then is, v_s [m/s]."""
 
-    force: float = 2e3
+    force: float = 100.0
     sliding: float = 1e-2
 
 
