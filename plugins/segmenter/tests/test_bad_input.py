@@ -7,6 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from skillframe_segmenter.boundaries import Move, moved
+from skillframe_segmenter.learning import relabelled
+from skillframe_segmenter.segmentation import refitted
 
 from skillframe.cli import main
 from skillframe.demonstration.files import write_demonstration
@@ -196,6 +199,24 @@ def test_a_boundary_that_a_person_moves_stays_where_it_was_put(run, files, tmp_p
     assert after[0] == pytest.approx(before[0], abs=0.3)
     document = json.loads(second.read_text())
     assert document["phase_model"]["direction"] != json.loads(first.read_text())["phase_model"]["direction"]
+
+
+def test_boundaries_are_counted_after_phases_are_joined_and_any_of_them_can_be_moved():
+    """Joining takes boundaries away that the segmenter has found; nobody sees those, and they must not come back."""
+    demonstrations = [legs(i, X, Z, -X) for i in range(3)]
+    found = registry().segmenter("wrench_hmm").fit(demonstrations, None, {})
+    joined = relabelled(found, 1, 2)
+    assert all(len(a["boundaries"]) > len(b["boundaries"]) for a, b in zip(*map(rows_in, (found, joined)), strict=True))
+    for i, row in enumerate(rows_in(joined)):
+        move = Move(i, 0, row["boundaries"][0] + 0.1)
+        rows = moved(rows_in(joined), [move], ["a", "b", "c"])
+        again = rows_in(refitted(joined, demonstrations, rows, {i}, None, {}))
+        assert again[i]["boundaries"] == [move.time]
+        assert [other["labels"] for other in again] == [other["labels"] for other in rows]
+
+
+def rows_in(document):
+    return document["demonstrations"]
 
 
 def test_segment_refuses_in_a_sentence_and_leaves_no_file(run, files, tmp_path):

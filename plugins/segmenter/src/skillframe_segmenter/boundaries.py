@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import PurePath
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from skillframe.errors import InputError, UnknownName
 from skillframe.records import Document
@@ -41,12 +41,6 @@ def parse_move(text: str, names: Sequence[str]) -> Move:
     if name not in known:
         raise UnknownName("demonstration", name, known)
     return Move(known[name], boundary, time)
-
-
-def moves_of(settings: Mapping[str, Any]) -> tuple[list[Move], dict[str, Any]]:
-    """Moves out of the settings' `boundaries` ([[demonstration, boundary, seconds], ...]), and the other settings."""
-    values = dict(settings)
-    return [Move(int(d), int(b), float(t)) for d, b, t in values.pop("boundaries", [])], values
 
 
 def moved(rows: Sequence[Document], moves: Sequence[Move], names: Sequence[str]) -> list[Document]:

@@ -25,7 +25,8 @@ from skillframe.frames import norm
 from skillframe.records import Document, LearnOptions
 from skillframe.registry import registry
 from skillframe_segmenter.agreement import check_agreement
-from skillframe_segmenter.boundaries import parse_move
+from skillframe_segmenter.boundaries import Move, moved, parse_move
+from skillframe_segmenter.segmentation import refitted
 from skillframe_segmenter.settings import Settings
 from skillframe_segmenter.zvc import ZvcSettings
 
@@ -38,7 +39,8 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     """The body of a policy document.
 
     Settings: `segmenter` (wrench_hmm), `skill` (lmc), `phases` (found), `recoveries` (1), `set_boundary` (a list of
-    "DEMONSTRATION:BOUNDARY=SECONDS"), those of the segmenter, and those of the phases' learner.
+    "DEMONSTRATION:BOUNDARY=SECONDS", counted as they stand without it), those of the segmenter, and those of the
+    phases' learner.
 
     Raises:
         InputError: demonstrations that cannot be cut or do not agree, or an unknown setting.
@@ -46,9 +48,8 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     """
     own, cutting, learning = _sorted(options)
     segmenter = registry().segmenter(own["segmenter"])
-    moves = [parse_move(text, [d.source for d in demonstrations]) for text in own["set_boundary"]]
-    if moves:
-        cutting = {**cutting, "boundaries": [list(move) for move in moves]}
+    names = [d.source for d in demonstrations]
+    moves = [parse_move(text, names) for text in own["set_boundary"]]
     found = segmenter.fit(demonstrations, own["phases"], cutting)
     options = LearnOptions(at=options.at, hand=options.hand, axes=options.axes, settings=learning)
     if own["phases"] is None:
@@ -56,6 +57,8 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     check_agreement(found["demonstrations"], demonstrations)
     if own["phases"] is None:
         found = _joined(found, demonstrations, own["skill"], options, stand_ins=True)
+    if moves:
+        found = _held(found, demonstrations, moved(found["demonstrations"], moves, names), moves, own, cutting)
     bodies = [_learn(found, demonstrations, k, own["skill"], options) for k in range(_count(found))]
     shared = {key: value for key, value in bodies[0].items() if key != "phases"}
     return {
@@ -76,7 +79,7 @@ def _sorted(options: LearnOptions) -> tuple[dict[str, Any], dict[str, Any], dict
         "set_boundary": [],
     }
     own |= {key: value for key, value in options.settings.items() if key in OWN}
-    names = {*Settings.__dataclass_fields__, *ZvcSettings.__dataclass_fields__, "boundaries"}
+    names = {*Settings.__dataclass_fields__, *ZvcSettings.__dataclass_fields__}
     cutting = {key: value for key, value in options.settings.items() if key in names}
     learning = {k: v for k, v in options.settings.items() if k not in names and k not in OWN}
     for key in ("phases", "recoveries"):
@@ -84,6 +87,18 @@ def _sorted(options: LearnOptions) -> tuple[dict[str, Any], dict[str, Any], dict
         if value is not None and (not isinstance(value, int) or isinstance(value, bool) or value < 0):
             raise InputError(f"--set {key}", f"{value!r} is not a whole number", "give one")
     return own, {**cutting, "at": options.at, "axes": options.axes}, learning
+
+
+def _held(
+    found: Document, demonstrations: Sequence[Demonstration], rows: Sequence[Document], moves: Sequence[Move],
+    own: Mapping[str, Any], cutting: Mapping[str, Any],
+) -> Document:  # fmt: skip
+    """The segmentation with rows in which a person has moved boundaries; a model of micro-phases is fitted again."""
+    if "phase_of" not in found["phase_model"]:
+        return {**found, "demonstrations": list(rows)}
+    again = refitted(found, demonstrations, rows, {m.demonstration for m in moves}, own["phases"], cutting)
+    check_agreement(again["demonstrations"], demonstrations)
+    return again
 
 
 def _count(found: Document) -> int:

@@ -7,7 +7,7 @@ The flow of `wrench_hmm` (and, with poses instead of wrenches driving the transi
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -20,7 +20,7 @@ from skillframe.errors import InputError
 from skillframe.frames import Float, norm, rotation_vector
 from skillframe.records import Document
 from skillframe_segmenter import em, gate, merge, model, runs
-from skillframe_segmenter.boundaries import Move, moved, moves_of
+from skillframe_segmenter.boundaries import OPTION
 from skillframe_segmenter.features import Features, Scales, features, scales, typical_scales
 from skillframe_segmenter.model import PhaseModel, Pose0
 from skillframe_segmenter.settings import WINDOW_S, Settings
@@ -72,30 +72,56 @@ def segment(
     Args:
         demonstrations: one or more.
         phases: how many; None finds the number.
-        settings: by name; `boundaries` moves some, see `boundaries`.
+        settings: by name, see `Settings`.
         kind: "wrench_hmm" or "pose_hmm".
 
     Raises:
         InputError: demonstrations that cannot be cut, settings that make no sense, or too many phases.
     """
-    moves, values = moves_of(settings)
-    chosen = build(Settings, values, "--set")
+    chosen = build(Settings, settings, "--set")
     prepared = prepare(demonstrations, chosen, kind)
     data = em.gather(prepared.seen, prepared.drive, chosen)
     _check_count(demonstrations, prepared.cut, phases)
     found = fit(data, prepared, phases, chosen)
-    names = [d.source for d in demonstrations]
-    rows = rows_of(prepared.cut, found.labels, names)
-    if moves:
-        rows = moved(rows, moves, names)
-        found = _refit(data, prepared, found, rows, moves, chosen)
-        rows = [
-            r if i in {m.demonstration for m in moves} else old
-            for i, (r, old) in enumerate(zip(rows, rows_of(prepared.cut, found.labels, names), strict=True))
-        ]
-    document = model.to_document(online_model(prepared, found, chosen), kind)
+    rows = rows_of(prepared.cut, found.labels, [d.source for d in demonstrations])
+    return {"phase_model": _model_of(prepared, found, chosen, kind), "demonstrations": rows}
+
+
+def refitted(
+    document: Document, demonstrations: Sequence[Demonstration], rows: Sequence[Document], said: Set[int],
+    phases: int | None, settings: Mapping[str, Any],
+) -> Document:  # fmt: skip
+    """A segmentation fitted again, the demonstrations that a person has spoken about held as their rows say.
+
+    Args:
+        document: of `segment`, its phases joined or not.
+        demonstrations: as they were then.
+        rows: `demonstrations` of the document with boundaries moved.
+        said: numbers of those to hold.
+        phases: as they were then.
+        settings: as they were then.
+
+    Raises:
+        InputError: an interval shorter than a window.
+    """
+    chosen, kind = build(Settings, settings, "--set"), document["phase_model"]["type"]
+    prepared = prepare(demonstrations, chosen, kind)
+    data = em.gather(prepared.seen, prepared.drive, chosen)
+    before = fit(data, prepared, phases, chosen)._replace(phase_of=np.array(document["phase_model"]["phase_of"]))
+    found = _refit(data, prepared, before, rows, said, chosen)
+    again = rows_of(prepared.cut, found.labels, [d.source for d in demonstrations])
+    for i in said:
+        if len(again[i]["boundaries"]) != len(rows[i]["boundaries"]):
+            where = again[i]["file"] or f"demonstration {i + 1}"
+            raise InputError(where, f"has an interval shorter than a window of {WINDOW_S:g} s", f"mend {OPTION}")
+        again[i]["boundaries"] = rows[i]["boundaries"]
+    return {"phase_model": _model_of(prepared, found, chosen, kind), "demonstrations": again}
+
+
+def _model_of(prepared: Prepared, found: Segmented, settings: Settings, kind: str) -> Document:
+    document = model.to_document(online_model(prepared, found, settings), kind)
     document["criterion"] = {str(k): value for k, value in found.criterion.items()}
-    return {"phase_model": document, "demonstrations": rows}
+    return document
 
 
 def prepare(demonstrations: Sequence[Demonstration], settings: Settings, kind: str) -> Prepared:
@@ -174,11 +200,9 @@ def _numbered(found: Segmented) -> Segmented:
 
 
 def _refit(
-    data: em.Data, prepared: Prepared, found: Segmented, rows: Sequence[Document], moves: Sequence[Move],
-    settings: Settings,
-) -> Segmented:  # fmt: skip
+    data: em.Data, prepared: Prepared, found: Segmented, rows: Sequence[Document], said: Set[int], settings: Settings
+) -> Segmented:
     """EM again, with the phases of demonstrations whose boundaries a person has moved held as said."""
-    said = {m.demonstration for m in moves}
     k = len(found.phase_of)
     ruled = [
         np.where(found.phase_of == _labels_of(rows[i], w)[:, None], 0.0, em.NEVER)

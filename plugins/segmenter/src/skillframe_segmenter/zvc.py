@@ -24,7 +24,6 @@ from skillframe.errors import InputError
 from skillframe.frames import Float, norm
 from skillframe.records import Document
 from skillframe_segmenter import runs
-from skillframe_segmenter.boundaries import moved, moves_of
 from skillframe_segmenter.features import typical_speeds
 from skillframe_segmenter.segmentation import rows_of, successors
 from skillframe_segmenter.windows import Windows, cut_all
@@ -54,12 +53,10 @@ class ZvcSettings:
 
 def fit(demonstrations: Sequence[Demonstration], phases: int | None, settings: Mapping[str, Any]) -> Document:
     """`phase_model` and `demonstrations` of a policy file; see `SegmenterType.fit`."""
-    moves, values = moves_of(settings)
-    chosen = build(ZvcSettings, values, "--set")
+    chosen = build(ZvcSettings, settings, "--set")
     cut, point = cut_all(demonstrations, chosen.at, chosen.axes)
     labels = [_labels(w, chosen, phases) for w in cut]
-    names = [d.source for d in demonstrations]
-    rows = moved(rows_of(cut, labels, names), moves, names)
+    rows = rows_of(cut, labels, [d.source for d in demonstrations])
     count = max(int(each.max()) for each in labels) + 1
     model = {
         "type": "zvc", "version": 1, "at": point.tolist(), "axes": chosen.axes, "still": chosen.still,
