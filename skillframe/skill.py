@@ -5,7 +5,7 @@ observation with a desired pose and an impedance, and the controller exerts, at 
 
     F = K (x_d - x) + D (v_d - v) + F_ff                                                   (1)
 
-which is equation (1) of the seed document with the damping sign that dissipates: D acts on desired minus measured
+which is equation (1) of the overview paper with the damping sign that dissipates: D acts on desired minus measured
 twist, and a desired twist of zero is allowed. A skill owns no clock, no files and no randomness of its own.
 """
 

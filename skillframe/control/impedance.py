@@ -1,4 +1,4 @@
-r"""Cartesian impedance, equation (1) of the seed document with the damping sign that dissipates.
+r"""Cartesian impedance, equation (1) of the overview paper with the damping sign that dissipates.
 
     F = K (x_d - x) + D (v_d - v) + F_ff,    x: position and attitude of the centre of compliance
 

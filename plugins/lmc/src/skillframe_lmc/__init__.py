@@ -1,7 +1,7 @@
 """skillframe plug-in: Linear Motion with Compliance (LMC), one phase of a compliant assembly skill in six dimensions.
 
 Read in this order: `intervals` (what is measured), `work`, `sectors` and `directions`, `axes`, `gains` (the four
-decisions), `learner` (their flow, Fig. 6 of the seed document), `runtime` (the skill that runs). This module is all
+decisions), `learner` (their flow, Fig. 6 of the overview paper), `runtime` (the skill that runs). This module is all
 that is imported when plug-ins are listed.
 """
 

@@ -1,4 +1,4 @@
-"""Pictures of what was learned and why, drawn from the skill file alone: after Figs. 13 and 14 of the seed document."""
+"""Pictures of what was learned and why from the skill file alone: after Figs. 13 and 14 of the overview paper."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ nothing. For an interval \(k\),
 
     V_k = x_{k+1} - x_k   or   log(R_{k+1} R_k^T),    F_k = mean of the wrench while moving,    W_k = sum of F . dx
 
-(the seed document speaks of intervals without saying how they are cut; cutting by path is our choice). The step is 2 mm
+(the overview paper speaks of intervals without saying how they are cut; by path is our choice). The step is 2 mm
 or 1 degree, 1 mm on paths under 20 mm, smaller where the whole motion is shorter than five of them, and larger where
 the position noise asks for it or the path is long.
 """

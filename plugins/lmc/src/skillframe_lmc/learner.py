@@ -1,4 +1,4 @@
-r"""The flow of learning (Fig. 6 of the seed document).
+r"""The flow of learning (Fig. 6 of the overview paper).
 
 First the pitch, then for translation and rotation alike
 

@@ -24,7 +24,7 @@ from skillframe.skillfile import new_document
 from skillframe.skillsource import learned
 from skillframe.teacher import TeacherSettings
 
-SEED = "the seed document (Suomalainen), section on learning from force"
+SEED = "the overview paper (Suomalainen), section on learning from force"
 PAPER_6 = "Suomalainen, Calinon, Pignat, Kyrki, ICRA 2019"
 DOWN, X, Y = np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 NOISE = {"teacher.aim_noise_deg": 8.0, "world.friction": 0.2}

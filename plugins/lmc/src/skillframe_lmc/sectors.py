@@ -1,7 +1,7 @@
 r"""Sectors and pyramids: which pushes explain an interval of motion, and by how much others miss.
 
 A tool that slides along \(\hat v\) against a contact force \(F_m\) slides the same way for every push inside the sector
-between \(\hat v\) and \(-\hat F_m\) (Fig. 5 of the seed document); for Coulomb friction it is 90 degrees - atan(mu)
+between \(\hat v\) and \(-\hat F_m\) (Fig. 5 of the overview paper); for Coulomb friction it is 90 degrees - atan(mu)
 wide. A person wavers, so the sector is widened to a pyramid (Fig. 8): by alpha out of its plane and by beta beyond its
 two edges. With n = v x m, m = unit(-F_m), w the angle from v to m, e = n x v, a direction D lies
 

@@ -1,6 +1,6 @@
 r"""Who moved the tool: three degrees of freedom are compliant if the environment did more work than the teacher.
 
-    W = F_m . dx   (translation),    W = T_m . dbeta   (rotation, T_m at the hand)          (3) of the seed document
+    W = F_m . dx   (translation),    W = T_m . dbeta   (rotation, T_m at the hand)          (3) of the overview paper
 
 F_m and T_m are the environment's, so positive work is the environment's and negative work the teacher's. Sliding with
 friction always takes work from the teacher; levering a peg round an edge drives the wrist. The part is fully compliant

@@ -17,7 +17,7 @@ from skillframe.records import Document, Illustration, RowResult, RowRun, RowTyp
 from skillframe.reproduce.bars import reached
 from skillframe_search.trials import FILLET_M, NOBODY_KNEW, Task, demonstrations, document, goals, search, share
 
-SOURCE = "Ehlers, Suomalainen, Lundell, Kyrki, ICRA 2019 (abstract), and the seed document"
+SOURCE = "Ehlers, Suomalainen, Lundell, Kyrki, ICRA 2019 (abstract), and the overview paper"
 SETTINGS = {
     "time": 20.0, "push": 10.0, "speed": 0.015, "stiffness": 2000.0, "world.fillet": FILLET_M, "world.friction": 0.2,
 }  # fmt: skip
@@ -44,7 +44,7 @@ def row_types() -> Iterable[RowType]:
     )  # fmt: skip
     yield RowType(
         name="23", summary="a spiral is sure with the right pitch and centre, in the plane only",
-        published="guaranteed with the right pitch and start", source="the seed document",
+        published="guaranteed with the right pitch and start", source="the overview paper",
         bar="centred spiral 100 % of the peg's holes; centre 6 mm off: at 7 s, 15 points behind the learned search",
         settings=SETTINGS, group="spiral", run=_spiral,
     )  # fmt: skip

@@ -26,7 +26,7 @@ from skillframe.teacher import TeacherSettings
 from skillframe_segmenter.model import from_document
 from skillframe_segmenter.observer import follow
 
-HAGOS = "Hagos, Suomalainen, Kyrki, IROS 2018 (abstract), and the seed document"
+HAGOS = "Hagos, Suomalainen, Kyrki, IROS 2018 (abstract), and the overview paper"
 SETTINGS = {"teacher.aim_noise_deg": 8.0, "world.friction": 0.2, "table.moved": 0.03}
 GROUPS, QUICK_GROUPS, EACH = 12, 4, 3
 NEAR_S, FAR_S = 0.30, 0.35
