@@ -48,7 +48,8 @@ __all__ = ["CALIBRATION_S", "MachineLoop", "simulate_machine"]
 CALIBRATION_S, SETTLE_S, SWING_M = 6.0, 1.0, (0.10, 0.10, 0.05)
 """Swing in the air before a run, two or three reversals of every cylinder, and a moment to come to rest (ours)."""
 IMPEDANCE_RATE, LEAST_DAMPING = 2.0, 5e4  # 1/s and N s/m; D where a skill leaves it open, from teleoperation trials
-VALVE_TICKS = 500
+VALVES_S = 0.5
+"""So often the swing's rows are fitted anew for overlap and supply pressure of the valves (ours)."""
 RESIDUAL_LIMIT, RESIDUAL_ENERGY, RESIDUAL_TICKS = 1e-2, 200.0, 100
 """Relative bond residual that ends a trial, once so many joules were exchanged; looked at every 100 ticks."""
 
@@ -204,7 +205,7 @@ class MachineLoop(Loop):
     def _look_at_valves(self, tick: int) -> None:
         """Identify them, and let the law go by what is known so far: what it learns of inertias hangs on it."""
         self.valves.step(self.demand.valve, self._seen, self.terms)
-        if tick >= VALVE_TICKS and tick % VALVE_TICKS == 0:
+        if tick and tick % round(VALVES_S / self.dt) == 0:
             self.valves.solve()
             self.law.deadband[:], self.law.supply[:] = self.valves.compensated, self.valves.supply
 

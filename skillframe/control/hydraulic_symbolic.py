@@ -82,23 +82,8 @@ def law_function(chain: ClosedChain, axes: tuple[int, int]) -> ca.Function:
     rubbed = _adapted(friction, drive_f, [b[1] for b in rub_bounds], gain["dt"])
     limits = (b[0] for b in (*bounds, *rub_bounds))
     inputs = (
-        s.z,
-        s.zd,
-        p_a,
-        p_b,
-        force,
-        *reference,
-        theta,
-        rub,
-        memory,
-        deadband,
-        supply,
-        *limits,
-        table,
-        k_x,
-        k_f,
-        scalars,
-    )
+        s.z, s.zd, p_a, p_b, force, *reference, theta, rub, memory, deadband, supply, *limits, table, k_x, k_f, scalars,
+    )  # fmt: skip
     present = c["area_a"] * p_a - c["area_b"] * p_b
     return _function("law", inputs, (valve, f_pr, present, learned, rubbed, ca.vertcat(value.T, slope.T, bristle.T)))
 
