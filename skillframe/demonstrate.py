@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from skillframe.blind_teacher import BlindSettings
+from skillframe.demonstration.convention import STANDARD
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import SkillframeError
 from skillframe.executor import Result, Setup, simulate
@@ -76,10 +77,11 @@ def record(
     def keep(trace: Trace, slot: int, number: int) -> Demonstration:
         return demonstration_from(trace, scene, settings, sensors, seed=seed, slot=slot, attempt=number)
 
-    return collect(scene, count, attempt, keep, progress)
+    return collect(robot, scene, count, attempt, keep, progress)
 
 
 def collect(
+    robot: RobotModel,
     scene: Scene,
     count: int,
     attempt: Callable[[list[int], int], Result],
@@ -89,7 +91,8 @@ def collect(
     """Let a teacher attempt what is still missing until every slot has its demonstration.
 
     Args:
-        scene: for the message.
+        robot: for the messages.
+        scene: for the messages.
         count: slots to be filled.
         attempt: runs the slots, the so many-th time.
         keep: makes the demonstration of a slot from its trace and the number of the attempt.
@@ -100,6 +103,8 @@ def collect(
     """
     done: dict[int, Demonstration] = {}
     rejected: list[str] = []
+    if progress is not None:
+        progress(beginning(robot, scene, count))
     for number in range(MOST_ATTEMPTS):
         slots = [slot for slot in range(count) if slot not in done]
         result = attempt(slots, number)
@@ -117,6 +122,11 @@ def collect(
         f"world {scene.name}: the teacher failed {MOST_ATTEMPTS} times for one demonstration "
         f"(last: {rejected[-1]}); lower the noise or choose another start"
     )
+
+
+def beginning(robot: RobotModel, scene: Scene, count: int) -> str:
+    """Said once nothing speaks against the recording any more."""
+    return f"{robot.spec.name} in {scene.name}: recording {count} demonstration{'s' * (count != 1)} ..."
 
 
 def _attempt(
@@ -159,7 +169,7 @@ def demonstration_from(
         "contact": bool(scene.fixture), "simulated": {**asdict(settings), **provenance},
         "robot": trace.meta["robot"], "world": {"name": scene.name, "params": scene.params},
         "sensor": {"force_noise": noise.force_noise, "torque_noise": noise.torque_noise},
-        "stages": [time for time, _ in trace.meta["events"]],
+        "stages": [time for time, _ in trace.meta["events"]], "wrench": dict(STANDARD),
     }  # fmt: skip
     return Demonstration(
         time=trace.time.copy(), position=pose.at(-handle).position, quaternion=trace.quaternion.copy(),

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from skillframe.blind_teacher import LEVER, BlindSettings, BlindTeacher
-from skillframe.demonstrate import MOST_ATTEMPTS, Recording, demonstration_from
+from skillframe.demonstrate import MOST_ATTEMPTS, Recording, beginning, demonstration_from
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError, SkillframeError
 from skillframe.executor import Result, Setup, simulate
@@ -57,6 +57,8 @@ def record_blind(
         raise InputError(f"world {scene.name}", "has no surface to search on", "choose peg_in_hole or socket")
     done: dict[int, Demonstration] = {}
     rejected: list[str] = []
+    if progress is not None:
+        progress(beginning(robot, scene, count))
     for attempt in range(MOST_ATTEMPTS):
         slots = [slot for slot in range(count) if slot not in done]
         result, handle = _attempt(robot, scene, settings, slots, attempt, seed, draws or {}, rate_hz, sensors)

@@ -52,6 +52,7 @@ def record_operated(
         SkillframeError: a slot still fails after 20 attempts; says with what.
     """
     require_stable_loop(settings)
+    _require_direction(scene)
 
     def attempt(slots: list[int], number: int) -> Result:
         rngs = [np.random.default_rng([seed, slot, number]) for slot in slots]
@@ -61,7 +62,7 @@ def record_operated(
     def keep(trace: Trace, slot: int, number: int) -> Demonstration:
         return demonstration_of_machine(trace, scene, settings, seed=seed, slot=slot, attempt=number)
 
-    return collect(scene, count, attempt, keep, progress)
+    return collect(robot, scene, count, attempt, keep, progress)
 
 
 def operate(
@@ -88,13 +89,17 @@ def operate(
         rate_hz: of the traces.
         duration_s: longest demonstration, without the swing in the air.
     """
-    if scene.task.direction is None:
-        raise InputError(f"world {scene.name}", "gives the operator nowhere to push", "choose another world")
+    _require_direction(scene)
     operator = Operator(scene.task, fixture_poses(robot, draws, len(rngs)), settings)
     setup = Setup(robot=robot, scene=scene, stop_when=scene.task.done or scene.goal)
     result = simulate(operator, setup, draws, rngs, duration_s=duration_s, trace_hz=rate_hz)
     done = result.status == Status.SUCCESS
     return replace(result, success=done, failure=np.where(done, "", result.failure))
+
+
+def _require_direction(scene: Scene) -> None:
+    if scene.task.direction is None:
+        raise InputError(f"world {scene.name}", "gives the operator nowhere to push", "choose another world")
 
 
 def demonstration_of_machine(

@@ -210,10 +210,19 @@ def _show(found: Audit) -> None:
     click.echo("  " + ("usable" if found.usable else "NOT usable") + f", {counted(len(found.warnings), 'warning')}")
 
 
+WRENCH_WORDS: dict[str, Callable[[Any], str]] = {
+    "sign": lambda sign: f"{sign} on tool", "point": lambda point: f"at the {point} point",
+    "frame": lambda frame: f"{frame} axes",
+    "includes_tool_weight": lambda it_does: f"{'with' if it_does else 'without'} the tool's weight",
+}  # fmt: skip
+
+
 def _declared(found: Audit) -> str:
+    """What the metadata say about the wrench, as it is after reading."""
     frames = f"; points {', '.join(found.frames)}" if found.frames else ""
-    said = ", ".join(f"{k} {v}" for k, v in found.wrench.items()) or "not declared: environment on tool, base axes"
-    return said + frames
+    words = [say(found.wrench[key]) for key, say in WRENCH_WORDS.items() if key in found.wrench]
+    words += [f"{key} {value}" for key, value in found.wrench.items() if key not in WRENCH_WORDS]
+    return (", ".join(words) or "not declared, taken as environment on tool, base axes") + frames
 
 
 def six(values: list[float]) -> str:

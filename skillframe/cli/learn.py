@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from skillframe.cli.endings import SKILL
+from skillframe.cli.words import tell
 
 if TYPE_CHECKING:
     from skillframe.demonstration.record import Demonstration
@@ -56,8 +57,7 @@ def command(
     save(document, out)
     _warn(demonstrations)
     lines = kind.describe(document) if kind.describe is not None else [kind.summary]
-    for line in [f"{out}: {kind.name} from {len(files)} demonstration{'s' * (len(files) != 1)}", *lines]:
-        click.echo(line, err=as_json)
+    tell([f"{out}: {kind.name} from {len(files)} demonstration{'s' * (len(files) != 1)}", *lines], err=as_json)
     if as_json:
         from skillframe.cli.output import emit_json
 

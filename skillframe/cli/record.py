@@ -85,7 +85,6 @@ def command(
     machine, scene = load_robot_model(robot), load_world(world, params)
     common: dict[str, Any] = {"count": count, "seed": seed, "draws": draws, "progress": _progress}
     common |= {} if rate is None else {"rate_hz": rate}
-    _progress(f"{machine.spec.name} in {world}: recording {count} ...")
     if machine.spec.actuation or any(map(_given, operated.values())):
         recording = _operated(
             machine, scene, teacher, {**operated, "noise": noise, "delay": delay, "scale": scale}, common

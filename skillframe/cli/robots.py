@@ -80,18 +80,25 @@ def check(robot: str, as_json: bool) -> int:
 
 @command.command()
 @click.argument("robot", metavar="NAME|URDF")
-def show(robot: str) -> None:
+@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
+def show(robot: str, as_json: bool) -> None:
     """What a robot is like: joints, limits, home, mass, tool frames.
 
     \b
     Example:
-      skillframe robots show panda
+      skillframe robots show panda --json
     """
+    from skillframe.cli.output import emit_json
+    from skillframe.robot.describe import as_json as plain
     from skillframe.robot.describe import describe
     from skillframe.robot.model import load_model
     from skillframe.robot.spec import load_robot
 
-    click.echo(describe(load_model(load_robot(robot))))
+    model = load_model(load_robot(robot))
+    if as_json:
+        emit_json(plain(model))
+    else:
+        click.echo(describe(model))
 
 
 def _plain(result: Audit) -> dict[str, object]:

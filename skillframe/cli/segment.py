@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from skillframe.cli.endings import SKILL
+from skillframe.cli.words import tell
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from skillframe.records import Document
 
 
@@ -65,18 +64,11 @@ def command(
     document = learned(kind, [read_demonstration(path) for path in files], options)
     save(document, out)
     count = len(document["phases"])
-    _tell(
-        [f"{out}: {count} phase{'s' * (count != 1)} from {len(files)} demonstration{'s' * (len(files) != 1)}"], as_json
-    )
-    _tell(kind.describe(document) if kind.describe is not None else [kind.summary], as_json)
+    made = f"{out}: {count} phase{'s' * (count != 1)} from {len(files)} demonstration{'s' * (len(files) != 1)}"
+    tell([made, *(kind.describe(document) if kind.describe is not None else [kind.summary])], err=as_json)
     if as_json:
         _emit(document)
     return 0
-
-
-def _tell(lines: Sequence[str], to_stderr: bool) -> None:
-    for line in lines:
-        click.echo(line, err=to_stderr)
 
 
 def _emit(document: Document) -> None:

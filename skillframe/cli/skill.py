@@ -10,6 +10,7 @@ import click
 
 from skillframe.cli.endings import PAGE
 from skillframe.cli.output import emit_json
+from skillframe.cli.words import tell
 
 if TYPE_CHECKING:
     from skillframe.records import Document, Illustration
@@ -55,8 +56,7 @@ def show(file: Path, as_json: bool) -> None:
     if as_json:
         emit_json({**document, "words": words})
         return
-    for line in words:
-        click.echo(line)
+    tell(words)
     sources = ", ".join(source["file"] for source in document["learned_from"])
     made = _maker(document["created_by"])
     click.echo(f"learned from {sources or 'nothing'}; made by {made}")

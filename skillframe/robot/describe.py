@@ -1,11 +1,14 @@
-"""A robot in words and figures a person can read; degrees only here, with the unit written."""
+"""A robot in words and figures a person can read, degrees only there and with their unit; and the same as JSON."""
 
 from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from skillframe.frames import rotation_vector
+from skillframe.frames import quaternion_from_matrix, rotation_vector
 from skillframe.robot.bodies import rigid_bodies
 from skillframe.robot.kinematics import tool_pose
 from skillframe.robot.link_checks import given_inertias
@@ -15,15 +18,15 @@ from skillframe.robot.model import RobotModel
 def describe(robot: RobotModel) -> str:
     """Joints with limits and home, mass, arms with the tool's pose at home."""
     spec, model = robot.spec, robot.model
-    mass = sum(g.mass for g in given_inertias(robot).values())
-    moving = len(rigid_bodies(robot.urdf)) - (spec.base == "fixed")
+    mass, moving = _mass(robot), _moving(robot)
     lines = [
         f"{spec.name}: {spec.summary}" if spec.summary else spec.name,
         f"  base {spec.base}, {moving} moving bodies, nq {model.nq}, nv {model.nv}, {mass:.4g} kg",
         f"  control {spec.control.rate_hz:g} Hz, fixture at {_triple(spec.workspace.fixture)} m in base",
         f"  limits {_limits(robot)}",
     ]
-    lines += ["", f"  {'joint':<20}{'home':>16}{'lower':>12}{'upper':>12}{'velocity/s':>12}{'effort':>10}"]
+    lines += ["", "  joints that turn in rad, rad/s and Nm, joints that slide in m, m/s and N"]
+    lines += [f"  {'joint':<20}{'home':>16}{'lower':>12}{'upper':>12}{'velocity':>12}{'effort':>10}"]
     lines += [_joint(robot, index) for index in range(1, model.njoints)]
     for arm, frame in zip(spec.arm, robot.tool_frames, strict=True):
         pose = tool_pose(model, robot.home, frame)
@@ -34,6 +37,62 @@ def describe(robot: RobotModel) -> str:
     return "\n".join(lines)
 
 
+def as_json(robot: RobotModel) -> dict[str, Any]:
+    """The same for scripts, in SI units and radians; null where there is no limit, or no home of its own."""
+    spec, model = robot.spec, robot.model
+    return {
+        "name": spec.name, "summary": spec.summary, "base": spec.base, "nq": model.nq, "nv": model.nv,
+        "mass_kg": _mass(robot), "moving_bodies": _moving(robot), "rate_hz": spec.control.rate_hz,
+        "fixture_m": [float(x) for x in spec.workspace.fixture], "limits": asdict(spec.limits),
+        "joints": [_joint_values(robot, index) for index in range(1, model.njoints)],
+        "arms": [_arm_values(robot, i) for i in range(len(spec.arm))],
+    }  # fmt: skip
+
+
+def _joint_values(robot: RobotModel, index: int) -> dict[str, Any]:
+    model, joint = robot.model, robot.model.joints[index]
+    names = ("unit", "home", "lower", "upper", "velocity", "effort")
+    values: dict[str, Any] = {"name": model.names[index], "freedoms": joint.nv, **dict.fromkeys(names)}
+    if joint.nv == 1:
+        speed, effort = model.velocityLimit[joint.idx_v], model.effortLimit[joint.idx_v]
+        figures = (_home(robot, joint), *(_bounds(robot, joint) or (None, None)), _finite(speed), _finite(effort))
+        values |= dict(zip(names, (_unit(joint), *figures), strict=True))
+    return values
+
+
+def _arm_values(robot: RobotModel, index: int) -> dict[str, Any]:
+    arm, pose = robot.spec.arm[index], tool_pose(robot.model, robot.home, robot.tool_frames[index])
+    return {
+        "name": arm.name, "tool_frame": arm.tool_frame, "home_position_m": pose.position.tolist(),
+        "home_quaternion_xyzw": quaternion_from_matrix(pose.rotation).tolist(),
+    }  # fmt: skip
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _mass(robot: RobotModel) -> float:
+    return float(sum(g.mass for g in given_inertias(robot).values()))
+
+
+def _moving(robot: RobotModel) -> int:
+    return len(rigid_bodies(robot.urdf)) - (robot.spec.base == "fixed")
+
+
+def _home(robot: RobotModel, joint: pin.JointModel) -> float:
+    """Value of a joint of one freedom at home [rad or m]; a continuous one holds cosine and sine."""
+    if joint.nq == 2:
+        return float(np.arctan2(robot.home[joint.idx_q + 1], robot.home[joint.idx_q]))
+    return float(robot.home[joint.idx_q])
+
+
+def _bounds(robot: RobotModel, joint: pin.JointModel) -> tuple[float, float] | None:
+    """Its range, or None where it turns or slides freely."""
+    low, high = (limit[joint.idx_q] for limit in (robot.model.lowerPositionLimit, robot.model.upperPositionLimit))
+    return (float(low), float(high)) if joint.nq == 1 and low < high else None
+
+
 def _joint(robot: RobotModel, index: int) -> str:
     model, joint = robot.model, robot.model.joints[index]
     name = f"  {model.names[index]:<20}"
@@ -41,14 +100,9 @@ def _joint(robot: RobotModel, index: int) -> str:
         return f"{name}{'follows another':>16}"
     if joint.nv > 1:
         return f"{name}{f'{joint.nv} freedoms':>16}"
-    value = robot.home[joint.idx_q]
-    bounds = ["free", "free"]
-    if joint.nq == 2:
-        value = np.arctan2(robot.home[joint.idx_q + 1], robot.home[joint.idx_q])
-    elif model.lowerPositionLimit[joint.idx_q] < model.upperPositionLimit[joint.idx_q]:
-        bounds = [f"{limit[joint.idx_q]:.4g}" for limit in (model.lowerPositionLimit, model.upperPositionLimit)]
+    value, bounds = _home(robot, joint), [f"{limit:.4g}" for limit in _bounds(robot, joint) or ()] or ["free", "free"]
     speed, effort = model.velocityLimit[joint.idx_v], model.effortLimit[joint.idx_v]
-    return f"{name}{f'{value:.4f} {_unit(joint)}':>16}{bounds[0]:>12}{bounds[1]:>12}{speed:>12.4g}{effort:>10.4g}"
+    return f"{name}{f'{value:.4f} {_unit(joint)}':>16}{bounds[0]:>12}{bounds[1]:>12}{speed:>12.4g}{effort:>10.6g}"
 
 
 def _unit(joint: pin.JointModel) -> str:

@@ -146,6 +146,7 @@ def test_every_world_can_be_demonstrated(world):
         assert np.isfinite(one.wrench).all()
         assert one.rate == pytest.approx(500.0)
         assert one.meta["teacher"] == "kinesthetic"
+        assert one.meta["wrench"]["frame"] == "base" and one.meta["wrench"]["sign"] == "environment"
         touched = norm(one.wrench[:, :3]).max() > 3.0
         assert touched == (world != "free")
 

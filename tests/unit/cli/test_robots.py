@@ -108,3 +108,21 @@ def test_an_unknown_robot_gets_a_suggestion_and_exit_code_2(capsys):
     for action in ("show", "check"):
         assert run(["robots", action, "pand"]) == 2
         assert "did you mean 'panda'" in capsys.readouterr().err
+
+
+def test_show_says_the_same_to_people_and_scripts(capsys):
+    assert run(["robots", "show", "panda"]) == 0
+    words = capsys.readouterr().out
+    assert run(["robots", "show", "panda", "--json"]) == 0
+    robot = json.loads(capsys.readouterr().out)
+    assert [j["name"] for j in robot["joints"]] == [f"joint{i}" for i in range(1, 8)]
+    assert all(f"{j['home']:.4f} {j['unit']}" in words for j in robot["joints"])
+    assert (robot["nq"], robot["nv"], robot["arms"][0]["tool_frame"]) == (7, 7, "flange")
+    assert abs(sum(x * x for x in robot["arms"][0]["home_quaternion_xyzw"]) - 1.0) < 1e-12  # rounding
+
+
+def test_what_a_joint_does_not_have_is_null_for_scripts(capsys):
+    assert run(["robots", "show", "hiab_xs031", "--json"]) == 0
+    joints = {j["name"]: j for j in json.loads(capsys.readouterr().out)["joints"]}
+    assert joints["lift_barrel_pivot"]["effort"] is None  # without a motor, and without a limit
+    assert joints["lift_piston"]["unit"] == "m" and joints["lift_piston"]["effort"] > 0.0
