@@ -189,10 +189,34 @@ def peg(seed: int, index: int = 0, *, noise: float = 8.0) -> Made:
     return hand.finish()
 
 
+def wipe(seed: int, index: int = 0, *, noise: float = 8.0) -> Made:
+    """Down onto a table that leans by up to 50 degrees, round and round on it, and up again."""
+    rng = np.random.default_rng([47, seed, index])
+    hand = Hand(rng=rng, noise=np.deg2rad(noise))
+    leaning = rng.normal(size=3) * np.array([1.0, 1.0, 0.0])
+    normal = rotation_matrix(rng.uniform(0.0, 0.9) * leaning / np.linalg.norm(leaning)) @ Z
+    across = np.cross(normal, rng.normal(size=3))
+    across /= np.linalg.norm(across)
+    hand.speed = rng.uniform(0.1, 0.2)
+    hand.move_free(-normal, rng.uniform(0.1, 0.2))
+    hand.mark()
+    wide, narrow = rng.uniform(0.03, 0.08) * np.array([1.0, rng.uniform(0.5, 1.0)])
+    period, turns = rng.uniform(1.0, 2.5), rng.uniform(2.2, 5.0)
+    for angle in np.arange(0.0, 2.0 * np.pi * turns, 2.0 * np.pi * DT / period):
+        aimed, size = hand.push(-normal)
+        stroke = -wide * np.sin(angle) * across + narrow * np.cos(angle) * np.cross(normal, across)
+        length = float(np.linalg.norm(stroke))
+        pushed = 0.5 * aimed + stroke / length
+        hand.tick(*contact(2.0 * np.pi / period * length * pushed, size * pushed, [normal], hand.friction))
+    hand.mark()
+    hand.move_free(normal, rng.uniform(0.1, 0.2))
+    return hand.finish()
+
+
 @cache
 def demonstrations(task: str, seed: int, count: int = 3, first: int = 0, **options: float) -> list[Made]:
     """`count` demonstrations of a task; the valley's sides in turn."""
     if task == "valley":
         return [valley(100 * seed + first + i, 1.0 if i % 2 == 0 else -1.0, **options) for i in range(count)]
-    make = {"ls": lower_and_slide, "hose": hose, "peg": peg}[task]
+    make = {"ls": lower_and_slide, "hose": hose, "peg": peg, "wipe": wipe}[task]
     return [make(seed, first + i, **options) for i in range(count)]

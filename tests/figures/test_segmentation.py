@@ -298,13 +298,43 @@ def test_the_real_snap_assembly():
     assert max(late) <= 0.45 and min(late) > 0.0  # a chatter would be a third switch
 
 
-def test_the_real_wiping_is_shown_and_not_gated():
+def test_the_real_wiping_is_one_phase_alike_in_all_and_no_lmc():
     base = recordings_dir()
     if base is None or not (base / "icsc_wiping").is_dir():
         pytest.skip("SKILLFRAME_RECORDINGS does not hold icsc_wiping")
     names = ("px", "py", "pz", "qx", "qy", "qz", "qw", "fx", "fy", "fz", "tx", "ty", "tz")
-    columns = "t=t," + ",".join(f"{n}={n.removeprefix('p')}" for n in names)
-    wipes = [read_demonstration(base / "icsc_wiping" / f"rim{i}.csv", columns=columns) for i in range(3)]
-    for phases in (None, 6):
-        for i, row in enumerate(policy(wipes, phases=phases)["demonstrations"]):
-            line(f"wiping rim{i}, phases {phases or 'found'}", "".join(str(k + 1) for k in row["labels"]))
+    w_first = {"qw": "qx", "qx": "qy", "qy": "qz", "qz": "qw"}  # what the pad's normal says that the columns hold
+    for reading, order, frame in (("as labelled", {}, "base"), ("w-first, tool's axes", w_first, "tool")):
+        columns = "t=t," + ",".join(f"{n}={order.get(n, n.removeprefix('p'))}" for n in names)
+        wipes = [
+            read_demonstration(base / "icsc_wiping" / f"rim{i}.csv", columns=columns, wrench_frame=frame)
+            for i in range(3)
+        ]
+        document = policy(wipes)
+        turning = document["phase_model"]["round"]
+        for i, (one, row) in enumerate(zip(wipes, document["demonstrations"], strict=True)):
+            lines = (base / "icsc_wiping" / f"rim{i}.labels.csv").read_text().split()
+            by_hand = [float(one.time[int(text.split(",")[0])]) for text in lines[2:4]]
+            edges = [row["start"], *row["boundaries"], row["end"]]
+            (k,) = (k for k, label in enumerate(row["labels"]) if label == turning)
+            found = f"{edges[k]:.2f} to {edges[k + 1]:.2f} s", f"{by_hand[0]:.2f} to {by_hand[1]:.2f} s"
+            line(f"rim{i}, {reading}", "".join(str(n + 1) for n in row["labels"]), *found)
+            assert edges[k] < by_hand[0] + 0.5 and edges[k + 1] > by_hand[1] - 0.5  # hand labels lead contact by that
+
+
+@pytest.mark.parametrize("noise", [8.0, 15.0])
+def test_wipes_of_all_kinds_are_one_phase_and_nothing_else_is(noise):
+    alike, total, stray = 0, NOTHING, 0
+    for seed in range(7300, 7312):
+        taught = made.demonstrations("wipe", seed, noise=noise)
+        document = policy([t.demonstration for t in taught])
+        turning, rows = document["phase_model"].get("round"), document["demonstrations"]
+        alike += all(row["labels"].count(turning) == 1 for row in rows)
+        for one, row in zip(taught, rows, strict=True):
+            total += score([(c, c) for c in one.changes], row["boundaries"])
+        for task in ("valley", "ls", "hose", "peg"):
+            one_task = made.demonstrations(task, seed, noise=noise)
+            stray += "round" in policy([t.demonstration for t in one_task])["phase_model"]
+    line(f"wipes, {noise:.0f} degrees", f"{alike}/12", f"{total.missed}/{total.changes}", total.false, total.largest)
+    line("    other tasks with a round", f"{stray}/48")
+    assert alike >= 11 and stray == 0

@@ -111,3 +111,10 @@ def test_the_projection_keeps_angles_from_its_centre_and_can_be_undone(centre: l
     assert np.allclose(norm(points), np.degrees(np.arccos(np.clip(directions @ plane.centre, -1, 1))), atol=1e-6)
     for tangent, k in ((plane.right, plane.labels[0]), (plane.up, plane.labels[1])):
         assert tangent["xyz".index(k)] > 0.0 or math.isclose(tangent["xyz".index(k)], 0.0)
+
+
+def test_a_stiffness_of_which_only_rounding_is_left_is_read_as_none() -> None:
+    """Three compliant axes leave k (I - sum a a^T), zero but for rounding, which may be just below it."""
+    given = learned(registry().skill("lmc"), CASES["valley"], LearnOptions())
+    part = {**given["phases"][0]["rotation"], "stiffness": [[2e-15, 0.0, 0.0], [0.0, -4e-15, 1e-15], [0.0, 1e-15, 0.0]]}
+    assert describe({**given, "phases": [{**given["phases"][0], "rotation": part}]})

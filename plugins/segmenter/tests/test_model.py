@@ -74,7 +74,7 @@ def test_em_never_loses_likelihood_while_the_motion_is_fitted(kind):
     settings = Settings()
     prepared = prepare(demonstrations, settings, kind)
     data = em.gather(prepared.seen, prepared.drive, settings)
-    posterior = em._leaky(em._by_time(data, 2), 2)
+    posterior = em._leaky(em._by_time(data.lengths, 2), 2)
     weights = transitions.prior_weights(2, data.regressors.shape[1], settings.stay_s)
     steps = em._steps(data, transitions.probabilities(weights, data.regressors))
     trail = []

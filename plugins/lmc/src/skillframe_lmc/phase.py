@@ -129,7 +129,7 @@ def _unit(vector: Float, where: str) -> Float:
 
 def _gain(values: dict[str, Any], key: str, where: str) -> Float:
     matrix = np.array(_get(values, key, tuple[Vector, Vector, Vector], where))
-    scale = max(float(np.abs(matrix).max()), 1e-12)
+    scale = max(float(np.abs(matrix).max()), 1.0)  # 1 N/m: what rounding leaves of no stiffness is none
     if np.abs(matrix - matrix.T).max() > 1e-9 * scale or np.linalg.eigvalsh(matrix).min() < -1e-9 * scale:
         raise InputError(f"{where}.{key}", "should be symmetric and positive semi-definite", "learn the skill again")
     return matrix

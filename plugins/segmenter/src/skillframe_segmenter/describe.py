@@ -24,9 +24,15 @@ def describe(document: Document) -> list[str]:
     lines = [
         f"policy of {count} phase{'s' * (count != 1)}; {SIGNALS.get(kind, 'a phase gives way when it comes to rest')}"
     ]
+    turning = document["phase_model"].get("round")
     for i, words in enumerate(_words(policy)):
         corner = "└─" if i + 1 == count else "├─"
         lines.append(f"{corner} phase {i + 1}: {words[0]}; then {successor_words(policy.successors, i)}")
+    if turning is not None:
+        lines.append(
+            f"phase {turning + 1} is not an LMC: it goes round and round, and no linear motion comes back against its "
+            "own direction; run, it will not repeat what was shown"
+        )
     again = f"begun anew at most {policy.recoveries} time{'s' * (policy.recoveries != 1)}"
     lines.append(f"a phase that fails (its force, time or travel limit) is {again if policy.recoveries else 'the end'}")
     for row in document.get("demonstrations", []):

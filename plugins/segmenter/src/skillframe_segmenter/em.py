@@ -7,8 +7,9 @@ Windows are correlated, so the emission is tempered, in the E-step and in the cr
 
 Without it a criterion finds phases in the noise of a long recording. Each number of phases starts twice, from equal
 shares of time and from groups of change points; the start that ends at the better likelihood is kept. Transitions stay
-at their prior until the motion has converged and are then fitted to the wrench in three rounds. The papers fit such a
-model by EM and give no constants; all of these are ours.
+at their prior until the motion has converged and are then fitted to the wrench in three rounds. Windows that go round
+(see `rounds`) belong to the last phase, and it to them; the others are fitted as if it were not there. The papers fit
+such a model by EM and give no constants; all of these are ours.
 """
 
 from __future__ import annotations
@@ -61,6 +62,7 @@ class Data(NamedTuple):
         regressors: (W, R) what drives the transitions.
         inside: (B, T) which windows of the longest demonstration's length each has.
         temper: eta.
+        going: (W,) windows of the phase that goes round, which is the last; None if there is no such phase.
         ruled: (W, K) added to log densities: `NEVER` where a person has said that a window is of another phase; None
             if nobody has said anything.
     """
@@ -69,7 +71,13 @@ class Data(NamedTuple):
     regressors: Float
     inside: NDArray[np.bool_]
     temper: float
+    going: NDArray[np.bool_] | None = None
     ruled: Float | None = None
+
+    @property
+    def straight(self) -> NDArray[np.bool_]:
+        """(W,) windows that do not go round."""
+        return np.ones(len(self.regressors), dtype=bool) if self.going is None else ~self.going
 
     @property
     def lengths(self) -> list[int]:
@@ -90,23 +98,32 @@ class Fit(NamedTuple):
     criterion: float
 
 
-def gather(demonstrations: Sequence[Features], regressors: Sequence[Float], settings: Settings) -> Data:
-    """Demonstrations as one body of data."""
+def gather(
+    demonstrations: Sequence[Features], regressors: Sequence[Float], settings: Settings,
+    going: Sequence[NDArray[np.bool_]] | None = None,
+) -> Data:  # fmt: skip
+    """Demonstrations as one body of data; `going` are the windows of each that go round, if that is a phase."""
     lengths = np.array([len(d.motion) for d in demonstrations])
     seen = emission.observe(
         np.concatenate([d.motion for d in demonstrations]), np.concatenate([d.contact for d in demonstrations])
     )
-    temper = settings.temper * float(np.clip(settings.temper_windows / lengths.mean(), 0.1, 1.0))
+    straight = lengths if going is None else np.array([int((~each).sum()) for each in going])
+    temper = settings.temper * float(np.clip(settings.temper_windows / max(straight.mean(), 1.0), 0.1, 1.0))
     inside = np.arange(lengths.max()) < lengths[:, None]
-    return Data(seen, np.concatenate(regressors), inside, temper)
+    return Data(seen, np.concatenate(regressors), inside, temper, None if going is None else np.concatenate(going))
 
 
 def best(data: Data, signals: Sequence[Float], phases: int, settings: Settings) -> Fit:
     """The better of the two starts for a number of phases, motion only; `signals` are what change points see."""
-    starts = [_by_time(data, phases)]
-    found = changepoints.grouped(signals, phases)
-    if found is not None and phases > 1:
+    straight = data.straight
+    others = phases - (data.going is not None)
+    starts = [_by_time([int(x.sum()) for x in data.split(straight)], others)]
+    parts = [x[mine] for x, mine in zip(signals, data.split(straight), strict=True) if mine.any()]
+    found = changepoints.grouped(parts, others)
+    if found is not None and others > 1:
         starts.append(np.concatenate(found))
+    if data.going is not None:
+        starts = [_placed(x, straight, phases - 1) for x in starts]
     return max((converge(data, _leaky(x, phases), settings) for x in starts), key=lambda fit: fit.log_likelihood)
 
 
@@ -117,8 +134,15 @@ def _leaky(labels: NDArray[np.intp], phases: int) -> Float:
     return posterior
 
 
-def _by_time(data: Data, phases: int) -> NDArray[np.intp]:
-    return np.concatenate([(np.arange(n) * phases) // n for n in data.lengths])
+def _by_time(lengths: Sequence[int], phases: int) -> NDArray[np.intp]:
+    return np.concatenate([(np.arange(n) * phases) // max(n, 1) for n in lengths])
+
+
+def _placed(labels: NDArray[np.intp], where: NDArray[np.bool_], other: int) -> NDArray[np.intp]:
+    """Labels of some windows among all, the rest labelled `other`."""
+    result = np.full(len(where), other, dtype=np.intp)
+    result[where] = labels
+    return result
 
 
 def converge(data: Data, posterior: Float, settings: Settings) -> Fit:
@@ -161,6 +185,8 @@ def with_transitions(data: Data, fit: Fit, settings: Settings) -> Fit:
 def log_densities(data: Data, model: Model) -> Float:
     """(W, K) tempered log densities, with what a person has ruled out."""
     result = model.temper * emission.log_likelihood(data.seen, model.phases)
+    if data.going is not None:
+        result += NEVER * (data.going[:, None] != (np.arange(model.count) == model.count - 1))
     return result if data.ruled is None else result + data.ruled
 
 
@@ -168,7 +194,15 @@ def _maximise(data: Data, posterior: Float, weights: Float) -> Model:
     k = posterior.shape[1]
     firsts = posterior[np.concatenate([[0], np.cumsum(data.lengths)[:-1]])]
     initial = 0.5 / k + 0.5 * firsts.mean(axis=0)
-    return Model(phases=emission.fit(data.seen, posterior), initial=initial, weights=weights, temper=data.temper)
+    return Model(phases=_moving(data, posterior), initial=initial, weights=weights, temper=data.temper)
+
+
+def _moving(data: Data, posterior: Float) -> Phases:
+    """How the phases move; the covariance of one that goes round is no measure for the others."""
+    if data.going is None:
+        return emission.fit(data.seen, posterior)
+    parts = emission.fit(data.seen, posterior[:, :-1]), emission.fit(data.seen, posterior[:, -1:])
+    return Phases(*(np.concatenate(pair) for pair in zip(*parts, strict=True)))
 
 
 def _expect(data: Data, model: Model, steps: Float) -> tuple[chain.Smoothed, Float]:
@@ -188,7 +222,7 @@ def _steps(data: Data, probabilities: Float) -> Float:
 def _fit(data: Data, model: Model, posterior: Float, log_likelihood: float) -> Fit:
     k, m = model.count, DIMENSIONS
     parameters = k * (2 * m + 0.25 * m * (m - 1) / 2) + k * (k - 1)
-    samples = max(data.temper * len(data.regressors), 2.0)
+    samples = max(data.temper * float(data.straight.sum()), 2.0)
     return Fit(model, posterior, log_likelihood, float(parameters * np.log(samples) - 2.0 * log_likelihood))
 
 

@@ -155,6 +155,8 @@ def _joined(
         if {one, two} <= touching and _one_push(bodies[one], bodies[two])
     ]
     for (one, two), parts in candidates:
+        if found["phase_model"].get("round") in (one, two):
+            continue
         if _part(kind.learn(parts, options), "translation").get("desired_direction") is not None:
             return _joined(relabelled(found, one, two), demonstrations, skill, options, stand_ins=stand_ins)
     return found
@@ -229,6 +231,8 @@ def relabelled(found: Document, one: int, two: int) -> Document:
         for before, after in pairwise([*row["labels"], count - 1]):
             counts[before][after] += 1.0
     model = {**found["phase_model"], "successors": counts}
+    if "round" in model:
+        model["round"] = number[model["round"]]
     if "phase_of" in model:
         model["phase_of"] = [number[k] for k in model["phase_of"]]
     return {**found, "phase_model": model, "demonstrations": rows}

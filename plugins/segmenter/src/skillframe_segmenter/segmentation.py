@@ -23,6 +23,7 @@ from skillframe_segmenter import em, gate, merge, model, runs
 from skillframe_segmenter.boundaries import OPTION
 from skillframe_segmenter.features import Features, Scales, features, scales, typical_scales
 from skillframe_segmenter.model import PhaseModel, Pose0
+from skillframe_segmenter.rounds import rounds
 from skillframe_segmenter.settings import WINDOW_S, Settings
 from skillframe_segmenter.windows import Windows, cut_all
 
@@ -37,7 +38,8 @@ class Prepared(NamedTuple):
 
     Attributes:
         cut: in windows; point: (3,) that was looked at; scale: of each; seen: features.
-        drive: (W, R) regressors of the transitions, by demonstration; origin: of poses, if they drive.
+        drive: (W, R) regressors of the transitions, by demonstration; going: windows (W,) of each that go round, if
+            that is a phase; origin: of poses, if they drive.
     """
 
     cut: list[Windows]
@@ -45,6 +47,7 @@ class Prepared(NamedTuple):
     scale: list[Scales]
     seen: list[Features]
     drive: list[Float]
+    going: list[NDArray[np.bool_]] | None
     origin: Pose0 | None
 
 
@@ -55,6 +58,7 @@ class Segmented(NamedTuple):
         fit: of the micro-phases; phase_of: (K,) phase of each.
         paths: micro-phase of every window; labels: phase of every window; both by demonstration.
         criterion: by number of micro-phases tried.
+        round: the phase that goes round and round, or None.
     """
 
     fit: em.Fit
@@ -62,6 +66,7 @@ class Segmented(NamedTuple):
     paths: list[Labels]
     labels: list[Labels]
     criterion: dict[int, float]
+    round: int | None = None
 
 
 def segment(
@@ -80,7 +85,7 @@ def segment(
     """
     chosen = build(Settings, settings, "--set")
     prepared = prepare(demonstrations, chosen, kind)
-    data = em.gather(prepared.seen, prepared.drive, chosen)
+    data = em.gather(prepared.seen, prepared.drive, chosen, prepared.going)
     _check_count(demonstrations, prepared.cut, phases)
     found = fit(data, prepared, phases, chosen)
     rows = rows_of(prepared.cut, found.labels, [d.source for d in demonstrations])
@@ -106,7 +111,7 @@ def refitted(
     """
     chosen, kind = build(Settings, settings, "--set"), document["phase_model"]["type"]
     prepared = prepare(demonstrations, chosen, kind)
-    data = em.gather(prepared.seen, prepared.drive, chosen)
+    data = em.gather(prepared.seen, prepared.drive, chosen, prepared.going)
     before = fit(data, prepared, phases, chosen)._replace(phase_of=np.array(document["phase_model"]["phase_of"]))
     found = _refit(data, prepared, before, rows, said, chosen)
     again = rows_of(prepared.cut, found.labels, [d.source for d in demonstrations])
@@ -121,6 +126,8 @@ def refitted(
 def _model_of(prepared: Prepared, found: Segmented, settings: Settings, kind: str) -> Document:
     document = model.to_document(online_model(prepared, found, settings), kind)
     document["criterion"] = {str(k): value for k, value in found.criterion.items()}
+    if found.round is not None:
+        document["round"] = found.round
     return document
 
 
@@ -129,10 +136,12 @@ def prepare(demonstrations: Sequence[Demonstration], settings: Settings, kind: s
     cut, point = cut_all(demonstrations, settings.at, settings.axes)
     scale = scales(cut)
     seen = [features(w, s) for w, s in zip(cut, scale, strict=True)]
+    going = rounds(cut, seen)
     if kind == "pose_hmm":
         origin = _origin(cut)
-        return Prepared(cut, point, scale, seen, [pose_regressors(w.position, w.rotation, origin) for w in cut], origin)
-    return Prepared(cut, point, scale, seen, [f.regressors for f in seen], None)
+        drive = [pose_regressors(w.position, w.rotation, origin) for w in cut]
+        return Prepared(cut, point, scale, seen, drive, going, origin)
+    return Prepared(cut, point, scale, seen, [f.regressors for f in seen], going, None)
 
 
 def _origin(cut: Sequence[Windows]) -> Pose0:
@@ -167,19 +176,32 @@ def _check_count(demonstrations: Sequence[Demonstration], cut: Sequence[Windows]
 def fit(data: em.Data, prepared: Prepared, phases: int | None, settings: Settings) -> Segmented:
     """Phases of prepared demonstrations, numbered in the order in which they appear."""
     signals = [np.hstack([f.motion, 0.5 * f.contact]) for f in prepared.seen]
-    most = min(settings.phases_max, min(w.size for w in prepared.cut) // FEWEST_PER_PHASE)
-    tried = {k: em.best(data, signals, k, settings) for k in (range(1, most + 1) if phases is None else [phases])}
+    goes_round = data.going is not None
+    if phases == 1 or not data.straight.any():
+        data, phases = data._replace(going=None), 1
+    tried = {k: em.best(data, signals, k, settings) for k in (_numbers(data, settings) if phases is None else [phases])}
     chosen = em.with_transitions(data, min(tried.values(), key=lambda f: f.criterion), settings)
     paths = em.paths(data, chosen.model)
     tidy = [runs.without_short(path, SHORT) for path in paths]
-    groups = np.arange(chosen.model.count)
+    count = chosen.model.count
+    groups = np.arange(count)
     if phases is None:
         travelled = np.concatenate([WINDOW_S * np.cumsum(w.motion, axis=0) for w in prepared.cut])
-        groups = np.array(merge.groups_of_one_motion(
-            data.seen, travelled, tidy, chosen.model.count, settings.merge_angle_rad, settings.merge_votes
-        ))  # fmt: skip
+        straight = count - (data.going is not None)
+        groups[:straight] = merge.groups_of_one_motion(
+            data.seen, travelled, tidy, straight, settings.merge_angle_rad, settings.merge_votes
+        )
     labels = [runs.without_short(groups[path], SHORT if phases else _shortest(path)) for path in tidy]
-    return _numbered(Segmented(chosen, groups, paths, labels, {k: f.criterion for k, f in tried.items()}))
+    criteria = {k: f.criterion for k, f in tried.items()}
+    return _numbered(Segmented(chosen, groups, paths, labels, criteria, count - 1 if goes_round else None))
+
+
+def _numbers(data: em.Data, settings: Settings) -> range:
+    """The numbers of phases that are tried."""
+    free = [int(each.sum()) for each in data.split(data.straight)]
+    most = min(settings.phases_max, min((n for n in free if n >= FEWEST_PER_PHASE), default=0) // FEWEST_PER_PHASE)
+    going = int(data.going is not None)
+    return range(1 + going, max(most, 1) + going + 1)
 
 
 def _shortest(path: Labels) -> int:
@@ -196,7 +218,8 @@ def _numbered(found: Segmented) -> Segmented:
                for k, g in enumerate(found.phase_of)]  # fmt: skip
     phase_of = np.array([number[int(found.phase_of[k])] for k in nearest], dtype=np.intp)
     labels = [np.array([number[int(x)] for x in each], dtype=np.intp) for each in found.labels]
-    return found._replace(phase_of=phase_of, labels=labels)
+    turning = None if found.round is None else number.get(found.round)
+    return found._replace(phase_of=phase_of, labels=labels, round=turning)
 
 
 def _refit(
@@ -210,7 +233,7 @@ def _refit(
         else np.zeros((w.size, k))
         for i, w in enumerate(prepared.cut)
     ]
-    held = data._replace(ruled=np.concatenate(ruled))
+    held = _said_to_go(data, prepared, found, rows, said)._replace(ruled=np.concatenate(ruled))
     start = em.converge(held, found.fit.posterior, settings)
     again = em.with_transitions(held, start, settings)
     paths = em.paths(held, again.model)
@@ -219,6 +242,19 @@ def _refit(
         for i, (w, path) in enumerate(zip(prepared.cut, paths, strict=True))
     ]
     return _numbered(found._replace(fit=again, paths=paths, labels=labels))
+
+
+def _said_to_go(
+    data: em.Data, prepared: Prepared, found: Segmented, rows: Sequence[Document], said: Set[int]
+) -> em.Data:  # fmt: skip
+    """The data with what goes round where a person has said so, in demonstrations that a person has spoken about."""
+    if data.going is None or len(found.phase_of) == 1:
+        return data._replace(going=None)
+    going = [
+        _labels_of(rows[i], w) == found.round if i in said else each
+        for i, (w, each) in enumerate(zip(prepared.cut, data.split(data.going), strict=True))
+    ]
+    return data._replace(going=np.concatenate(going))
 
 
 def _labels_of(row: Document, cut: Windows) -> Labels:

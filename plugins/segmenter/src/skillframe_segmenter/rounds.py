@@ -1,0 +1,106 @@
+r"""Motion that goes round and round, as a wipe does: no linear motion with compliance, whatever its direction.
+
+Contact lets a phase move by M d with M positive semidefinite, so that it never goes against its desired direction:
+
+    d . v = d^T M d >= 0,   hence   d . (x_j - x_i) = sum d . v h > 0        for all that moves along d at all.
+
+What comes back to where it was is therefore not one LMC. It may be several, there and back, or round by four straight
+strokes; a round has no straight strokes either. Windows i to j are a round if the tool
+
+    comes back:            |x_j - x_i| < path / 4, seen from the base and from the tool, which a crank turns along,
+    goes round something:  4 pi area > 0.3 path^2 (of a circle 1, of a square 0.8, of there and back 0),
+    turns all the time:    at least half of its windows turn by more than half of the mean, 2 pi / (j - i),
+    moves, and widely:     |u| > 1/2 in nine windows of ten, and 2 area / path, a circle's radius, is over 5 mm.
+
+Only the tightest count, those without a round inside, and they are put together to stretches of time. What a hand does
+by the way is no phase: stretches shorter than a quarter of the demonstration's longest are left out, and most
+demonstrations must have one. The law is that of the model; the constants are ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.frames import Float, norm, unit
+from skillframe_segmenter.features import Features
+from skillframe_segmenter.settings import WINDOW_S
+from skillframe_segmenter.windows import Windows
+
+SHORTEST, LONGEST = 6, 400  # windows
+BACK, ROUND, STEADY, MOVING, RADIUS_M = 0.25, 0.3, 0.5, 0.9, 0.005
+FAST, ASIDE = 0.5, 0.25  # |u|; of the longest stretch
+Mask = NDArray[np.bool_]
+
+
+def rounds(cut: Sequence[Windows], seen: Sequence[Features]) -> list[Mask] | None:
+    """Which windows of each demonstration go round; None if that is no phase of theirs."""
+    found = [going_round(w, f) for w, f in zip(cut, seen, strict=True)]
+    return found if 2 * sum(bool(each.any()) for each in found) > len(found) else None
+
+
+def going_round(cut: Windows, seen: Features) -> Mask:
+    """Which windows (W,) of a demonstration belong to a round."""
+    step = WINDOW_S * cut.motion[:, :3]
+    turn = _turning(unit(step))
+    sums = _Sums(step, np.einsum("tji,tj->ti", cut.rotation, step), norm(seen.motion[:, :3]) > FAST)
+    result, count = np.zeros(cut.size, dtype=bool), cut.size
+    first_end = np.full(count + 1, 2 * count)  # of the rounds found that begin here or later
+    for length in range(SHORTEST, min(LONGEST, count) + 1):
+        axis, fine = sums.loops(length)
+        starts = np.flatnonzero(fine & (first_end[: len(fine)] > np.arange(len(fine)) + length))
+        if len(starts):
+            inside = starts[:, None] + np.arange(length - 1)
+            steady = np.vecdot(turn[inside], axis[starts, None]) > np.pi / length
+            for i in starts[steady.mean(axis=1) >= STEADY].tolist():
+                result[i : i + length] = True
+                first_end[: i + 1] = np.minimum(first_end[: i + 1], i + length)
+    return _without_asides(result)
+
+
+def _without_asides(going: Mask) -> Mask:
+    """Without stretches that are short beside the longest."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], going.astype(np.intp), [0]])))
+    starts, stops = edges[::2], edges[1::2]
+    result = going.copy()
+    for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
+        result[start:stop] = stop - start >= ASIDE * (stops - starts).max()
+    return result
+
+
+class _Sums:
+    """Running sums of a path, from which any stretch of it is judged."""
+
+    def __init__(self, step: Float, step_of_tool: Float, moving: Mask) -> None:
+        """Steps (W, 3) in base axes, the same in the tool's, and whether it moves (W,)."""
+        self.place, self.place_of_tool = _running(step), _running(step_of_tool)
+        self.area = _running(0.5 * np.cross(self.place[:-1], step))
+        self.path = _running(norm(step))
+        self.moving = _running(moving.astype(float))
+
+    def loops(self, length: int) -> tuple[Float, Mask]:
+        """Axis (W + 1 - length, 3) of what stretches of `length` windows enclose, and whether they may be rounds."""
+        back, back_of_tool, area, path, moving = (
+            x[length:] - x[:-length] for x in (self.place, self.place_of_tool, self.area, self.path, self.moving)
+        )
+        area = area - 0.5 * np.cross(self.place[:-length], back)
+        size = norm(area)
+        fine = (np.maximum(norm(back), norm(back_of_tool)) < BACK * path) & (2.0 * size > RADIUS_M * path)
+        fine &= (4.0 * np.pi * size > ROUND * path * path) & (moving >= MOVING * length)
+        return area / np.maximum(size, 1e-12)[:, None], fine
+
+
+def _running(x: Float) -> Float:
+    return np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x, axis=0)])
+
+
+def _turning(direction: Float) -> Float:
+    """(W - 1, 3) rotation vectors from each direction (W, 3) to the next."""
+    one, two = direction[:-1], direction[1:]
+    axis = np.cross(one, two)
+    size = norm(axis)
+    angle = np.arctan2(size, np.vecdot(one, two))
+    result: Float = axis * (angle / np.maximum(size, 1e-12))[:, None]
+    return result
