@@ -9,7 +9,8 @@ holds the interpreter's lock; a hang thus becomes a death like any other.
 from __future__ import annotations
 
 import logging
-import tempfile
+import shutil
+import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from itertools import count
@@ -18,11 +19,12 @@ from typing import Any
 
 from skillframe.campaign.driver import Answer, Died, Evaluate, Raised
 from skillframe.campaign.rows import ChunkJob, Row
-from skillframe.campaign.worker import guarded
+from skillframe.campaign.worker import guarded, share_file
 from skillframe.errors import SkillframeError
 
 THREADS = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 CONNECT_S = 30.0
+LOOK_S, TELL_S = 0.01, 1.0
 _MEMORY_LOGGER = "distributed.nanny.memory"
 
 
@@ -53,23 +55,24 @@ class ClusterPool:
         workers: number of local processes, where no scheduler is given.
         scheduler: address of a running scheduler, whose workers see the campaign's folder under the same path.
         memory_bytes: limit per local worker; None shares the machine's memory between them and this process.
-        watch: folder for the watchdogs' files, seen by all workers; None for a temporary one.
+        watch: folder for the workers' files, seen by all of them: made anew, and removed at the end.
+        tell: told now and then how many trials' worth of the jobs in flight is done.
 
     Raises:
         SchedulerError: the scheduler does not answer, has no workers, or has workers of several threads.
     """
 
     def __init__(
-        self, evaluate: Evaluate, seconds: Callable[[ChunkJob], float], *, workers: int = 1,
-        scheduler: str | None = None, memory_bytes: int | None = None, watch: Path | None = None,
+        self, evaluate: Evaluate, seconds: Callable[[ChunkJob], float], *, watch: Path, tell: Callable[[float], None],
+        workers: int = 1, scheduler: str | None = None, memory_bytes: int | None = None,
     ) -> None:  # fmt: skip
         import dask
         from distributed import as_completed
 
-        self._evaluate, self._seconds = evaluate, seconds
+        self._evaluate, self._seconds, self._watch, self._tell = evaluate, seconds, watch, tell
         self._stack = ExitStack()
         try:
-            self._watch = watch or Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="skillframe-")))
+            self._make_room()
             self._memory = self._listen()
             self._stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 0}))
             self._client = self._connect(scheduler) if scheduler else self._start(workers, memory_bytes)
@@ -80,6 +83,12 @@ class ClusterPool:
             raise
         self._jobs: dict[Any, tuple[ChunkJob, Path]] = {}
         self._number = count()
+
+    def _make_room(self) -> None:
+        """An empty folder for the workers' files; what a killed session left there goes."""
+        shutil.rmtree(self._watch, ignore_errors=True)
+        self._watch.mkdir(parents=True, exist_ok=True)
+        self._stack.callback(shutil.rmtree, self._watch, ignore_errors=True)
 
     def _listen(self) -> _MemoryDeaths:
         handler, logger = _MemoryDeaths(), logging.getLogger(_MEMORY_LOGGER)
@@ -134,13 +143,24 @@ class ClusterPool:
 
     def next(self) -> tuple[ChunkJob, Answer]:
         """Wait for the next job to end."""
+        self._wait()
         future = next(self._completed)
         job, watch = self._jobs.pop(future)
         try:
             return job, self._answer(future, watch)
         finally:
             future.release()
-            watch.unlink(missing_ok=True)
+            for path in (watch, share_file(watch)):
+                path.unlink(missing_ok=True)
+
+    def _wait(self) -> None:
+        """Until a job has ended; meanwhile tell how far those in flight are."""
+        due = time.monotonic() + TELL_S
+        while not self._completed.has_ready():
+            time.sleep(LOOK_S)
+            if time.monotonic() >= due:
+                self._tell(sum(_share(watch) * len(job.trials) for job, watch in self._jobs.values()))
+                due = time.monotonic() + TELL_S
 
     def _answer(self, future: Any, watch: Path) -> Answer:
         from distributed import KilledWorker
@@ -166,3 +186,11 @@ class ClusterPool:
         for future in list(self._jobs):
             future.cancel()
         self._stack.close()
+
+
+def _share(watch: Path) -> float:
+    """How far a job says that it is; nothing said yet, or half a number, is no progress."""
+    try:
+        return float(share_file(watch).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return 0.0

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
+from skillframe.campaign.pulse import heard
 from skillframe.campaign.rows import ChunkJob, Row
 from skillframe.errors import SkillframeError
 
@@ -147,12 +148,17 @@ def chunk_size(trials: int, workers: int, largest: int) -> int:
 
 
 class InProcess:
-    """A pool of one: this process; a trial that kills it ends the campaign, which can be resumed."""
+    """A pool of one: this process; a trial that kills it ends the campaign, which can be resumed.
+
+    Args:
+        evaluate: the work.
+        tell: told now and then how many trials' worth of the job is done.
+    """
 
     size = 1
 
-    def __init__(self, evaluate: Evaluate) -> None:
-        self._evaluate = evaluate
+    def __init__(self, evaluate: Evaluate, tell: Callable[[float], None]) -> None:
+        self._evaluate, self._tell = evaluate, tell
         self._jobs: deque[ChunkJob] = deque()
 
     def submit(self, job: ChunkJob) -> None:
@@ -163,7 +169,8 @@ class InProcess:
         """Run the next job now."""
         job = self._jobs.popleft()
         try:
-            return job, self._evaluate(job)
+            with heard(lambda share: self._tell(share * len(job.trials))):
+                return job, self._evaluate(job)
         except Exception as error:  # whatever a skill or world raises is that trial's outcome
             return job, Raised(error)
 

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import dataclasses
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from skillframe.campaign.axes import Value
+from skillframe.campaign.pulse import beat
 from skillframe.campaign.rows import EXTRA, OUTCOME, TRACE, ChunkJob, Row, plain_value, rows_of
 from skillframe.campaign.sampling import draws, trial_rngs
 from skillframe.campaign.spec import CampaignSpec
@@ -41,11 +43,11 @@ def evaluate(job: ChunkJob) -> list[Row]:
     groups: dict[tuple[Value, ...], list[int]] = {}
     for i, trial in enumerate(job.trials):
         groups.setdefault(tuple(plain_value(drawn[name][i]) for name in scenes), []).append(trial)
-    rows = {
-        row["trial"]: row
-        for values, trials in groups.items()
-        for row in _simulate(spec, job, tuple(trials), dict(zip(scenes, values, strict=True)))
-    }
+    rows: dict[int, Row] = {}
+    for values, trials in groups.items():
+        pulse = partial(_beat, len(rows), len(trials), len(job.trials), spec.duration_s)
+        found = _simulate(spec, job, tuple(trials), dict(zip(scenes, values, strict=True)), pulse)
+        rows |= {row["trial"]: row for row in found}
     return [rows[trial] for trial in job.trials]
 
 
@@ -100,7 +102,15 @@ def _scene(spec: CampaignSpec, varied: Mapping[str, Value]) -> Scene:
     return load_world(spec.world, {n.removeprefix("world."): v for n, v in settings.items() if n.startswith("world.")})
 
 
-def _simulate(spec: CampaignSpec, job: ChunkJob, trials: tuple[int, ...], scene: Mapping[str, Value]) -> list[Row]:
+def _beat(before: int, group: int, trials: int, duration_s: float, now: float) -> None:
+    """Say how far the chunk is: whole groups of trials, and the simulated time of one."""
+    beat((before + group * min(now / duration_s, 1.0)) / trials)
+
+
+def _simulate(
+    spec: CampaignSpec, job: ChunkJob, trials: tuple[int, ...], scene: Mapping[str, Value],
+    progress: Callable[[float], None],
+) -> list[Row]:  # fmt: skip
     """Rows of trials that share a scene."""
     robot = load_robot_model(str(spec.folder / spec.robot))
     _, document = load_skill(spec.skills[job.skill], spec.folder)
@@ -109,7 +119,7 @@ def _simulate(spec: CampaignSpec, job: ChunkJob, trials: tuple[int, ...], scene:
     varied = {name: values for name, values in draws(spec, trials).items() if name not in scene}
     result = simulate(
         skill, setup, {**constant, **varied}, trial_rngs(spec.seed, trials), duration_s=spec.duration_s,
-        trace_hz=TRACE_HZ if job.traces else None,
+        trace_hz=TRACE_HZ if job.traces else None, progress=progress,
     )  # fmt: skip
     if result.interrupted:  # rows that a Ctrl-C cut short are no outcome
         raise KeyboardInterrupt

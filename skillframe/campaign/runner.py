@@ -30,14 +30,24 @@ CHUNK = 64
 """Largest number of trials per job: batching has paid off by then, and a kill loses little."""
 TRACES = 8
 SAMPLE = 2
+WATCH = "watch"
+"""Folder in a campaign's folder for the files of the workers that run now."""
 
 
 class Progress(NamedTuple):
-    """How far a campaign is: rows stored, rows planned, and a sentence if there is something to say."""
+    """How far a campaign is.
+
+    Attributes:
+        done: rows stored.
+        total: rows planned.
+        note: a sentence if there is something to say.
+        under_way: how many rows' worth of the chunks in flight is done.
+    """
 
     done: int
     total: int
     note: str = ""
+    under_way: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +82,7 @@ def run_campaign(
         folder: made by `folder.prepare`.
         evaluate: runs a chunk; a function that worker processes can import.
         options: how to run.
-        notify: told after every chunk.
+        notify: told after every chunk, and now and then while chunks run.
         params: the world's parameter dataclass; None looks it up.
 
     Returns:
@@ -106,21 +116,27 @@ class _Session:
                 with closing(self._pool(evaluate)) as pool:
                     self.log.note({"environment": environment(), "workers": pool.size, "started": time.time()})
                     self._driver(pool, self._keep).run(self._jobs(pool.size))
-                    self._driver(pool, self._keep_traces).run(self._untraced())
+                    self._again(pool)
         finally:
             self.log.note({"wall_s": time.perf_counter() - start})
             summary = self._write()
         return summary
 
+    def _again(self, pool: Pool) -> None:
+        """Run once more what is to leave a trace."""
+        jobs = self._untraced()
+        if jobs:
+            self._tell(f"{sum(len(job.trials) for job in jobs)} of them run again, to leave traces")
+        self._driver(pool, self._keep_traces).run(jobs)
+
     def _pool(self, evaluate: Evaluate) -> Pool:
         if self.options.workers is None and self.options.scheduler is None:
-            return InProcess(evaluate)
+            return InProcess(evaluate, self._tell_share)
         from skillframe.campaign.cluster import ClusterPool
 
-        watch = self.spec.folder if self.options.scheduler else None
         return ClusterPool(
             evaluate, self._seconds, workers=self.options.workers or 1, scheduler=self.options.scheduler,
-            memory_bytes=self.options.memory_bytes, watch=watch,
+            memory_bytes=self.options.memory_bytes, watch=self.spec.folder.resolve() / WATCH, tell=self._tell_share,
         )  # fmt: skip
 
     def _seconds(self, job: ChunkJob) -> float:
@@ -153,6 +169,11 @@ class _Session:
 
     def _tell(self, note: str = "") -> None:
         self.notify(Progress(len(self.log.done), self.total, note))
+
+    def _tell_share(self, under_way: float) -> None:
+        """Between chunks; the traces at the end are no rows."""
+        if len(self.log.done) < self.total:
+            self.notify(Progress(len(self.log.done), self.total, under_way=under_way))
 
     def _complete(self) -> bool:
         return self.rule.after is not None or len(self.log.done) == self.total

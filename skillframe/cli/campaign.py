@@ -109,7 +109,7 @@ def status(folder: Path, as_json: bool) -> int:
     state = "complete" if now["complete"] else "unfinished"
     if now["running"]:
         state = f"running, process {now['running']['pid']} on {now['running']['host']}"
-    click.echo(f"{now['name']}: {now['rows']} of {now['planned_rows']} rows, {state}")
+    click.echo(f"{now['name']}: {now['rows']} of {now['planned_rows']} runs, {state}")
     _show_rates(now["skills"])
     if state == "unfinished":
         click.echo(f"to go on: skillframe campaign resume {folder}")
@@ -225,10 +225,10 @@ def _progress() -> Iterator[Callable[[Progress], None]]:
 
     console = Console(stderr=True)
     with Bar(console=console, transient=True) as bar:
-        task = bar.add_task("trials", total=None)
+        task = bar.add_task("runs", total=None)
 
         def show(progress: Progress) -> None:
-            bar.update(task, completed=progress.done, total=progress.total)
+            bar.update(task, completed=progress.done + progress.under_way, total=progress.total)
             if progress.note:
                 console.print(progress.note, markup=False)
 
@@ -236,15 +236,27 @@ def _progress() -> Iterator[Callable[[Progress], None]]:
 
 
 def _lines() -> Callable[[Progress], None]:
-    shown = -1
+    """Lines with the share that is done, the runs that have ended, and a guess of what is left from the pace so far."""
+    import time
+
+    shown, began, first = -1, time.monotonic(), -1.0
 
     def show(progress: Progress) -> None:
-        nonlocal shown
-        tenth = 10 * progress.done // progress.total
-        if tenth != shown:
-            shown = tenth
-            click.echo(f"{progress.done} of {progress.total} rows", err=True)
+        nonlocal shown, first
+        share = (progress.done + progress.under_way) / progress.total
+        first = share if first < 0.0 else first
+        if int(10 * share) > shown:
+            shown = int(10 * share)
+            spent = time.monotonic() - began
+            left = spent * (1.0 - share) / (share - first) if share > first else 0.0
+            guess = f", about {_span(left)} left" if left >= 1.0 else ""
+            click.echo(f"{share:.0%}: {progress.done} of {progress.total} runs done{guess}", err=True)
         if progress.note:
             click.echo(progress.note, err=True)
 
     return show
+
+
+def _span(seconds: float) -> str:
+    """A length of time for people."""
+    return f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"

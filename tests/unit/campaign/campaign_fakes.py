@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from skillframe.campaign.folder import prepare
+from skillframe.campaign.pulse import beat
 from skillframe.campaign.rows import TRACE, rows_of
 from skillframe.campaign.runner import Options, run_campaign
 from skillframe.campaign.sampling import draws, trial_rngs
@@ -84,6 +85,20 @@ def good(job):
 
 def slow(job):
     time.sleep(0.02 * len(job.trials))
+    return good(job)
+
+
+def tells_quickly(job):
+    """Says that it is half done."""
+    beat(0.5)
+    return good(job)
+
+
+def tells(job):
+    """Says that it is half done, and takes its time."""
+    for _ in range(20):
+        beat(0.5)
+        time.sleep(0.1)
     return good(job)
 
 

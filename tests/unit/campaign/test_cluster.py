@@ -80,6 +80,16 @@ def test_a_hang_in_a_small_chunk_is_ended_and_named(out, reference):
     assert b"worker died (time limit)" in line
 
 
+def test_how_far_chunks_are_is_told_while_they_run_and_what_a_killed_session_left_is_swept(campaign, tmp_path):
+    out = fakes.start(campaign(trials=4), tmp_path / "out")
+    (out / "watch").mkdir()
+    (out / "watch" / "job-99.txt").touch()
+    told = []
+    fakes.run(out, fakes.tells, told.append, workers=2, chunk=2, traces=0)
+    assert {p.under_way for p in told if not p.done} >= {2.0}  # two chunks of two runs, both half done
+    assert not (out / "watch").exists()
+
+
 @pytest.mark.slow
 def test_a_trial_whose_worker_was_killed_once_is_not_blamed(out, reference):
     fakes.run(out, fakes.dies_once, **LIMITS)

@@ -16,6 +16,7 @@ from campaign_fakes import (
     raises,
     run,
     start,
+    tells_quickly,
     write_campaign,
 )
 
@@ -277,3 +278,10 @@ def test_ctrl_c_keeps_what_is_finished_says_how_to_go_on_and_exits_130(tmp_path,
     assert 20 <= stored < 800
     assert len(table(out).splitlines()) == stored + 1
     assert not read_summary(out)["complete"]
+
+
+def test_how_far_a_chunk_is_is_told_in_process(out):
+    told = []
+    run(out, tells_quickly, told.append, chunk=12, traces=0)
+    assert {p.under_way for p in told} == {0.0, 6.0}  # half of twelve
+    assert all(p.done + p.under_way <= p.total for p in told)
