@@ -11,10 +11,13 @@ from functools import lru_cache
 from typing import Any
 from weakref import WeakValueDictionary
 
+from skillframe.actuation.actuator import DISCARD
 from skillframe.actuation.extract import unpack
-from skillframe.actuation.inspection import FLOATS, FmuFacts, read_description
-from skillframe.errors import InputError, SkillframeError
+from skillframe.actuation.inspection import FmuFacts, read_description
+from skillframe.actuation.values import values_of
+from skillframe.errors import SkillframeError
 
+LAST_SUCCESSFUL_TIME, TERMINATED = 2, 3  # of fmi2StatusKind
 _KEYS = itertools.count(1)
 _LISTENERS: WeakValueDictionary[int, Instance] = WeakValueDictionary()
 
@@ -88,7 +91,8 @@ class Instance:
             )  # fmt: skip
             self._instantiate()
         except Exception as error:
-            raise InstanceFailed(self.sentence(f"does not load: {error}")) from None
+            tool = "; its maker's tool must be installed" if self._cs.needsExecutionTool else ""
+            raise InstanceFailed(self.sentence(f"does not load: {error}") + tool) from None
         self.component = int(getattr(self._fmu.component, "value", self._fmu.component))
         self._fresh = True
 
@@ -154,15 +158,7 @@ class Instance:
             UnknownName, InputError: no such parameter, or a value that is not of its type.
         """
         variable = self.facts.settable(name)
-        values = list(value) if isinstance(value, list | tuple) else [value]
-        if len(values) != variable.size:
-            raise InputError(f"{self.name}: {name}", f"has {variable.size} numbers, got {len(values)}", "correct it")
-        try:
-            converted = [convert(variable.type, v) for v in values]
-        except (TypeError, ValueError):
-            raise InputError(
-                f"{self.name}: {name}", f"is of type {variable.type}, got {value!r}", "correct it"
-            ) from None
+        converted = values_of(variable, value, self.name)
         typed = variable.type if variable.type != "Enumeration" else ("Integer" if self.version == 2 else "Int64")
         getattr(self._fmu, f"set{typed}")([variable.reference], converted)
 
@@ -170,19 +166,31 @@ class Instance:
         """Set variables of one type by reference."""
         getattr(self._fmu, f"set{type_}")(references, values)
 
-    def do_step(self, time: float, step: float) -> bool:
-        """One step through fmpy, outside the loop; True if the FMU asks to end.
+    def do_step(self, time: float, step: float) -> float | None:
+        """One step through fmpy, outside the loop; the time at which the FMU asks to end, or None.
 
         Raises:
             InstanceFailed: it returned early although that was not allowed.
             Exception: fmpy's, with the status it returned.
         """
-        flags = self._fmu.doStep(time, step)
+        try:
+            flags = self._fmu.doStep(time, step)
+        except Exception as error:
+            if self.version == 2 and getattr(error, "status", 0) == DISCARD and self._terminated():
+                return float(self._fmu.getRealStatus(LAST_SUCCESSFUL_TIME))
+            raise
         if self.version == 2:
+            return None
+        if flags[2] and not flags[1]:
+            raise InstanceFailed("returned early from a step, which was not allowed")
+        return float(flags[3]) if flags[1] else None
+
+    def _terminated(self) -> bool:
+        """Whether an FMI 2 instance that discarded a step wants to end."""
+        try:
+            return bool(self._fmu.getBooleanStatus(TERMINATED))
+        except Exception:
             return False
-        if flags[2]:
-            raise InstanceFailed(self.sentence("returned early from a step, which was not allowed"))
-        return bool(flags[1])
 
     def get_values(self, type_: str, references: list[int], count: int) -> list[Any]:
         """Values of variables of one type, arrays flattened."""
@@ -201,26 +209,25 @@ class Instance:
         getattr(self._fmu, name)(self._fmu.component, self._states[slot])
 
     def forget(self) -> None:
-        """Free kept states."""
+        """Free kept states; one that the FMU does not take back is left to it."""
         name = "fmi2FreeFMUstate" if self.version == 2 else "fmi3FreeFMUState"
         for state in self._states.values():
-            getattr(self._fmu, name)(self._fmu.component, ctypes.byref(state))
+            with suppress(Exception):
+                getattr(self._fmu, name)(self._fmu.component, ctypes.byref(state))
         self._states.clear()
+
+    def end(self) -> None:
+        """Say that the run is over, as the standard asks before `close`.
+
+        Raises:
+            InstanceFailed: the FMU refuses.
+        """
+        try:
+            self._fmu.terminate()
+        except Exception as error:
+            raise InstanceFailed(self.sentence(f"cannot be terminated: {error}")) from None
 
     def close(self) -> None:
         """Free the instance."""
         self.forget()
         self._fmu.freeInstance()
-
-
-def convert(type_: str, value: Any) -> Any:
-    """A plain value as an FMI type takes it."""
-    if type_ in FLOATS or type_ == "Float32":
-        return float(value)
-    if type_ == "Boolean":
-        if isinstance(value, str):
-            return {"true": True, "false": False, "1": True, "0": False}[value.lower()] if value else False
-        return bool(value)
-    if type_ == "String":
-        return str(value)
-    return int(value)

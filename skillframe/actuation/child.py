@@ -49,7 +49,8 @@ class Child:
             self._process = subprocess.Popen(
                 [sys.executable, "-m", "skillframe.actuation.worker", str(theirs.fileno()), str(limits.memory_bytes)],
                 pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL, env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
+                stderr=subprocess.DEVNULL, start_new_session=True,
+                env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
             )  # fmt: skip
         finally:
             theirs.close()
@@ -110,6 +111,7 @@ class Child:
 
     def _death(self) -> str:
         """In words how the child ended, with the most memory it held if that may be why."""
+        self._end_group()
         try:
             _, status, usage = os.wait4(self._process.pid, 0)
         except ChildProcessError:
@@ -119,13 +121,19 @@ class Child:
         memory = f"having used {usage.ru_maxrss // 1024} MB of {self.limits.memory_bytes // 1024**2} MB"
         if code < 0:
             large = usage.ru_maxrss > max(TELLING * self.limits.memory_bytes / 1024, self._inherited_kb)
-            return f"crashed ({signal.Signals(-code).name}{', ' + memory if large else ''})"
+            name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
+            return f"crashed ({name}{', ' + memory if large else ''})"
         return f"ran out of memory ({memory})" if code == 12 else f"left with code {code}"
 
+    def _end_group(self) -> None:
+        """End the child and whatever its FMU has started; before it is waited for, so that its number is still its."""
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+
     def kill(self) -> None:
-        """End the child at once."""
+        """End the child at once, and what its FMU has started."""
         if self._process.returncode is None:
-            self._process.kill()
+            self._end_group()
             self._process.wait()
         self._pipe.close()
 
@@ -135,6 +143,6 @@ class Child:
             self.kill()
             return
         self.send(b"q")
-        with suppress(subprocess.TimeoutExpired):
-            self._process.wait(2.0)
+        with suppress(OSError):
+            self._pipe.poll(2.0)
         self.kill()

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+import lzma
 import os
 import stat
 import tempfile
 import zipfile
+import zlib
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
 
@@ -15,6 +17,7 @@ from skillframe.paths import cache_dir
 
 LARGEST = 2_000_000_000  # bytes unpacked; more is taken for a trap
 MOST_FILES = 20_000
+LONGEST = 1000  # characters of a name
 
 
 def unpack(path: Path) -> Path:
@@ -81,6 +84,8 @@ def _check(path: Path, members: list[zipfile.ZipInfo]) -> None:
             raise InputError(
                 path, f"holds {name!r}, which would be written outside its folder", "do not trust this file"
             )
+        if len(name) > LONGEST or any(len(part.encode()) > 255 for part in parts):
+            raise InputError(path, f"holds a name of {len(name)} characters", "do not trust this file")
         if stat.S_ISLNK(member.external_attr >> 16):
             raise InputError(
                 path, f"holds a link, {name!r}, which can lead outside its folder", "do not trust this file"
@@ -97,5 +102,9 @@ def _extract(path: Path, folder: Path) -> None:
     try:
         with zipfile.ZipFile(path) as archive:
             archive.extractall(folder)
-    except (zipfile.BadZipFile, OSError, EOFError) as error:
+    except OSError as error:
+        raise InputError(path, f"cannot be unpacked: {error.strerror}", "copy the file again") from None
+    except (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError) as error:
         raise InputError(path, f"cannot be unpacked: {error}", "copy the file again") from None
+    except (RuntimeError, NotImplementedError):  # zipfile's words for a password and for a method it does not know
+        raise InputError(path, "is packed with a password or in an unusual way", "pack it as a plain zip") from None

@@ -36,6 +36,9 @@ def build_from_sources(path: Path) -> BuiltFmu:
     files, defines = _sources(description, cs.modelIdentifier)
     if not files:
         raise InputError(path, "does not list its source files", "ask its maker for a binary")
+    for name in files:
+        if name.startswith("-") or not (unpack(path) / "sources" / name).is_file() or ".." in Path(name).parts:
+            raise InputError(path, f"lists the source {name!r}, which is not in its folder sources", "export it again")
     out.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=out.parent) as work:
         tree = Path(work) / "tree"

@@ -81,9 +81,9 @@ class FmuFacts:
         found = self.variables.get(name)
         if found is not None and found.causality in ("parameter", "input"):
             return found
-        raise UnknownName(
-            f"parameter or input of {self.path.name}", name, [*self.names("input"), *self.names("parameter")]
-        )
+        note = f"{name!r} is there as {found.causality}" if found else ""
+        known = [*self.names("input"), *self.names("parameter")]
+        raise UnknownName(f"parameter or input of {self.path.name}", name, known, note)
 
     def require_runnable(self) -> None:
         """Refuse what cannot be driven here, saying what is inside.
@@ -92,9 +92,8 @@ class FmuFacts:
             InputError: no co-simulation, or no binary for this machine.
         """
         if "co_simulation" not in self.kinds:
-            raise InputError(
-                self.path, f"holds {' and '.join(self.kinds) or 'no interface'} only", "export it as co-simulation"
-            )
+            inside = " and ".join(self.kinds) + " only" if self.kinds else "no interface that can be run"
+            raise InputError(self.path, f"holds {inside}", "export it as co-simulation")
         if self.runs_here:
             return
         from fmpy import platform, platform_tuple
@@ -132,7 +131,7 @@ def _inspect(path: Path, digest: str) -> FmuFacts:
         path=path,
         digest=digest,
         fmi_version=description.fmiVersion,
-        name=description.modelName,
+        name=" ".join((description.modelName or path.stem).split()) or path.stem,
         kinds=tuple(kind for kind, there in kinds.items() if there is not None),
         platforms=platforms,
         has_sources=any(PurePosixPath(n).parts[0] == "sources" and n.endswith((".c", ".cpp")) for n in names),
@@ -151,26 +150,64 @@ def read_description(path: Path) -> Any:
     Raises:
         InputError: the XML cannot be read, or is of FMI 1.
     """
-    from fmpy import read_model_description
-
+    folder = unpack(path)
     try:
-        description = read_model_description(str(unpack(path)), validate=False)
-    except InputError:
-        raise
+        description = _read(folder, validate=False)
     except Exception as error:
         raise InputError(
-            path, f"has a model description that cannot be read: {_line(error)}", "export it again"
+            path, f"has a model description that cannot be read: {_why(folder, error)}", "export it again"
         ) from None
     if description.fmiVersion.startswith("1"):
         raise InputError(path, "is an FMI 1.0 unit", "export it as FMI 2.0 or 3.0 co-simulation")
+    if (description.guid or description.instantiationToken) is None:
+        token = "guid" if description.fmiVersion.startswith("2") else "instantiationToken"
+        raise InputError(path, f"has a model description without {token}", "export it again")
     return description
 
 
+def _read(folder: Path, validate: bool) -> Any:
+    from fmpy import read_model_description
+
+    return read_model_description(str(folder), validate=validate)
+
+
+def _why(folder: Path, error: Exception) -> str:
+    """What is wrong with a description, in the words of the XML reader or of the standard's schema."""
+    from fmpy.model_description import ValidationError
+    from lxml.etree import LxmlError  # type: ignore[import-untyped]
+
+    if isinstance(error, OSError):  # lxml's, for bytes of another encoding
+        return "its text is not in the encoding that it names"
+    if isinstance(error, LxmlError | ValidationError) or type(error) is Exception:
+        return _line(error)
+    try:
+        _read(folder, validate=True)
+    except (ValidationError, LxmlError) as found:
+        return _line(found).partition(": - ")[2].partition(" - ERROR")[0] or _line(found)
+    except Exception:
+        pass
+    return "it is not built as the standard says, or names no version of it"
+
+
 def problems_of(path: Path) -> list[str]:
-    """What fmpy's validation finds: schema, names, structure, units, start values."""
+    """What fmpy's validation finds: schema, names, structure, units, start values.
+
+    An alias of FMI 3 shares the entries of its variable; fmpy 0.3 asks for entries of its own, which is left out here.
+    """
     from fmpy.validation import validate_fmu
 
-    return [" ".join(str(problem).split()) for problem in validate_fmu(str(path))]
+    found = [" ".join(str(problem).split()) for problem in validate_fmu(str(path))]
+    return [problem for problem in found if problem not in _asked_of_aliases(path)]
+
+
+def _asked_of_aliases(path: Path) -> set[str]:
+    """What fmpy says where every initial unknown is there, and only their aliases have no entry."""
+    description = read_description(path)
+    there = {unknown.variable.name for unknown in description.initialUnknowns}
+    shared = {v.name for v in description.modelVariables if v.alias is not None and v.alias.name in there}
+    expected, actual = (", ".join(sorted(names)) for names in (there | shared, there))
+    where = "ModelStructure/InitialUnknowns does not contain the expected set of variables."
+    return {f"{where} Expected {{{expected}}} but was {{{actual}}}."} if shared else set()
 
 
 def _line(error: Exception) -> str:

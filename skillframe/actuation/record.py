@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import csv
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from skillframe.actuation.allow import is_allowed
-from skillframe.actuation.bindings import InstanceFailed, convert
+from skillframe.actuation.bindings import InstanceFailed
 from skillframe.actuation.child import ChildLost
 from skillframe.actuation.inspection import FmuFacts, FmuVariable, inspect_fmu
 from skillframe.actuation.library import find_fmu
 from skillframe.actuation.simulate import Request, check_request, output_columns, simulate
+from skillframe.actuation.values import values_of
 from skillframe.errors import InputError
 
 
@@ -38,19 +40,26 @@ def simulate_to_csv(
     names, rows = read_inputs(table, facts) if table else ([], [])
     request = Request(path=path, stop=stop, step=step, parameters=settings or {}, input_names=names, input_rows=rows)
     check_request(facts, request)
-    columns = ["time", *output_columns(facts)]
-    count, problem = 0, ""
-    part = out.with_name(out.name + ".part")
-    with part.open("w", newline="", encoding="utf-8") as file_out:
-        writer = csv.writer(file_out)
+    if out.is_dir():
+        raise InputError(out, "is a folder", "give --out the name of a file")
+    return _write(out, ["time", *output_columns(facts)], simulate(request, not is_allowed(path), limit_s))
+
+
+def _write(out: Path, columns: list[str], rows: Iterator[list[Any]]) -> Recorded:
+    """Rows as they come; whatever ends them, those that were reached are kept."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    part, count, problem = out.with_name(out.name + ".part"), 0, ""
+    with part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
         writer.writerow(columns)
         try:
-            for row in simulate(request, sandboxed=not is_allowed(path), limit_s=limit_s):
+            for row in rows:
                 writer.writerow(row)
                 count += 1
         except (InstanceFailed, ChildLost) as error:
             problem = str(error)
-    os.replace(part, out)
+        finally:
+            os.replace(part, out)
     return Recorded(columns, count, problem)
 
 
@@ -62,17 +71,21 @@ def read_inputs(path: Path, facts: FmuFacts) -> tuple[list[str], list[list[float
         UnknownName: a column that is no input.
     """
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            lines = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(path, f"cannot be read: {error}", "give a CSV file") from None
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            lines = [line for line in csv.reader(file, skipinitialspace=True) if line]
+    except OSError as error:
+        raise InputError(path, f"cannot be read: {error.strerror}", "give a CSV file") from None
+    except (UnicodeDecodeError, csv.Error):
+        raise InputError(path, "is not text in UTF-8", "give a CSV file") from None
     if not lines or "time" not in (names := [n.strip() for n in lines[0]]):
         raise InputError(path, "has no column time", "give a CSV with a header: time, then inputs by name")
     if len(lines) < 2:
         raise InputError(path, "has a header and no rows", "add rows")
     at = names.index("time")
-    others = [n for n in names if n != "time"]
+    others = [n for i, n in enumerate(names) if i != at]
     for name in others:
+        if names.count(name) > 1:
+            raise InputError(f"{path}: {name}", "is the name of two columns", "keep one")
         facts.variable(name, "input")
     rows = []
     for number, line in enumerate(lines[1:], start=2):
@@ -91,5 +104,10 @@ def read_inputs(path: Path, facts: FmuFacts) -> tuple[list[str], list[list[float
 
 
 def _convertible(path: Path, variable: FmuVariable, values: list[float]) -> None:
-    if variable.type not in ("Real", "Float64", "Float32") and any(convert(variable.type, v) != v for v in values):
-        raise InputError(f"{path}: {variable.name}", f"is of type {variable.type}", "give whole numbers, or 0 and 1")
+    """Every value of a column can be one of the input's type; an array is refused later, by name."""
+    for value in values if variable.size == 1 and variable.type != "String" else ():
+        values_of(variable, value, path)
+    if variable.type == "String":
+        raise InputError(
+            f"{path}: {variable.name}", "is text, and a table holds numbers", "leave it at its start value"
+        )

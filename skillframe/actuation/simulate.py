@@ -14,7 +14,10 @@ from typing import Any
 
 from skillframe.actuation.bindings import Instance, InstanceFailed
 from skillframe.actuation.inspection import FmuFacts, FmuVariable, inspect_fmu
+from skillframe.actuation.values import values_of
 from skillframe.errors import InputError
+
+MOST_COLUMNS = 100_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,13 +49,20 @@ def check_request(facts: FmuFacts, request: Request) -> None:
     """Refuse what cannot be simulated before anything is loaded.
 
     Raises:
-        InputError, UnknownName: not runnable here, wrong names, or impossible times.
+        InputError, UnknownName: not runnable here, wrong names, values of another type, or impossible times.
     """
     facts.require_runnable()
     if not (0.0 < request.step <= request.stop < float("inf")):
         raise InputError("--step, --stop", f"{request.step:g} and {request.stop:g} s", "give 0 < step <= stop")
-    for name in request.parameters:
-        facts.settable(name)
+    if not facts.variable_step and not _even(request):
+        problem = f"{request.stop:g} s is no whole number of steps of {request.step:g} s"
+        raise InputError("--stop", f"{problem}, and {facts.path.name} takes steps of one length", "give a multiple")
+    wide = sum(v.size for v in _outputs(facts))
+    if wide > MOST_COLUMNS:
+        raise InputError(facts.path, f"has outputs of {wide} values in all", f"{MOST_COLUMNS} are the most")
+    for name, value in request.parameters.items():
+        if any(v != v for v in values_of(facts.settable(name), value, facts.path.name)):
+            raise InputError(f"{facts.path.name}: {name}", "is not a number (NaN)", "give a number")
     for name in request.input_names:
         if facts.variable(name, "input").size != 1:
             raise InputError(f"--input: {name}", "is an array", "leave it at its start value")
@@ -75,7 +85,9 @@ def simulate(request: Request, sandboxed: bool, limit_s: float = 30.0) -> Iterat
     child = Child(facts.path, facts.name, SandboxLimits())
     try:
         child.tell(b"m", {**asdict(request), "path": str(request.path)})
-        while row := child.heard(limit_s, "simulating"):
+        what = "simulating"
+        while row := child.heard(limit_s, what):
+            what = "simulating" if row[0] < request.stop else "being freed after its last step"
             yield row
     finally:
         child.close()
@@ -97,22 +109,26 @@ def _rows(instance: Instance, facts: FmuFacts, request: Request) -> Iterator[lis
     instance.start({**request.parameters, **start}, {}, 0.0)
     setters = [facts.variables[name] for name in names]
     yield [0.0, *_read(instance, facts)]
-    count = max(1, round(request.stop / request.step))
-    if abs(count * request.step - request.stop) > 1e-9 * request.stop:
-        count = int(request.stop / request.step) + 1
+    count = max(1, round(request.stop / request.step)) if _even(request) else int(request.stop / request.step) + 1
     for k in range(count):
         time, end = k * request.step, min((k + 1) * request.step, request.stop) if k + 1 < count else request.stop
         try:
             for variable, value in zip(setters, _inputs_at(request, time), strict=False):
                 instance.set_value(variable.name, value)
             ended = instance.do_step(time, end - time)
-            row = [end, *_read(instance, facts)]
+            row = [end if ended is None else ended, *_read(instance, facts)]
         except Exception as error:
             raise InstanceFailed(instance.sentence(f"failed at {time:.6g} s: {error}")) from None
         _check_finite(instance, facts, row)
         yield row
-        if ended:
-            raise InstanceFailed(instance.sentence(f"asked to end at {end:.6g} s"))
+        if ended is not None:
+            raise InstanceFailed(instance.sentence(f"asked to end at {ended:.6g} s"))
+    instance.end()
+
+
+def _even(request: Request) -> bool:
+    """Whether the stop time is a whole number of steps."""
+    return abs(round(request.stop / request.step) * request.step - request.stop) <= 1e-9 * request.stop
 
 
 def _inputs_at(request: Request, time: float) -> list[float]:

@@ -8,6 +8,7 @@ from skillframe.actuation.actuator import INPUTS, OUTPUTS, ActuatorSpec
 from skillframe.actuation.bindings import Instance
 from skillframe.actuation.inspection import FLOATS, FmuFacts, FmuVariable
 from skillframe.actuation.stepper import LARGEST, Wiring
+from skillframe.actuation.values import values_of
 from skillframe.errors import InputError
 
 
@@ -23,7 +24,8 @@ def mapping(spec: ActuatorSpec, facts: FmuFacts) -> tuple[dict[str, FmuVariable]
 
     Raises:
         UnknownName: a mapped name that the FMU does not have.
-        InputError: nothing that could be driven, no force, or a variable that is no real scalar.
+        InputError: nothing that could be driven, no force, a variable that is no real scalar, or a parameter's value
+            that is not of its type.
     """
     chosen_in = spec.inputs or {n: n for n in INPUTS if n in facts.names("input")}
     chosen_out = spec.outputs or {n: n for n in OUTPUTS if n in facts.names("output")}
@@ -37,7 +39,7 @@ def mapping(spec: ActuatorSpec, facts: FmuFacts) -> tuple[dict[str, FmuVariable]
         known = ", ".join(facts.names("output")) or "none"
         raise InputError(where, f"no output is mapped to force (it has: {known})", 'add outputs = { force = "..." }')
     for name in spec.parameters:
-        facts.variable(name, "parameter")
+        values_of(facts.variable(name, "parameter"), spec.parameters[name], where)
     return inputs, outputs
 
 

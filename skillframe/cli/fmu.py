@@ -7,6 +7,8 @@ from pathlib import Path
 
 import click
 
+from skillframe.cli.numbers import POSITIVE
+
 
 @click.group(name="fmu")
 def command() -> None:
@@ -110,7 +112,7 @@ def check(file: str, as_json: bool, allow: bool) -> int:
 @click.option("--input", "table", type=click.Path(path_type=Path), help="CSV: time, then inputs by name; rows hold.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="CSV: time, then every output by name.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter or start value of an input.")
-@click.option("--timeout", default=30.0, show_default=True, help="Wall time without a sign of life [s].")
+@click.option("--timeout", default=30.0, type=POSITIVE, show_default=True, help="Wall time without a sign of life [s].")
 def simulate(
     file: str, stop: float, step: float, table: Path | None, out: Path, settings: tuple[str, ...], timeout: float
 ) -> int:
@@ -127,7 +129,8 @@ def simulate(
         file, stop, step, out, table=table, settings=dict(parse_setting(text) for text in settings), limit_s=timeout
     )
     if ended.problem:
-        click.echo(f"{ended.problem}; {ended.rows} rows are in {out}", err=True)
+        rows = "1 row is" if ended.rows == 1 else f"{ended.rows} rows are"
+        click.echo(f"{ended.problem}; {rows} in {out}", err=True)
         return 1
     click.echo(f"{out}: {ended.rows} rows, {', '.join(ended.columns[1:])}")
     return 0
