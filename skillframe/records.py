@@ -196,6 +196,7 @@ class RowType:
         calibrated: what was chosen with the published figure in sight; "" if ours is a prediction.
         settings: what `--set` can change, with its value as shipped [SI units, unless the name says otherwise].
         group: rows of one group are computed one after another in one process, so that they can share what is costly.
+        topic: a word or two under which the page lists the row; "" takes the group.
         run: computes it; slow, and not in the process of the command.
     """
 
@@ -207,4 +208,5 @@ class RowType:
     calibrated: str = ""
     settings: Mapping[str, Setting] = field(default_factory=dict)
     group: str = ""
+    topic: str = ""
     run: Callable[[RowRun], RowResult]

@@ -28,7 +28,7 @@ LANDED_S, FAST = 7.0, 0.6  # contact has settled; share of the largest speed tha
 def row_types() -> Iterable[RowType]:
     """The rows 19 to 22."""
     yield RowType(
-        name="19", summary="the crane learns and reproduces in contact, stiff and soft",
+        name="19", topic="crane", summary="the crane learns and reproduces in contact, stiff and soft",
         published="demonstrated, no figures", source="IROS 2018 (abstract)",
         bar="from two teleoperated demonstrations on wood as on styrofoam: a push that slides on stack and "
         "stop, both pushes within 10 degrees, and every run on either ends in the corner with less than 12 kN",
@@ -41,7 +41,8 @@ def row_types() -> Iterable[RowType]:
         settings={"press.depth": 0.12, "duration": 14.0}, group="crane", run=_force,
     )  # fmt: skip
     yield RowType(
-        name="21", summary="pressures that hold the crane at its start", published="130/30.9 and 90/35.7 bar",
+        name="21", topic="crane", summary="pressures that hold the crane at its start",
+        published="130/30.9 and 90/35.7 bar",
         source=f"{DATA}, start values of the simulation", bar="net piston forces within 2 %",
         settings={"robot.payload": 475.0, "cylinder.bore": 0.080, "cylinder.rod": 0.045}, run=_holding,
     )  # fmt: skip

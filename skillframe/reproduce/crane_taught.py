@@ -82,7 +82,8 @@ def taught(job: RowRun) -> RowResult:
         f"{count} runs end in the corner",
         verdict="pass" if min(inside) > 0.0 and apart <= APART_DEG and good == count else "fail",
         pictures=[_picture(job, skills[0], [reached[0, surface].result for surface in surfaces])],
-        head=("operator", "taught on", "push [degrees]", "inside by", *(f"runs on {each}" for each in surfaces)),
+        head=("operator", "taught on", "push [degrees]", "inside by [degrees]",
+              *(f"runs on {each}" for each in surfaces)),
         rows=[
             (str(each.pair + 1), each.surface, f"{each.angle:.1f}", f"{margin:.1f}",
              *(_words(reached[i, surface]) for surface in surfaces))

@@ -16,6 +16,8 @@ from skillframe.reproduce.document import origin
 BADGES = {"pass": "badge won", "fail": "badge lost", "reported": "badge"}
 HEAD = ("row", "what is claimed", "published", "ours", "verdict", "values")
 STYLE = """
+.links > span { display: inline-flex; gap: 0.55rem; } .topic { font-size: 0.9rem; font-weight: 600; }
+.links a.fail { color: var(--bad); }
 .rows { font-size: 0.92rem; } .rows td { min-width: 3.2rem; } .rows td:nth-child(2) { min-width: 13rem; }
 .rows td:nth-child(3), .rows td:nth-child(4) { min-width: 12rem; }
 .facts { display: grid; grid-template-columns: max-content minmax(0, 1fr); gap: 0.25rem 1.2rem; margin: 0.6rem 0; }
@@ -39,10 +41,19 @@ def render(entries: Sequence[Mapping[str, Any]]) -> str:
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
         tag("title", "skillframe reproduce"), tag("style", _style()),
     )  # fmt: skip
-    links = [tag("a", each["row"], href=f"#row-{each['row']}", title=each["summary"]) for each in entries]
-    top = tag("nav", tag("span", "skillframe", class_="brand"), tag("div", *links, class_="links"))
+    top = tag("nav", tag("span", "skillframe", class_="brand"), tag("div", *_links(entries), class_="links"))
     body = tag("body", top, tag("main", _hero(entries), *(_section(each) for each in entries)), _foot())
     return "<!DOCTYPE html>\n" + tag("html", head, body, lang="en")
+
+
+def _links(entries: Sequence[Mapping[str, Any]]) -> list[Markup]:
+    """The rows by topic; pointed at, a number says what it claims. Rows that an older version kept have no topic."""
+    topics: dict[str, list[Markup]] = {}
+    for each in entries:
+        hint = f"row {each['row']}, {each['verdict']}: {each['summary']}"
+        link = tag("a", each["row"], href=f"#row-{each['row']}", title=hint, class_=each["verdict"])
+        topics.setdefault(each.get("topic") or "row", []).append(link)
+    return [tag("span", tag("span", topic, class_="topic"), *links) for topic, links in topics.items()]
 
 
 def _style() -> Markup:

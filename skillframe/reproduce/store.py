@@ -28,7 +28,8 @@ def entry(row: RowType, job: Job, result: RowResult, wall_s: float, cpu_s: float
         "table": {"head": list(result.head), "rows": [list(each) for each in result.rows]},
         "pictures": [picture._asdict() for picture in result.pictures],
         "command": job.command, "seed": job.seed, "quick": job.quick, "settings": dict(job.settings),
-        "wall_s": round(wall_s, 2), "cpu_s": round(cpu_s, 2), "group": job.group, "key": job.key,
+        "wall_s": round(wall_s, 2), "cpu_s": round(cpu_s, 2), "group": job.group, "topic": row.topic or row.group,
+        "key": job.key,
     }  # fmt: skip
 
 

@@ -30,6 +30,7 @@ DOWN, X, Y = np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]), np.array([0.
 NOISE = {"teacher.aim_noise_deg": 8.0, "world.friction": 0.2}
 VALLEY = {**NOISE, "world.slope_deg": 45.0}
 SHARE = 0.95
+TOPIC = "learning from force"
 REDRAWN = "demonstrations that failed and were redrawn"
 START_DEG = 8.0
 LEVER = (
@@ -43,34 +44,40 @@ LEVER = (
 def row_types() -> Iterable[RowType]:
     """The rows of this plug-in."""
     yield RowType(
-        name="1", summary="the sector of feasible pushes narrows with friction", published="narrower with friction",
+        name="1", topic=TOPIC,
+        summary="the sector of feasible pushes narrows with friction", published="narrower with friction",
         source=SEED, bar="median width within 1 degree of 90 - atan(friction), at three frictions",
         settings={"world.friction": 0.2, "teacher.aim_noise_deg": 3.0}, run=_sector_width,
     )  # fmt: skip
     yield RowType(
-        name="2", summary="from either side, one push and one free axis slide to the valley's bottom",
+        name="2", topic=TOPIC,
+        summary="from either side, one push and one free axis slide to the valley's bottom",
         published="slides from any start of the convergence region", source=SEED,
         bar="largest tilt of the push within 2 degrees of slope - atan(friction), both sides",
         settings={"world.friction": 0.2, "world.slope_deg": 45.0}, run=_valley_boundary,
     )  # fmt: skip
     yield RowType(
-        name="3", summary="the intersection of pyramids is robust to a wavering hand", published="robust to noise",
+        name="3", topic=TOPIC,
+        summary="the intersection of pyramids is robust to a wavering hand", published="robust to noise",
         source=SEED, bar="a feasible direction from two demonstrations in 95 % of the pairs", settings=VALLEY,
         run=_noise,
     )  # fmt: skip
     yield RowType(
-        name="4", summary="hose coupler: a push, no turn; one compliant axis each; aligned from both starts",
+        name="4", topic=TOPIC,
+        summary="hose coupler: a push, no turn; one compliant axis each; aligned from both starts",
         published="translation yes, rotation no; 1 + 1 axes; both starts aligned", source=SEED,
         bar="the same in 95 % of the pairs, and both starts of every pair that is run, steered at the flange",
         settings=NOISE, run=_hose,
     )  # fmt: skip
     yield RowType(
-        name="5", summary="peg in hole: push along z, free along x, turns about y",
+        name="5", topic=TOPIC,
+        summary="peg in hole: push along z, free along x, turns about y",
         published="push z, no turn, axes x and y", source=PAPER_6,
         bar="identical, and the push within 10 degrees of z, in 95 % of the pairs", settings=NOISE, run=_peg,
     )  # fmt: skip
     yield RowType(
-        name="6", summary="levering teaches that translation is the environment's", published="3-DoF compliance",
+        name="6", topic=TOPIC,
+        summary="levering teaches that translation is the environment's", published="3-DoF compliance",
         source=SEED, bar="translation fully compliant, rotation not, in every demonstration", settings=NOISE,
         run=_levering,
     )  # fmt: skip
@@ -136,7 +143,8 @@ def _sector_width(job: RowRun) -> RowResult:
     return RowResult(
         ours=", ".join(f"{row[2]} at friction {row[0]}" for row in rows) + " degrees",
         verdict="pass" if worst <= 1.0 else "fail", values={"largest_difference_deg": worst},
-        head=("friction", "90 - atan [degrees]", "median width", "over demonstrations"), rows=rows,
+        head=("friction", "90 - atan(friction) [degrees]", "median width [degrees]", "over demonstrations [degrees]"),
+        rows=rows,
     )  # fmt: skip
 
 
@@ -182,7 +190,8 @@ def _valley_boundary(job: RowRun) -> RowResult:
     return RowResult(
         ours=f"largest tilt {rows[1][2]} and {rows[1][3]} degrees, theory {rows[1][1]}",
         verdict="pass" if worst <= 2.0 else "fail", values={"largest_difference_deg": worst},
-        head=("friction", "slope - atan [degrees]", "from one side", "from the other"), rows=rows,
+        head=("friction", "slope - atan(friction) [degrees]", "from one side [degrees]", "from the other [degrees]"),
+        rows=rows,
     )  # fmt: skip
 
 

@@ -46,7 +46,7 @@ def row_types() -> Iterable[RowType]:
         name="23", summary="a spiral is sure with the right pitch and centre, in the plane only",
         published="guaranteed with the right pitch and start", source="the overview paper",
         bar="centred spiral 100 % of the peg's holes; centre 6 mm off: at 7 s, 15 points behind the learned search",
-        settings=SETTINGS, group="spiral", run=_spiral,
+        settings=SETTINGS, group="spiral", topic="search", run=_spiral,
     )  # fmt: skip
 
 
