@@ -22,7 +22,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         InputError: missing, not text, or not TOML (with the line).
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise InputError(path, "no such file", "check the path") from None
     except (OSError, UnicodeDecodeError) as error:
@@ -98,6 +98,9 @@ def _coerce_union(value: Any, args: tuple[Any, ...], where: str) -> Any:
 
 
 def _coerce_sequence(value: Any, origin: type, args: tuple[Any, ...], where: str) -> Any:
+    if isinstance(value, Mapping):
+        name = where.rpartition(".")[2]
+        raise InputError(where, "expected a list of tables, got one table", f"write [[{name}]] in place of [{name}]")
     if not isinstance(value, list | tuple):
         raise InputError(where, f"expected a list, got {value!r}")
     if origin is list or (len(args) == 2 and args[1] is Ellipsis):

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from skillframe.errors import InputError
 from skillframe.robot.bodies import Body, rigid_bodies
 from skillframe.robot.joint_checks import joint_warnings
 from skillframe.robot.link_checks import (
@@ -67,6 +68,13 @@ def audit(robot: RobotSpec | RobotModel) -> Audit:
         mass_kg=sum(g.mass for g in given.values()),
         problems=tuple(problems),
     )
+
+
+def unusable(spec: RobotSpec, reason: object) -> InputError:
+    """Refuse a robot that a simulator does not take: the audit's first fatal problem, else the simulator's words."""
+    fatal = next((p for p in audit(spec).problems if p.severity == "fatal"), None)
+    text = fatal.message if fatal else " ".join(str(reason).removeprefix("Error: ").split())
+    return InputError(f"robot {spec.name!r}", f"cannot be simulated: {text}", "type: skillframe robots check")
 
 
 def mass_matrix_problems(robot: RobotModel, given: dict[str, Given], bodies: list[Body]) -> Iterator[Problem]:

@@ -94,7 +94,12 @@ def load_model(spec: RobotSpec) -> RobotModel:
 
 
 def _check_machine(spec: RobotSpec, urdf: Urdf) -> None:
-    """Names in [[loop]] and [[actuation]], so that a slip is found by `robots check` and not by the first run."""
+    """Names of links and joints in robot.toml, so that a slip is found by `robots check` and not by the first run."""
+    if spec.payload is not None and spec.payload.link not in urdf.links:
+        raise UnknownName("link", spec.payload.link, urdf.links, f"named in {spec.name}'s [payload]")
+    for joint in spec.friction_share:
+        if joint not in urdf.joints:
+            raise UnknownName("joint", joint, urdf.joints, f"named in {spec.name}'s [friction_share]")
     for name in (frame for loop in spec.loop for frame in (loop.frame_a, loop.frame_b)):
         if name not in urdf.links and name not in urdf.joints:
             raise UnknownName("frame", name, urdf.links, f"named in {spec.name}'s [[loop]]")

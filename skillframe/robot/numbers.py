@@ -68,6 +68,10 @@ def check_joint_numbers(path: Path, name: str, joint: ET.Element) -> None:
         element = joint.find(tag)
         for attribute in attributes if element is not None else ():
             _check(f"{where} {tag}", element, attribute, 1)
+    limit = joint.find("limit")
+    for attribute in ("effort", "velocity"):
+        if numbers(limit, attribute, 1, (0.0,))[0] < 0.0:
+            raise InputError(f"{where} limit", f"{attribute} is below zero", "give its size")
     mimic = joint.find("mimic")
     if mimic is not None and not mimic.get("joint"):
         raise InputError(f"{where} mimic", "names no joint to follow", 'write <mimic joint="..."/>')

@@ -250,12 +250,34 @@ def _check_values(declared: RobotFile, where: str) -> None:
     box = declared.limits.workspace_m
     if box is not None and not all(low < high for low, high in zip(*box, strict=True)):
         raise InputError(f"{where}: limits.workspace_m", f"{box} is empty", "give the lower corner first")
-    names = [arm.name for arm in declared.arm]
-    if len(set(names)) < len(names):
-        raise InputError(f"{where}: arm", f"two arms have one name ({', '.join(names)})", "rename one")
+    for joint, share in declared.friction_share.items():
+        if not 0.0 <= share < math.inf:
+            raise InputError(f"{where}: friction_share.{joint}", f"is {share:g}", "give 0 or more")
+    place = declared.workspace
+    if not all(abs(x) <= LARGEST for x in place.fixture):
+        raise InputError(f"{where}: workspace.fixture", "is beyond any physical size", "give metres in base")
+    if abs(math.hypot(*place.attitude) - 1.0) > 0.01:
+        size = f"has the length {math.hypot(*place.attitude):g}, not 1"
+        raise InputError(f"{where}: workspace.attitude", size, "give a unit quaternion, x, y, z, w")
+    _check_names(declared, where)
     if (load := declared.payload) is not None and not 0.0 <= load.mass <= load.rating < math.inf:
         text = f"mass {load.mass:g} kg is not within 0 and the rating of {load.rating:g} kg"
         raise InputError(f"{where}: payload", text, "correct it")
     for link, inertia in declared.inertia.items():
         if not all(abs(x) <= LARGEST for x in (inertia.mass, *inertia.com, *inertia.inertia)):
             raise InputError(f"{where}: inertia.{link}", "holds a number beyond any physical size", "correct it")
+
+
+def _check_names(declared: RobotFile, where: str) -> None:
+    """Names that must differ, and must be there."""
+    names = [arm.name for arm in declared.arm]
+    if not all(names):
+        raise InputError(f"{where}: arm", "an arm has an empty name", 'write for example name = "arm"')
+    if len(set(names)) < len(names):
+        raise InputError(f"{where}: arm", f"two arms have one name ({', '.join(names)})", "rename one")
+    driven = [actuation.joint for actuation in declared.actuation]
+    if len(set(driven)) < len(driven):
+        raise InputError(f"{where}: actuation", f"two drive one joint ({', '.join(driven)})", "keep one of them")
+    for loop in declared.loop:
+        if loop.frame_a == loop.frame_b:
+            raise InputError(f"{where}: loop", f"closes {loop.frame_a!r} on itself", "name two frames")

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float, Pose, move_wrench, norm, quaternion_from_matrix, rotate, rotation_matrix
+from skillframe.robot.audit import unusable
 from skillframe.robot.carried import loaded_inertias
 from skillframe.robot.model import RobotModel
 from skillframe.world.convert import FIXTURE, SECOND, TIMESTEP, build_spec, held
@@ -66,7 +67,10 @@ class Plant:
     ) -> None:
         _leave_no_log_file()
         self.robot, self.scene, self.count = robot, scene, count
-        self.model = build_spec(robot, scene, timestep).compile()
+        try:
+            self.model = build_spec(robot, scene, timestep).compile()
+        except ValueError as error:
+            raise unusable(robot.spec, error) from None
         self.batch = mujoco.batch.Batch(self.model, count, nthread=1, persistent=True)
         self._layout = Layout(self.model)
         self._fixture, self._held, self.tool = fixture, held(robot, scene), scene.tool
