@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +17,7 @@ from skillframe.cli.numbers import POSITIVE, SEED
 if TYPE_CHECKING:
     from skillframe.trace import Trace
 
+LONGEST_S, RATE_HZ = 20.0, 100.0
 QUIET_S = 5.0  # a run that is over by then needs no progress
 
 
@@ -28,8 +31,10 @@ QUIET_S = 5.0  # a run that is over by then needs no progress
 @click.option("--replay", type=PAGE, help="Page with a 3-D replay and plots of the run (.html).")
 @click.option("--video", type=click.Path(path_type=Path), help="Film of the run (.mp4).")
 @click.option("--seed", default=0, show_default=True, type=SEED, help="Seed of the sensor noise.")
-@click.option("--duration", default=20.0, show_default=True, type=POSITIVE, help="Longest run in simulated seconds.")
-@click.option("--rate", default=100.0, show_default=True, type=POSITIVE, help="Rate of the trace [Hz].")
+@click.option(
+    "--duration", default=LONGEST_S, show_default=True, type=POSITIVE, help="Longest run in simulated seconds."
+)
+@click.option("--rate", default=RATE_HZ, show_default=True, type=POSITIVE, help="Rate of the trace [Hz].")
 @click.option("--json", "as_json", is_flag=True, help="The outcome as JSON on stdout.")
 def command(
     skill: str, world: str, robot: str, coc: str | None, settings: tuple[str, ...], out: Path | None,
@@ -67,7 +72,8 @@ def command(
         )  # fmt: skip
     assert result.traces is not None
     trace = result.traces[0]
-    trace.meta.update({"skill": name, "seed": seed, "draws": draws})
+    typed = _typed(skill, world, robot, coc, settings, seed, duration, rate)
+    trace.meta.update({"skill": name, "seed": seed, "draws": draws, "command": typed})
     if out is not None:
         trace.save(out)
     if replay is not None:
@@ -78,6 +84,19 @@ def command(
     if result.interrupted:
         raise KeyboardInterrupt
     return 0 if result.success[0] else 1
+
+
+def _typed(
+    skill: str, world: str, robot: str, coc: str | None, settings: Sequence[str], seed: int, duration: float,
+    rate: float,
+) -> str:  # fmt: skip
+    """What to type to get the same run again, without where it goes."""
+    words = ["skillframe", "run", skill, "--world", world, "--robot", robot]
+    words += [] if coc is None else ["--coc", coc]
+    words += [word for text in settings for word in ("--set", text)]
+    words += ["--seed", f"{seed}"]
+    words += [] if duration == LONGEST_S else ["--duration", f"{duration:g}"]
+    return shlex.join([*words, *([] if rate == RATE_HZ else ["--rate", f"{rate:g}"])])
 
 
 def _write_replay(trace: Trace, path: Path) -> None:
@@ -104,6 +123,11 @@ def _known(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def _hundredths(value: float) -> str:
+    """A figure of which thousandths mean nothing, and never none."""
+    return f"{value:.2f}" if value >= 0.01 else "less than 0.01"
+
+
 def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) -> None:
     keys = ["success", "failure", "reason", "duration_s", "peak_force_n", "final_error_m", "final_error_rad"]
     outcome = {key: _known(meta[key]) for key in keys}
@@ -117,8 +141,8 @@ def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) ->
     ended = f"  ended after {meta['duration_s']:.2f} s ({meta['reason']})"
     if None not in outcome.values():
         ended += (
-            f"; largest contact force {meta['peak_force_n']:.1f} N; {meta['final_error_m'] * 1000:.2f} mm and "
-            f"{meta['final_error_rad'] * 57.29578:.2f} degrees from the goal"
+            f"; largest contact force {meta['peak_force_n']:.1f} N; {_hundredths(meta['final_error_m'] * 1000)} mm and "
+            f"{_hundredths(math.degrees(meta['final_error_rad']))} degrees from the goal"
         )
     click.echo(ended)
     for what, path in files.items():

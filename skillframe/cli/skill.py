@@ -94,6 +94,7 @@ def explain(file: Path, out: Path) -> None:
 
 def _page(name: str, document: Document, words: Sequence[str], pictures: Sequence[Illustration]) -> str:
     """One HTML page that needs nothing else: words, pictures, where it comes from."""
+    from skillframe.report.learned import labelled
     from skillframe.report.markup import Markup, data_uri, tag
 
     cards = [
@@ -106,7 +107,9 @@ def _page(name: str, document: Document, words: Sequence[str], pictures: Sequenc
         )
         for picture in pictures
     ]
-    details = tag("section", tag("h2", "In words"), tag("ul", *(tag("li", line) for line in words[1:])), class_="card")
+    details = tag(
+        "section", tag("h2", "In words"), tag("ul", *(tag("li", *labelled(line)) for line in words[1:])), class_="card"
+    )
     sources = ", ".join(source["file"] for source in document["learned_from"]) or "nothing"
     made = f"Skill of type {document['type']}, learned from {sources}."
     head = tag(

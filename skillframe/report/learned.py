@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,6 +14,7 @@ from skillframe.report.markup import Markup, data_uri, escape, figure, join, not
 from skillframe.report.sources import Chapter
 
 PARTS = ("translation", "rotation")
+LABEL = re.compile(r"(phase \d+: )?[a-z]{1,12}: ")
 
 
 def learned_section(chapter: Chapter) -> Markup:
@@ -40,7 +42,7 @@ def described(document: Mapping[str, Any]) -> tuple[list[str], str]:
 def skill_block(name: str, document: Mapping[str, Any]) -> Markup:
     """One skill: words, pictures, numbers, where it comes from."""
     lines, trouble = described(document)
-    words = tag("ul", *[tag("li", line) for line in lines], class_="words") if lines else ""
+    words = tag("ul", *[tag("li", *labelled(line)) for line in lines], class_="words") if lines else ""
     pictures, more_trouble = _pictures(document)
     numbers = _numbers(document)
     folded = numbers if trouble else tag("details", tag("summary", "The numbers in the file"), numbers)
@@ -49,6 +51,12 @@ def skill_block(name: str, document: Mapping[str, Any]) -> Markup:
         note(trouble) if trouble else "", words, _origin(document), note(more_trouble) if more_trouble else "",
         tag("div", *pictures, class_="grid stacked") if pictures else "", folded, class_="skill",
     )  # fmt: skip
+
+
+def labelled(line: str) -> list[object]:
+    """A line of a description with what it is about, if it says so first, set off."""
+    found = LABEL.match(line)
+    return [tag("strong", found[0]), line[found.end() :]] if found else [line]
 
 
 def _kind(document: Mapping[str, Any]) -> SkillType | None:

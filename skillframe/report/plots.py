@@ -21,10 +21,13 @@ AXES = ("x", "y", "z")
 LEAST_RANGE = {"N": 1.0, "Nm": 0.05, "mm": 0.5, "°": 0.5}
 MOST_EVENTS = 12
 CONTACT_N = 0.5
-LABEL_GAP = 12.0
+LABEL_GAP, LIMIT_GAP = 12.0, 24.0
 HEADROOM = 0.06
 """Share of a plot's height that is left above the curves, for the numbers of events."""
-FORCE_CAPTION = "What the environment does to the tool, filtered; x, y, z are the robot's base axes."
+FORCE_CAPTION = (
+    "What the environment does to the tool, filtered, which is what limits are held against; x, y, z are the robot's "
+    "base axes."
+)
 POSITION_CAPTION = (
     "Of the centre of compliance, from the start. Dashed: asked for by the skill; where they part, the environment led."
 )
@@ -81,7 +84,8 @@ def _limit_line(axes: Axes, limit: float | None, unit: str) -> Markup:
         return Markup("")
     y = float(axes.up(limit))
     line = tag("line", x1=LEFT, x2=axes.right, y1=round(y, 1), y2=round(y, 1), class_="limit")
-    return join([line, text(LEFT + 6, y - 5, f"limit {limit:g} {unit}", "limit-text", "start")])
+    beside = y - 5 if y - axes.top > LIMIT_GAP else y + 12  # at the top stand the numbers of events
+    return join([line, text(LEFT + 6, beside, f"limit {limit:g} {unit}", "limit-text", "start")])
 
 
 def _event_marks(axes: Axes, events: Sequence[tuple[float, str]]) -> Markup:

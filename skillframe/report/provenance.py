@@ -3,71 +3,114 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from skillframe.report.learned import flat, value_text
-from skillframe.report.markup import Markup, join, table, tag
+from skillframe.report.markup import Markup, join, number, table, tag
+from skillframe.report.quantities import quantity
 from skillframe.report.sources import Chapter
 
-SHOWN_ELSEWHERE = ("skills", "comparisons", "format")
+SHOWN_ELSEWHERE = ("skills", "comparisons", "format", "version", "versions", "hashes")
+LABELS = {
+    "complete": "all trials have run", "planned_trials": "trials per skill", "sessions": "times started or resumed",
+    "stopped_after_trial": "stopped early after trial", "wall_s": "wall time [s]",
+    "center_of_compliance": "centre of compliance [m, tool frame]",
+}  # fmt: skip
+SI = ", in SI units where none stands"
+Rows = list[tuple[object, object]]
 
 
 def provenance_section(chapter: Chapter) -> Markup:
     """Facts, files, commands."""
-    facts = _facts(chapter)
     parts = [
         tag("h3", "Repeat it"),
         tag("pre", "\n".join(commands(chapter))),
         tag("p", _place(chapter), class_="caption"),
     ]
-    if facts:
-        parts += [tag("h3", "What it depends on"), table(("", "value"), facts, numeric=9)]
+    blocks = [_block(title, rows) for title, rows in _facts(chapter) if rows]
+    if blocks:
+        parts += [tag("h3", "What it depends on"), tag("div", *blocks, class_="grid stacked")]
     if chapter.hashes:
-        rows = [(name, tag("code", digest)) for name, digest in chapter.hashes]
-        parts.append(
-            tag(
-                "details",
-                tag("summary", f"The {len(rows)} files this chapter was made from (SHA-256)"),
-                table(("file", "hash"), rows, numeric=9),
-            )
-        )
+        count = f"{len(chapter.hashes)} files" if len(chapter.hashes) > 1 else "file"
+        parts.append(_folded(f"The {count} this chapter was made from (SHA-256)", chapter.hashes))
+    as_run = flat(chapter.summary.get("hashes") or {})
+    if as_run:
+        rows = [(name.removeprefix("files."), str(digest)) for name, digest in sorted(as_run.items())]
+        parts.append(_folded("What ran, as the campaign noted it (SHA-256)", rows))
     if chapter.spec_text:
         parts.append(tag("details", tag("summary", "campaign.toml"), tag("pre", chapter.spec_text)))
     return join(parts)
 
 
-def _facts(chapter: Chapter) -> list[tuple[object, object]]:
-    """The summary's figures but those that are counted from the rows, and the scene's parameters."""
-    summary = {k: v for k, v in chapter.summary.items() if k not in SHOWN_ELSEWHERE}
-    scene = {k: v for k, v in chapter.scene.items() if k in ("params", "analytic")}
-    values: dict[str, Any] = {**flat(summary), **{f"scene.{k}": v for k, v in flat(scene).items()}}
-    if not values and chapter.runs:
-        values = _trace_facts(chapter.runs[0].trace.meta)
-    return [(_label(key), value_text(value)) for key, value in sorted(values.items())]
+def _block(title: str, rows: Rows) -> Markup:
+    return tag("div", tag("h4", title), table(("", ""), rows, numeric=9, class_="bare"), class_="card")
 
 
-def _trace_facts(meta: Mapping[str, Any]) -> dict[str, Any]:
-    names = ("robot", "world", "params", "seed", "trial", "draws", "skill", "center_of_compliance", "versions")
-    return flat({key: meta[key] for key in names if meta.get(key) is not None})
+def _folded(title: str, hashes: Iterable[tuple[str, str]]) -> Markup:
+    rows = [(name, tag("code", digest)) for name, digest in hashes]
+    return tag("details", tag("summary", title), table(("file", "hash"), rows, numeric=9))
+
+
+def _facts(chapter: Chapter) -> list[tuple[str, Rows]]:
+    """What ran, the world's parameters, and the versions, each under its title."""
+    meta = chapter.runs[0].trace.meta if chapter.runs and not chapter.summary else {}
+    names = ("robot", "world", "seed", "trial", "draws", "skill", "center_of_compliance")
+    ran = {key: meta[key] for key in names if meta.get(key) is not None} if meta else chapter.summary
+    scene = chapter.scene or meta
+    title = "The campaign" if chapter.summary else "The run"
+    return [
+        (title, _plain({key: value for key, value in ran.items() if key not in SHOWN_ELSEWHERE and value is not None})),
+        (f"The world's parameters{SI}", _physical(scene.get("params") or {})),
+        ("What theory says of it", _physical(scene.get("analytic") or {})),
+        ("Versions", _plain(chapter.summary.get("versions") or meta.get("versions") or {})),
+    ]
+
+
+def _plain(values: Mapping[str, Any]) -> Rows:
+    flattened = flat(values)
+    quantities = {key for key in flattened if key.startswith("draws.")}
+    drawn = _physical({key.removeprefix("draws."): flattened[key] for key in sorted(quantities)})
+    rest: Rows = [(_label(key), value_text(flattened[key])) for key in sorted(set(flattened) - quantities)]
+    return rest + drawn
+
+
+def _physical(values: Mapping[str, Any]) -> Rows:
+    """Quantities in units for people, as everywhere else on the page."""
+    rows: Rows = []
+    for key, value in sorted(flat(values).items()):
+        named = quantity(key.removesuffix("_rad"))
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            rows.append((named.label, value_text(value)))
+        else:
+            rows.append((named.label, f"{number(named.factor * value, 4)} {named.unit}".strip()))
+    return rows
 
 
 def _label(key: str) -> str:
-    return {"wall_s": "wall time [s]"}.get(key, key.replace("_", " "))
+    return LABELS.get(key, key.replace("_", " "))
 
 
 def _place(chapter: Chapter) -> str:
     """Where the commands are typed: the page knows names of files and not where they lie, so that it can be moved."""
     if chapter.folder:
         return f"Typed in the folder that holds {chapter.folder}."
+    if any(_command(run.trace.meta) for run in chapter.runs):
+        return "Runs are typed where they were first typed, the report in the folder that holds the traces."
     return "Typed in the folder that holds the traces."
+
+
+def _command(meta: Mapping[str, Any]) -> str:
+    return str(meta.get("command") or "")
 
 
 def commands(chapter: Chapter) -> list[str]:
     """What to type to get the same again."""
     if not chapter.folder:
-        names = " ".join(shlex.quote(run.name) for run in chapter.runs)
-        return [f"skillframe report {names} --out report.html"]
+        names = [shlex.quote(run.name) for run in chapter.runs]
+        typed = [(_command(run.trace.meta), name) for run, name in zip(chapter.runs, names, strict=True)]
+        runs = [f"{command} --out {name}" for command, name in typed if command]
+        return [*runs, f"skillframe report {' '.join(names)} --out report.html"]
     folder = shlex.quote(chapter.folder)
     lines = []
     if chapter.spec:

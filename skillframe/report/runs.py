@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -70,13 +71,19 @@ def _story(meta: Mapping[str, Any]) -> str:
     facts = [where, str((not meta.get("success") and meta.get("failure")) or meta.get("reason") or "")]
     for key, what, unit, factor in (
         ("duration_s", "took", "s", 1.0),
-        ("peak_force_n", "peak force", "N", 1.0),
+        ("peak_force_n", "peak force in the simulator", "N", 1.0),
         ("final_error_m", "final error", "mm", 1e3),
     ):
         if isinstance(meta.get(key), int | float):
-            facts.append(f"{what} {number(float(meta[key]) * factor)} {unit}")
+            facts.append(f"{what} {_figure(float(meta[key]) * factor)} {unit}")
     drawn = [_draw_text(name, value) for name, value in sorted((meta.get("draws") or {}).items())]
-    return "; ".join(f for f in facts if f) + "." + (f" Drawn for this trial: {', '.join(drawn)}." if drawn else "")
+    how = "Set for this run" if meta.get("trial") is None else "Drawn for this trial"
+    return "; ".join(f for f in facts if f) + "." + (f" {how}: {', '.join(drawn)}." if drawn else "")
+
+
+def _figure(value: float) -> str:
+    """A measured figure; below a hundredth of a millimetre, of a second or of a newton nothing is known."""
+    return number(value) if value >= 0.01 or not math.isfinite(value) else "< 0.01"
 
 
 def _draw_text(name: str, value: Any) -> str:

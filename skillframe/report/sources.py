@@ -91,10 +91,12 @@ def _folders(path: Path) -> list[Path]:
 
 def read_traces(paths: Sequence[Path]) -> Chapter:
     """A chapter of trace files; every one of them must be readable."""
-    chapter = Chapter(name="Single run" if len(paths) == 1 else "Single runs", traces=len(paths))
+    chapter = Chapter(name="Single runs", traces=len(paths))
     for path in paths:
         chapter.runs.append(Run(path.name, load_trace(path)))
         _remember(chapter, path, path.name)
+    if len(paths) == 1:
+        chapter.name = f"A run of {chapter.runs[0].trace.meta.get('skill') or paths[0].name}"
     return chapter
 
 

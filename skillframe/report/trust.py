@@ -121,7 +121,7 @@ def _failures(results: Results, folder: str) -> Markup:
             blocks.append(tag("div", tag("h4", skill), tag("p", f"No failure in {total} trials."), class_="card"))
             continue
         rows = [(cause, len(trials), percent(len(trials) / total), _named(trials)) for cause, trials in causes]
-        blocks.append(tag("div", tag("h4", skill), table(("cause", "trials", "share", "trial"), rows), class_="card"))
+        blocks.append(tag("div", tag("h4", skill), table(("cause", "trials", "share", "which"), rows), class_="card"))
     replay = tag(
         "p",
         "To see one again, bit by bit: ",
@@ -143,8 +143,12 @@ def _forces(chapter: Chapter, results: Results) -> Markup:
         return note("The table holds no peak forces.")
     known = [(skill, float(np.median(f)), float(f.max())) for skill, f in finite.items() if len(f)]
     said = [f"{skill}: median {number(middle)} N, highest {number(top)} N" for skill, middle, top in known]
+    held = " Peaks are the simulator's; limits are held against the filtered force, which has lower ones."
     drawn = figure(
-        "", "; ".join(said) + ".", _histogram(list(finite.values()), chapter.force_limit), class_="plot wide"
+        "",
+        "; ".join(said) + "." + held * (chapter.force_limit is not None),
+        _histogram(list(finite.values()), chapter.force_limit),
+        class_="plot wide",
     )
     return join([tag("h3", "How hard it pushed"), _skill_key(results), drawn])
 

@@ -1,11 +1,16 @@
 import json
+import shlex
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from skillframe.cli.main import run
 from skillframe.conformance.examples import example_demonstrations
 from skillframe.demonstration.files import write_demonstration
+from skillframe.report.provenance import commands
+from skillframe.report.sources import read_traces
+from skillframe.trace import Trace
 
 pytestmark = pytest.mark.needs_plugins
 
@@ -25,6 +30,21 @@ def test_a_run_leaves_a_trace_a_page_and_a_film(skill: str, tmp_path: Path, caps
     assert code == (0 if said["success"] else 1)
     assert {what: said[what] for what in files} == {what: str(path) for what, path in files.items()}
     assert all(path.stat().st_size > 1000 for path in files.values())
+
+
+def test_what_the_report_says_to_repeat_a_run_repeats_it(
+    skill: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    options = ["--world", "free", "--coc", "wrist", "--set", "start.offset_x=0.002", "--seed", "3"]
+    run(["run", skill, *options, "--duration", "0.3", "--rate", "50", "--out", "a.npz"])
+    first = Trace.load(Path("a.npz"))
+    (typed, _) = commands(read_traces([Path("a.npz")]))
+    assert shlex.split(typed)[-2:] == ["--out", "a.npz"]
+    run([*shlex.split(typed)[1:-1], "b.npz"])
+    again = Trace.load(Path("b.npz"))
+    assert again.meta == first.meta
+    assert np.array_equal(again.wrench, first.wrench)
 
 
 def test_a_film_that_could_not_be_written_is_refused_before_the_run(
