@@ -22,6 +22,7 @@ LEAST_RANGE = {"N": 1.0, "Nm": 0.05, "mm": 0.5, "°": 0.5}
 MOST_EVENTS = 12
 CONTACT_N = 0.5
 LABEL_GAP, LIMIT_GAP = 12.0, 24.0
+AFTER = 0.01
 HEADROOM = 0.06
 """Share of a plot's height that is left above the curves, for the numbers of events."""
 FORCE_CAPTION = (
@@ -92,10 +93,12 @@ def _event_marks(axes: Axes, events: Sequence[tuple[float, str]]) -> Markup:
     """Numbered lines at events; numbers that would overlap are written together."""
     lines: list[Markup] = []
     labels: list[tuple[float, str]] = []
-    for index, (when, what) in enumerate(events[:MOST_EVENTS], start=1):
+    first, last = axes.x
+    for index, (told, what) in enumerate(events[:MOST_EVENTS], start=1):
+        when = last if last < told < last + AFTER * (last - first) else told  # the end comes after the last sample
         if axes.inside(when, vertical=False):
             x = round(float(axes.across(when)), 1)
-            tip = tag("title", f"{when:.2f} s: {what}")
+            tip = tag("title", f"{told:.2f} s: {what}")
             lines.append(tag("line", tip, x1=x, x2=x, y1=axes.top, y2=axes.bottom, class_="event"))
             together = bool(labels) and x - labels[-1][0] < LABEL_GAP
             labels = (

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 from skillframe.records import Document, Illustration
 from skillframe.registry import registry
 from skillframe_segmenter.document import PolicyDocument, read
+from skillframe_segmenter.pictures import cuts
 from skillframe_segmenter.policy import successor_words
 
 SIGNALS = {
     "wrench_hmm": "the contact wrench asks for the next phase, or a phase comes to rest",
     "pose_hmm": "the pose asks for the next phase, or a phase comes to rest",
 }
-COLOURS = ("#3b6fb6", "#d9772b", "#3a9b5c", "#b0457b", "#8a6fc0", "#7a6a53", "#4aa3b5", "#c2a83e")
 
 
 def describe(document: Document) -> list[str]:
@@ -56,32 +54,13 @@ def _words(policy: PolicyDocument) -> list[list[str]]:
 def explain(document: Document) -> list[Illustration]:
     """Where the demonstrations were cut, then the pictures of each phase."""
     pictures = [
-        Illustration("Phases", "Where each demonstration was cut; equal colours are one phase.", _bars(document))
-    ]
+        Illustration(
+            "Phases", "Where each demonstration was cut; equal colours and numbers are one phase.",
+            cuts(document.get("demonstrations", [])),
+        )
+    ]  # fmt: skip
     for i, sub in enumerate(read(document).skills):
         kind = registry().skill(sub["type"])
         for picture in kind.explain(sub) if kind.explain is not None else []:
             pictures.append(picture._replace(title=f"Phase {i + 1}: {picture.title}"))
     return pictures
-
-
-def _bars(document: Document) -> str:
-    rows = list(document.get("demonstrations", []))
-    longest = max((row.get("end", 0.0) for row in rows), default=0.0) or 1.0
-    scale, parts = 640.0 / longest, []
-    for i, row in enumerate(rows):
-        y = 24 + 34 * i
-        edges = [row.get("start", 0.0), *row["boundaries"], row.get("end", longest)]
-        for (start, stop), label in zip(pairwise(edges), row["labels"], strict=True):
-            parts.append(
-                f'<rect x="{120 + scale * (start - edges[0]):.1f}" y="{y}" width="{scale * (stop - start):.1f}" '
-                f'height="22" fill="{COLOURS[label % len(COLOURS)]}"/>'
-                f'<text x="{124 + scale * (start - edges[0]):.1f}" y="{y + 16}" fill="#fff" font-size="13">'
-                f"{label + 1}</text>"
-            )
-        parts.append(f'<text x="8" y="{y + 16}" font-size="13" fill="#333">demonstration {i + 1}</text>')
-    height = 40 + 34 * len(rows)
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 780 {height}" width="780" height="{height}" '
-        f'font-family="sans-serif">{"".join(parts)}</svg>'
-    )
