@@ -17,15 +17,30 @@ def loop(initial, emission, transition):
     """Forward and backward one window after the other."""
     density = np.exp(emission)
     forward, backward = [initial * density[0]], [np.ones(len(initial))]
+    log_scale = 0.0
     for t in range(1, len(emission)):
-        forward.append(forward[-1] @ transition[t - 1] * density[t])
-        backward.append(transition[-t] @ (density[-t] * backward[-1]))
+        log_scale += np.log(forward[-1].sum())
+        forward.append(forward[-1] / forward[-1].sum() @ transition[t - 1] * density[t])
+        backward.append(transition[-t] @ (density[-t] * backward[-1] / backward[-1].sum()))
     forward, backward = np.array(forward), np.array(backward[::-1])
     posterior = forward * backward
-    return posterior / posterior.sum(axis=1, keepdims=True), np.log(forward[-1].sum()), forward, backward
+    return posterior / posterior.sum(axis=1, keepdims=True), log_scale + np.log(forward[-1].sum()), forward, backward
 
 
-@pytest.mark.parametrize(("windows", "phases"), [(2, 2), (9, 3), (10, 1), (37, 5)])
+def path_by_loop(initial, emission, transition):
+    """Viterbi's path one window after the other."""
+    score, back = np.log(initial) + emission[0], []
+    for t in range(1, len(emission)):
+        arriving = score[:, None] + np.log(transition[t - 1])
+        back.append(arriving.argmax(axis=0))
+        score = arriving.max(axis=0) + emission[t]
+    path = [int(score.argmax())]
+    for before in reversed(back):
+        path.append(int(before[path[-1]]))
+    return path[::-1]
+
+
+@pytest.mark.parametrize(("windows", "phases"), [(2, 2), (9, 3), (10, 1), (37, 5), (900, 3)])
 def test_blocks_give_what_the_loop_over_windows_gives(windows, phases):
     initial, emission, transition = random_chain(np.random.default_rng([windows, phases]), windows, phases)
     posterior, log_likelihood, _, _ = loop(initial, emission[0], transition[0])
@@ -70,3 +85,10 @@ def test_the_most_likely_path_beats_every_other():
 
     best = max(itertools.product(range(3), repeat=6), key=log_probability)
     assert tuple(chain.most_likely_path(initial, emission[0], transition[0])) == best
+
+
+@pytest.mark.parametrize(("windows", "phases"), [(2, 2), (9, 3), (10, 1), (37, 5), (900, 3)])
+def test_blocks_give_the_path_that_the_loop_over_windows_gives(windows, phases):
+    initial, emission, transition = random_chain(np.random.default_rng([5, windows, phases]), windows, phases)
+    found = chain.most_likely_path(initial, emission[0], transition[0])
+    assert found.tolist() == path_by_loop(initial, emission[0], transition[0])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from skillframe_segmenter.learning import _one_push, alternatives, neighbours
+from skillframe_segmenter.learning import _one_push, _turn_alike, alternatives, neighbours
 from skillframe_segmenter.merge import _leaning
 
 
@@ -60,3 +60,26 @@ def test_a_peg_that_is_aligned_between_approach_and_insertion_makes_no_detour():
     one_way, other_way = {"labels": [0, 1, 0]}, {"labels": [0, 2, 0]}
     assert (0, 1) not in alternatives([one_way, one_way])
     assert alternatives([one_way, other_way]) == [(1, 2)]
+
+
+X, Y, Z = np.eye(3).tolist()
+
+
+@pytest.mark.parametrize(
+    ("one", "two", "alike"),
+    [
+        ({"desired_direction": Y}, {"desired_direction": [0.0, -1.0, 0.0]}, True),  # righted from either side
+        ({"desired_direction": Y}, {"compliant_axes": [Y]}, True),  # shown from both sides within one of them
+        ({"desired_direction": Y}, {"compliant_axes": [X, Y]}, True),
+        ({"desired_direction": Y}, {"fully_compliant": True}, True),
+        ({"desired_direction": Y}, {"desired_direction": Z}, False),  # righted, and turned until it locks
+        ({"desired_direction": Y}, {"compliant_axes": [Z]}, False),
+        ({"desired_direction": Y}, {}, False),  # the attitude held
+        ({}, {}, True),
+    ],
+)
+def test_phases_may_stand_in_for_each_other_if_both_can_turn_as_the_other_turns(one, two, alike):
+    """One push explains lowering and interlocking; what tells them apart is the axis that they turn about."""
+    bodies = learned(0.0, **one), learned(0.0, **two)
+    assert _turn_alike(*bodies) is alike
+    assert _turn_alike(*bodies[::-1]) is alike

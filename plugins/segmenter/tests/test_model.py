@@ -67,6 +67,73 @@ def test_a_phase_s_direction_is_found_from_slides_on_planes_that_face_different_
     np.testing.assert_allclose(found, wanted, rtol=0.03)
 
 
+def seen_at_random(count):
+    u, a = (RNG.uniform(-0.5, 0.5, size=(count, 6)) for _ in range(2))
+    return emission.observe(u, a), u
+
+
+def test_densities_are_those_of_the_equation_written_out():
+    seen, u = seen_at_random(50)
+    root = RNG.normal(size=(2, 6, 6))
+    phases = emission.Phases(RNG.normal(size=(2, 6)), root @ np.swapaxes(root, 1, 2) + np.eye(6))
+    found = emission.log_likelihood(seen, phases)
+    for w in range(50):
+        for k in range(2):
+            whole = np.zeros((6, 6))
+            whole[:3, :3], whole[3:, 3:] = seen.free[w]
+            e, covariance = u[w] - whole @ phases.direction[k], phases.covariance[k]
+            expected = -0.5 * e @ np.linalg.solve(covariance, e) - 0.5 * np.linalg.slogdet(2.0 * np.pi * covariance)[1]
+            assert found[w, k] == pytest.approx(expected, rel=1e-10)  # a 6 x 6 system, solved twice
+
+
+def test_phases_are_those_of_the_equations_written_out():
+    seen, u = seen_at_random(80)
+    weight = RNG.dirichlet(np.ones(3), size=80)
+    found = emission.fit(seen, weight)
+    size, own = weight.sum(axis=0), []
+    for k in range(3):
+        direction = []
+        for part in range(2):
+            m, v = seen.free[:, part], u[:, 3 * part : 3 * part + 3]
+            moment = sum(weight[w, k] * m[w] for w in range(80)) + 0.01 * size[k] * np.eye(3)
+            direction.append(np.linalg.solve(moment, sum(weight[w, k] * m[w] @ v[w] for w in range(80))))
+        np.testing.assert_allclose(found.direction[k], np.concatenate(direction), rtol=1e-9)
+        moved = np.concatenate([seen.free[:, part] @ direction[part] for part in range(2)], axis=1)
+        scatter = ((u - moved) * weight[:, [k]]).T @ (u - moved)
+        own.append((scatter + 12.0 * 4.0 * 0.02**2 * np.eye(6)) / (size[k] + 12.0) + 0.02**2 * np.eye(6))
+    pooled = sum(n * s for n, s in zip(size, own, strict=True)) / size.sum()
+    for k in range(3):
+        share = size.sum() / 3.0
+        expected = (size[k] * own[k] + share * pooled) / (size[k] + share)
+        np.testing.assert_allclose(found.covariance[k], expected, rtol=1e-9)  # sums of 80 doubles, once solved
+
+
+@pytest.mark.parametrize("phases", [2, 4])
+def test_a_newton_step_is_the_one_of_finite_differences(phases):
+    """Gradient and curvature of the penalised expected log-likelihood by central differences, one row."""
+    phi = np.column_stack([RNG.uniform(-1.0, 1.0, size=(60, 2)), np.ones(60)])
+    target, row = RNG.dirichlet(np.ones(phases), size=60), 0.3 * RNG.normal(size=(phases, 3))
+    row[0] = 0.0
+    ridge = np.array([transitions.RIDGE, transitions.RIDGE, transitions.BIAS_RIDGE])
+
+    def value(x):
+        full = np.vstack([np.zeros(3), x.reshape(-1, 3)])
+        return (target * np.log(transitions.softmax(phi @ full.T))).sum() - 0.5 * (ridge * full**2).sum()
+
+    x, h = row[1:].ravel(), 1e-4
+    eye = h * np.eye(len(x))
+    gradient = np.array([(value(x + e) - value(x - e)) / (2.0 * h) for e in eye])
+    curvature = np.array(
+        [[value(x + a + b) - value(x + a - b) - value(x - a + b) + value(x - a - b) for b in eye] for a in eye]
+    )
+    step = np.linalg.solve(-curvature / (4.0 * h * h), gradient)
+    weights, joint = np.zeros((phases, phases, 3)), np.zeros((60, phases, phases))
+    weights[0], joint[:, 0] = row, target
+    found = transitions.improve(weights, np.zeros_like(weights), phi, joint, steps=1)[0] - row
+    assert np.abs(step).max() < transitions.LARGEST_STEP
+    np.testing.assert_allclose(found[1:].ravel(), step, rtol=1e-3, atol=1e-5)  # differences of second order, h^2
+
+
 @pytest.mark.parametrize("kind", ["wrench_hmm", "pose_hmm"])
 def test_em_never_loses_likelihood_while_the_motion_is_fitted(kind):
     """Up to the priors on covariances: the tempered likelihood itself may dip by less than a thousandth."""

@@ -3,13 +3,16 @@ r"""Forward and backward probabilities of a Markov chain whose transitions chang
     alpha_t = alpha_{t-1} A_t,    beta_{t-1} = A_t beta_t,    A_t(i, j) = P_t(i, j) b_t(j)
 
 A loop over T windows is what makes such a model slow in Python. The products of the K x K matrices A_t are therefore
-taken in about sqrt(T) blocks side by side, all demonstrations at once: prefix products inside every block, then one
-vector handed from block to block. All products are rescaled as they grow, so that nothing underflows. The result is
-that of the loop to rounding.
+taken in about sqrt(T) blocks side by side, all demonstrations and both directions at once (the backward pass is the
+forward pass of the reversed chain): prefix products inside every block, then one vector handed from block to block.
+Products are rescaled as they shrink, so that nothing underflows. The most likely path is the same with sums of logs for
+products and maxima for sums. The results are those of the loop to rounding. Inside, time is the last axis: K is small,
+and numpy is fast along a long one.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +21,7 @@ from numpy.typing import NDArray
 from skillframe.frames import Float
 
 TINY = 1e-300
+EVERY = 8  # products between two rescalings: a step shrinks by 1e-13 at most in practice, and doubles reach 1e-308
 
 
 class Smoothed(NamedTuple):
@@ -42,91 +46,125 @@ def smooth(initial: Float, emission: Float, transition: Float) -> Smoothed:
     Args:
         initial: (K,) probabilities of the first window.
         emission: (B, T, K) log densities; 0 in windows that only fill up a shorter demonstration.
-        transition: (B, T - 1, K, K), or (K, K) for all; identity into windows that only fill up.
+        transition: (B, T - 1, K, K); identity into windows that only fill up.
     """
-    highest = emission.max(axis=-1, keepdims=True)
-    density = np.exp(emission - highest) + TINY
-    first = initial * density[:, 0]
-    total = first.sum(axis=-1, keepdims=True)
-    steps = transition * density[:, 1:, None, :]
-    forward, log_scale = _forward(first / total, steps)
-    backward = _backward(steps)
+    batch, _, k = emission.shape
+    density, highest = _densities(emission)
+    first = initial[:, None] * density[:, :, 0]
+    total = first.sum(axis=0)
+    steps = np.moveaxis(transition, (0, 1), (-2, -1)) * density[:, :, 1:]
+    turned = np.swapaxes(steps, 0, 1)[..., ::-1]
+    starts = np.concatenate([first / total, np.full((k, batch), 1.0 / k)], axis=1)
+    passed, log_scale = _passed(starts, np.concatenate([steps, turned], axis=2))
+    forward, backward = passed[:, :batch], passed[:, batch:, ::-1]
     posterior = forward * backward
-    posterior /= posterior.sum(axis=-1, keepdims=True)
-    log_likelihood = highest[..., 0].sum(axis=1) + np.log(total[:, 0]) + log_scale
-    return Smoothed(posterior, forward, backward, log_likelihood)
+    posterior /= posterior.sum(axis=0)
+    log_likelihood = highest.sum(axis=1) + np.log(total) + log_scale[:batch]
+    return Smoothed(*(np.moveaxis(x, 0, -1) for x in (posterior, forward, backward)), log_likelihood)
 
 
-def _blocks(steps: Float) -> Float:
-    """(L, K, K, B, n): the steps of n blocks side by side, filled up with identities; long axes last, for speed."""
-    batch, count, k, _ = steps.shape
+def _time_last(x: Float) -> Float:
+    """(B, T, ...) with time and demonstrations moved to the end: (..., B, T)."""
+    return np.ascontiguousarray(np.moveaxis(x, (0, 1), (-2, -1)))
+
+
+def _densities(emission: Float) -> tuple[Float, Float]:
+    """Densities (K, B, T) over the highest of each window, and the log of the highest (B, T)."""
+    logs = _time_last(emission)
+    highest = logs.max(axis=0)
+    return np.exp(logs - highest) + TINY, highest
+
+
+def _blocks(steps: Float, neutral: Float) -> Float:
+    """(L, K, K, B, n): steps (K, K, B, T) in n blocks side by side, filled up with neutral steps (K, K)."""
+    k, _, batch, count = steps.shape
     length = max(1, int(np.ceil(np.sqrt(count))))
     blocks = max(1, -(-count // length))
-    filled = np.empty((batch, blocks * length, k, k))
-    filled[:, :count], filled[:, count:] = steps, np.eye(k)
-    return np.ascontiguousarray(filled.reshape(batch, blocks, length, k, k).transpose(2, 3, 4, 0, 1))
+    filled = np.empty((k, k, batch, blocks * length))
+    filled[..., :count], filled[..., count:] = steps, neutral[:, :, None, None]
+    return np.ascontiguousarray(np.moveaxis(filled.reshape(k, k, batch, blocks, length), -1, 0))
 
 
 def _product(a: Float, b: Float) -> Float:
-    """Matrix product over the first two axes (..., K, K, B, n) of both, all others side by side."""
-    result: Float = a[..., :, 0, None, :, :] * b[..., None, 0, :, :, :]
-    for j in range(1, b.shape[-4]):
-        result += a[..., :, j, None, :, :] * b[..., None, j, :, :, :]
+    """Matrix product over the first two axes (K, K, B, n) of both, all others side by side."""
+    result: Float = a[:, 0, None] * b[None, 0]
+    for j in range(1, len(b)):
+        result += a[:, j, None] * b[None, j]
     return result
 
 
-def _forward(first: Float, steps: Float) -> tuple[Float, Float]:
-    blocks = _blocks(steps)
-    length, k, _, batch, count = blocks.shape
-    scale = np.zeros((batch, count))
+def _best(a: Float, b: Float) -> Float:
+    """The same with sums for products and maxima for sums."""
+    result: Float = a[:, 0, None] + b[None, 0]
+    for j in range(1, len(b)):
+        np.maximum(result, a[:, j, None] + b[None, j], out=result)
+    return result
+
+
+def _applied(starts: Float, blocks: Float, apply: Callable[[Float, Float], Float], count: int) -> Float:
+    """(K, B, count) what vectors (K, B, n) at the starts of blocks become inside them, whose steps are `count`."""
+    inside = apply(starts[None, ..., None], np.moveaxis(blocks, 0, -1))[0]
+    result: Float = inside.reshape(*inside.shape[:2], -1)[..., :count]
+    return result
+
+
+def _passed(first: Float, steps: Float) -> tuple[Float, Float]:
+    """Normalised vectors (K, B, T + 1) that start as `first` (K, B), and the log of what was divided out (B,)."""
+    blocks = _blocks(steps, np.eye(len(first)))
+    length, _, _, batch, count = blocks.shape
+    log_scale = np.zeros((batch, count))
     for i in range(length):
         if i:
             blocks[i] = _product(blocks[i - 1], blocks[i])
-        size = blocks[i].max(axis=(0, 1))
-        blocks[i] /= size
-        scale += np.log(size)
-    carry, log_scale = np.ascontiguousarray(first.T), np.zeros(batch)
-    starts = np.empty((k, batch, count))
-    for i in range(count):
-        starts[:, :, i] = carry
-        carry = (carry[:, None] * blocks[-1, :, :, :, i]).sum(axis=0)
-        total = carry.sum(axis=0)
-        log_scale += scale[:, i] + np.log(total)
-        carry = carry / total
-    inside = _product(starts[None], blocks)[:, 0]
-    inside = inside.transpose(2, 3, 0, 1).reshape(batch, -1, k)[:, : steps.shape[1]]
-    inside /= inside.sum(axis=-1, keepdims=True)
-    return np.concatenate([first[:, None], inside], axis=1), log_scale
+        if i % EVERY == EVERY - 1 or i == length - 1:
+            size = blocks[i].max(axis=(0, 1))
+            blocks[i] /= size
+            log_scale += np.log(size)
+    starts, handed = _handed(first, blocks[-1])
+    inside = _applied(starts, blocks, _product, steps.shape[-1])
+    inside /= inside.sum(axis=0)
+    return np.concatenate([first[..., None], inside], axis=-1), log_scale.sum(axis=1) + handed
 
 
-def _backward(steps: Float) -> Float:
-    """The forward pass of the reversed chain: its steps are the transposes in reversed order."""
-    batch, _, k, _ = steps.shape
-    ones = np.full((batch, k), 1.0 / k)
-    turned, _ = _forward(ones, np.swapaxes(steps, -1, -2)[:, ::-1])
-    return turned[:, ::-1]
+def _handed(first: Float, across: Float) -> tuple[Float, Float]:
+    """Vectors (K, B, n) at the starts of blocks that they cross by (K, K, B, n); logs of what was divided out (B,)."""
+    matrices = np.ascontiguousarray(across.transpose(3, 2, 0, 1))
+    carry = np.ascontiguousarray(first.T)[:, None]
+    starts = np.empty((len(matrices), *carry.shape))
+    totals = np.empty((len(matrices), len(carry), 1, 1))
+    for i, matrix in enumerate(matrices):
+        starts[i] = carry
+        carry = carry @ matrix
+        totals[i] = carry.sum(axis=-1, keepdims=True)
+        carry /= totals[i]
+    return np.ascontiguousarray(starts[:, :, 0].transpose(2, 1, 0)), np.log(totals[:, :, 0, 0]).sum(axis=0)
 
 
 def pairs(smoothed: Smoothed, emission: Float, transition: Float) -> Float:
     """(B, T - 1, K, K) p(phase i at t - 1, phase j at t | all windows)."""
-    density = np.exp(emission - emission.max(axis=-1, keepdims=True)) + TINY
-    ahead = density[:, 1:] * smoothed.backward[:, 1:]
-    joint: Float = smoothed.forward[:, :-1, :, None] * transition * ahead[:, :, None, :]
-    joint /= joint.sum(axis=(-2, -1), keepdims=True)
-    return joint
+    density, _ = _densities(emission)
+    ahead = density[:, :, 1:] * np.moveaxis(smoothed.backward, -1, 0)[:, :, 1:]
+    steps = np.moveaxis(transition, (0, 1), (-2, -1))
+    joint = np.moveaxis(smoothed.forward, -1, 0)[:, None, :, :-1] * steps * ahead
+    joint /= joint.sum(axis=(0, 1))
+    return np.moveaxis(joint, (0, 1), (-2, -1))
 
 
 def most_likely_path(initial: Float, emission: Float, transition: Float) -> NDArray[np.intp]:
     """Viterbi path (T,) of one demonstration: emission (T, K) logs, transition (T - 1, K, K) probabilities."""
-    log_steps = np.log(transition + TINY)
-    score = np.log(initial + TINY) + emission[0]
-    back = np.empty((len(emission), len(score)), dtype=np.intp)
-    for t in range(1, len(emission)):
-        arriving = score[:, None] + log_steps[t - 1]
-        back[t] = arriving.argmax(axis=0)
-        score = arriving.max(axis=0) + emission[t]
-    path = np.empty(len(emission), dtype=np.intp)
-    path[-1] = score.argmax()
-    for t in range(len(emission) - 1, 0, -1):
-        path[t - 1] = back[t, path[t]]
-    return path
+    score = (np.log(initial + TINY) + emission[0])[:, None]
+    logs = _time_last(np.log(transition + TINY)[None])
+    steps = logs + emission[None, 1:].transpose(2, 0, 1)
+    blocks = _blocks(steps, np.log(np.eye(len(initial)) + TINY))
+    for i in range(1, len(blocks)):
+        blocks[i] = _best(blocks[i - 1], blocks[i])
+    starts = np.empty((*score.shape, blocks.shape[-1]))
+    for i in range(blocks.shape[-1]):
+        starts[..., i] = score
+        score = _best(score[None], blocks[-1, ..., i])[0]
+    scores = np.concatenate([starts[..., :1], _applied(starts, blocks, _best, steps.shape[-1])], axis=-1)
+    back = (scores[:, None, 0, :-1] + logs[:, :, 0]).argmax(axis=0).T.tolist()
+    path = [int(scores[:, 0, -1].argmax())]
+    for before in reversed(back):
+        path.append(before[path[-1]])
+    return np.array(path[::-1], dtype=np.intp)

@@ -11,6 +11,7 @@ length, started at the means farthest apart): one of the two places that the pha
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,15 +48,13 @@ def _cumulated(x: Float) -> tuple[Float, Float]:
 
 
 def _least_cost(x: Float, penalty: float) -> list[int]:
-    sums, squares = _cumulated(x)
+    cost = _costs(x)
     best, last = np.full(len(x) + 1, np.inf), np.zeros(len(x) + 1, dtype=np.intp)
     best[0] = -penalty
     for t in range(SHORTEST, len(x) + 1):
-        s = np.arange(0, t - SHORTEST + 1)
-        difference = sums[t] - sums[s]
-        cost = best[s] + squares[t] - squares[s] - (difference * difference).sum(axis=1) / (t - s) + penalty
-        last[t] = int(cost.argmin())
-        best[t] = cost[last[t]]
+        ways = best[: t - SHORTEST + 1] + cost[t, : t - SHORTEST + 1]
+        last[t] = ways.argmin()
+        best[t] = ways[last[t]] + penalty
     found, t = list[int](), len(x)
     while last[t] > 0:
         t = int(last[t])
@@ -63,20 +62,37 @@ def _least_cost(x: Float, penalty: float) -> list[int]:
     return found[::-1]
 
 
-def grouped(signals: Sequence[Float], phases: int) -> list[Labels] | None:
+def _costs(x: Float) -> Float:
+    """(T + 1, T + 1) cost of the segment that ends before its row's window and begins with its column's."""
+    sums, squares = _cumulated(x - x.mean(axis=0))
+    products = sums @ sums.T
+    size = np.diag(products)
+    edge = np.arange(len(sums))
+    length = np.maximum(edge[:, None] - edge, 1)
+    return squares[:, None] - squares - (size[:, None] + size - 2.0 * products) / length
+
+
+class Segments(NamedTuple):
+    """All segments of all demonstrations: how many windows (S,) each has, and their mean (S, n)."""
+
+    sizes: NDArray[np.intp]
+    means: Float
+
+
+def segments(signals: Sequence[Float]) -> Segments:
+    """The segments of signals (T, n), one after the other; a signal without windows has none."""
+    some = [x for x in signals if len(x)]
+    bounds = [np.array([0, *cuts(x), len(x)]) for x in some]
+    sizes = np.concatenate([np.diff(b) for b in bounds])
+    sums = np.concatenate([np.add.reduceat(x, b[:-1], axis=0) for x, b in zip(some, bounds, strict=True)])
+    return Segments(sizes, sums / sizes[:, None])
+
+
+def grouped(found: Segments, phases: int) -> Labels | None:
     """Labels of every window from K groups of segments; None if there are fewer segments than groups."""
-    bounds = [np.array([0, *cuts(x), len(x)]) for x in signals]
-    sizes = np.concatenate([np.diff(b) for b in bounds]).astype(float)
-    sums = np.concatenate([np.add.reduceat(x, b[:-1], axis=0) for x, b in zip(signals, bounds, strict=True)])
-    if len(sizes) < phases:
+    if len(found.sizes) < phases:
         return None
-    groups = _k_means(sums / sizes[:, None], sizes, phases)
-    result, first = list[Labels](), 0
-    for b in bounds:
-        count = len(b) - 1
-        result.append(np.repeat(groups[first : first + count], np.diff(b)))
-        first += count
-    return result
+    return np.repeat(_k_means(found.means, found.sizes.astype(float), phases), found.sizes)
 
 
 def _k_means(points: Float, weight: Float, k: int) -> Labels:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from skillframe.frames import Float
 from skillframe_segmenter import chain, changepoints, emission, transitions
+from skillframe_segmenter.changepoints import Segments
 from skillframe_segmenter.emission import DIMENSIONS, Observed, Phases
 from skillframe_segmenter.features import Features
 from skillframe_segmenter.settings import Settings
@@ -113,15 +114,14 @@ def gather(
     return Data(seen, np.concatenate(regressors), inside, temper, None if going is None else np.concatenate(going))
 
 
-def best(data: Data, signals: Sequence[Float], phases: int, settings: Settings) -> Fit:
-    """The better of the two starts for a number of phases, motion only; `signals` are what change points see."""
+def best(data: Data, segments: Segments, phases: int, settings: Settings) -> Fit:
+    """The better of the two starts for a number of phases, motion only; `segments` of all that does not go round."""
     straight = data.straight
     others = phases - (data.going is not None)
     starts = [_by_time([int(x.sum()) for x in data.split(straight)], others)]
-    parts = [x[mine] for x, mine in zip(signals, data.split(straight), strict=True) if mine.any()]
-    found = changepoints.grouped(parts, others)
+    found = changepoints.grouped(segments, others)
     if found is not None and others > 1:
-        starts.append(np.concatenate(found))
+        starts.append(found)
     if data.going is not None:
         starts = [_placed(x, straight, phases - 1) for x in starts]
     return max((converge(data, _leaky(x, phases), settings) for x in starts), key=lambda fit: fit.log_likelihood)
@@ -206,17 +206,19 @@ def _moving(data: Data, posterior: Float) -> Phases:
 
 
 def _expect(data: Data, model: Model, steps: Float) -> tuple[chain.Smoothed, Float]:
-    densities = np.zeros((*data.inside.shape, model.count))
-    densities[data.inside] = log_densities(data, model)
+    densities = np.zeros((model.count, *data.inside.shape))
+    densities[:, data.inside] = log_densities(data, model).T
+    densities = np.moveaxis(densities, 0, -1)
     return chain.smooth(model.initial, densities, steps), densities
 
 
 def _steps(data: Data, probabilities: Float) -> Float:
     """(B, T - 1, K, K) transitions into windows, from one row per window; the identity into windows that are not."""
     k = probabilities.shape[-1]
-    result = np.broadcast_to(np.eye(k), (*data.inside.shape, k, k)).copy()
-    result[data.inside] = probabilities
-    return result[:, 1:]
+    result = np.empty((k, k, *data.inside.shape))
+    result[...] = np.eye(k)[:, :, None, None]
+    result[:, :, data.inside] = np.moveaxis(probabilities, 0, -1)
+    return np.moveaxis(result[..., 1:], (0, 1), (-2, -1))
 
 
 def _fit(data: Data, model: Model, posterior: Float, log_likelihood: float) -> Fit:

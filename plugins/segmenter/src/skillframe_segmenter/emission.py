@@ -40,7 +40,7 @@ class Phases(NamedTuple):
 
 
 class Observed(NamedTuple):
-    """W windows ready for (1).
+    """W windows ready for (1); views of arrays whose last axis, in memory, is time: K is small, W is not.
 
     Attributes:
         motion: (W, 6) u.
@@ -59,36 +59,41 @@ def observe(motion: Float, contact: Float) -> Observed:
     normal = a - (np.vecdot(a, u) / np.maximum(np.vecdot(u, u), LEAST_MOTION))[..., None] * u
     free = np.eye(3) - normal[..., :, None] * normal[..., None, :]
     projected = u - np.vecdot(normal, u)[..., None] * normal
-    return Observed(motion, free, projected.reshape(-1, 6))
+    return Observed(*(_time_last_inside(x) for x in (motion, free, projected.reshape(-1, 6))))
 
 
-def expected(seen: Observed, direction: Float) -> Float:
-    """M d of W windows for K directions (K, 6): (K, W, 6)."""
-    count = len(seen.motion)
-    result = np.empty((len(direction), count, 6))
-    for part in range(2):
-        columns = slice(3 * part, 3 * part + 3)
-        flat = seen.free[:, part].reshape(3 * count, 3) @ direction[:, columns].T
-        result[:, :, columns] = flat.T.reshape(len(direction), count, 3)
-    return result
+def _time_last_inside(x: Float) -> Float:
+    """The same array (W, ...), the first axis last in memory."""
+    return np.moveaxis(np.ascontiguousarray(np.moveaxis(x, 0, -1)), -1, 0)
+
+
+def _residuals(seen: Observed, direction: Float) -> Float:
+    """U - M d of windows for K directions (K, 6): (K, 6, W)."""
+    motion, free = seen.motion.T, np.moveaxis(seen.free, 0, -1)
+    count = motion.shape[1]
+    result = np.empty((len(direction), 2, 3, count))
+    for part in range(2):  # M is symmetric: its rows may be summed as well as its columns
+        flat = direction[:, 3 * part : 3 * part + 3] @ free[part].reshape(3, 3 * count)
+        np.subtract(motion[3 * part : 3 * part + 3], flat.reshape(-1, 3, count), out=result[:, part])
+    return result.reshape(-1, DIMENSIONS, count)
 
 
 def log_likelihood(seen: Observed, phases: Phases) -> Float:
     """Log density (W, K) of (1) with eta = 1."""
-    residual = seen.motion - expected(seen, phases.direction)
     lower = np.linalg.cholesky(phases.covariance)
-    white = residual @ np.swapaxes(np.linalg.inv(lower), -1, -2)
+    white = np.linalg.inv(lower) @ _residuals(seen, phases.direction)
     log_det = np.log(np.einsum("kii->ki", lower)).sum(-1)
-    result: Float = -0.5 * np.vecdot(white, white) - (log_det + 0.5 * DIMENSIONS * np.log(2.0 * np.pi))[:, None]
+    white *= white
+    result: Float = -0.5 * white.sum(axis=1) - (log_det + 0.5 * DIMENSIONS * np.log(2.0 * np.pi))[:, None]
     return result.T
 
 
 def fit(seen: Observed, weight: Float) -> Phases:
     """Phases that (2) gives for responsibilities (W, K)."""
     direction = _directions(seen, weight)
-    residual = seen.motion - expected(seen, direction)
+    residual = _residuals(seen, direction)
     size = weight.sum(axis=0)
-    scatter = np.swapaxes(residual * weight.T[..., None], -1, -2) @ residual
+    scatter = (residual * weight.T[:, None]) @ np.swapaxes(residual, -1, -2)
     m, identity = DIMENSIONS, np.eye(DIMENSIONS)
     own = (scatter + 2.0 * m * PRIOR * identity) / (size + 2.0 * m)[:, None, None] + FLOOR * identity
     total, share = float(size.sum()), float(size.sum()) / len(size)
@@ -98,7 +103,7 @@ def fit(seen: Observed, weight: Float) -> Phases:
 
 def _directions(seen: Observed, weight: Float) -> Float:
     count, size = len(seen.motion), weight.sum(axis=0)
-    moments = (weight.T @ seen.free.reshape(count, 18)).reshape(-1, 2, 3, 3)
-    moments += 0.01 * np.maximum(size, 1e-9)[:, None, None, None] * np.eye(3)
-    sums = (weight.T @ seen.projected).reshape(-1, 2, 3, 1)
+    moments = (np.moveaxis(seen.free, 0, -1).reshape(18, count) @ weight).T.reshape(-1, 2, 3, 3)
+    moments = moments + 0.01 * np.maximum(size, 1e-9)[:, None, None, None] * np.eye(3)
+    sums = (seen.projected.T @ weight).T.reshape(-1, 2, 3, 1)
     return np.asarray(np.linalg.solve(moments, sums), dtype=float).reshape(-1, 6)

@@ -4,10 +4,11 @@ Two phases may be one skill shown from two sides: if they never share a demonstr
 the sequence (after the same phases, before the same phases), if demonstrations begin with the one and with the other
 (a policy has one beginning), or if one is what another demonstration leaves out on its way from the other, or a detour
 from it, without which a demonstration is like another. They are joined if the learner finds one desired direction for
-both, which is the definition itself. So are two that follow each other, both in contact and with the attitude held, and
-were learned as pushes less than 35 degrees apart: a box that touches a wall on its way into a corner is still pushed
-the same way. What the tool does in free air is another matter, since a push that leans on the friction cone explains
-both. Our choice; the papers join phases by their model alone.
+both, which is the definition itself, and if each can turn the tool about the axis, in whatever sense, that the other
+turns it about: lowering and interlocking are one push, but not one motion. So are two that follow each other, both in
+contact and with the attitude held, and were learned as pushes less than 35 degrees apart: a box that touches a wall on
+its way into a corner is still pushed the same way. What the tool does in free air is another matter, since a push that
+leans on the friction cone explains both. Our choice; the papers join phases by their model alone.
 """
 
 from __future__ import annotations
@@ -149,6 +150,7 @@ def _joined(
     candidates = [
         ((one, two), pieces(found, demonstrations, [one]) + pieces(found, demonstrations, [two]))
         for one, two in (alternatives(rows) if stand_ins else [])
+        if _turn_alike(bodies[one], bodies[two])
     ] + [
         ((one, two), pieces(found, demonstrations, [one, two]))
         for one, two in neighbours(rows)
@@ -188,6 +190,21 @@ def _one_push(one: Document, two: Document) -> bool:
         return False
     a, b = (_part(body, "translation").get("desired_direction") for body in (one, two))
     return a is not None and b is not None and sum(x * y for x, y in zip(a, b, strict=True)) > SAME_PUSH
+
+
+def _turn_alike(one: Document, two: Document) -> bool:
+    """Whether each phase can turn the tool about the axis, in whatever sense, that the other turns it about."""
+    return all(_gives(_part(a, "rotation"), _part(b, "rotation")) for a, b in ((one, two), (two, one)))
+
+
+def _gives(turn: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Whether a phase that turns as `turn` may turn about the desired axis of the other, if that has one."""
+    wanted, own = other.get("desired_direction"), turn.get("desired_direction")
+    if wanted is None or turn.get("fully_compliant"):
+        return True
+    axes = np.array([*turn.get("compliant_axes", []), *([] if own is None else [own])]).reshape(-1, 3)
+    base = np.linalg.svd(axes, full_matrices=False)
+    return float(norm(base[2][base[1] > 0.1] @ np.array(wanted))) > SAME_PUSH
 
 
 def alternatives(rows: Sequence[Mapping[str, Any]]) -> list[tuple[int, int]]:

@@ -19,7 +19,7 @@ from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
 from skillframe.frames import Float, norm, rotation_vector
 from skillframe.records import Document
-from skillframe_segmenter import em, gate, merge, model, runs
+from skillframe_segmenter import changepoints, em, gate, merge, model, runs
 from skillframe_segmenter.boundaries import OPTION
 from skillframe_segmenter.features import Features, Scales, features, scales, typical_scales
 from skillframe_segmenter.model import PhaseModel, Pose0
@@ -179,7 +179,8 @@ def fit(data: em.Data, prepared: Prepared, phases: int | None, settings: Setting
     goes_round = data.going is not None
     if phases == 1 or not data.straight.any():
         data, phases = data._replace(going=None), 1
-    tried = {k: em.best(data, signals, k, settings) for k in (_numbers(data, settings) if phases is None else [phases])}
+    cut = changepoints.segments([x[mine] for x, mine in zip(signals, data.split(data.straight), strict=True)])
+    tried = {k: em.best(data, cut, k, settings) for k in (_numbers(data, settings) if phases is None else [phases])}
     chosen = em.with_transitions(data, min(tried.values(), key=lambda f: f.criterion), settings)
     paths = em.paths(data, chosen.model)
     tidy = [runs.without_short(path, SHORT) for path in paths]

@@ -30,10 +30,11 @@ def prior_weights(phases: int, regressors: int, stay_s: float) -> Float:
 
 
 def probabilities(weights: Float, regressors: Float) -> Float:
-    """(..., K, K) transition probabilities for regressors phi (..., R)."""
-    k = len(weights)
-    logits = (regressors @ weights.reshape(k * k, -1).T).reshape(*regressors.shape[:-1], k, k)
-    return softmax(logits)
+    """(..., K, K) transition probabilities for regressors phi (..., R); time is the last axis in memory."""
+    k, size = weights.shape[:2], weights.shape[-1]
+    logits = weights.reshape(-1, size) @ regressors.reshape(-1, size).T
+    p = np.moveaxis(softmax(logits.reshape(*k, -1), axis=1), -1, 0)
+    return p.reshape(*regressors.shape[:-1], *k) if regressors.ndim != 2 else p
 
 
 def improve(weights: Float, prior: Float, regressors: Float, joint: Float, steps: int = 3) -> Float:
@@ -50,32 +51,48 @@ def improve(weights: Float, prior: Float, regressors: Float, joint: Float, steps
     k, size = len(weights), regressors.shape[1]
     ridge = np.full(size, RIDGE)
     ridge[-1] = BIAS_RIDGE
+    one, two = np.triu_indices(size)
+    targets = np.ascontiguousarray(np.moveaxis(joint, 0, -1))
     for i in range(k):
         others = np.flatnonzero(np.arange(k) != i)
-        used = joint[:, i].sum(axis=-1) > 1e-8
-        phi, target = regressors[used], joint[used, i]
-        for _ in range(steps if len(others) and len(phi) else 0):
-            result[i, others] += _newton(result[i], prior[i], others, phi, target, ridge)
+        used = targets[i].sum(axis=0) > 1e-8
+        if not len(others) or not used.any():
+            continue
+        phi, target = np.ascontiguousarray(regressors[used].T), targets[i][:, used]
+        squares = phi[one] * phi[two]
+        for _ in range(steps):
+            result[i, others] += _newton(result[i], prior[i], others, phi, squares, target, ridge)
     return result
 
 
-def _newton(row: Float, prior: Float, others: NDArray[np.intp], phi: Float, target: Float, ridge: Float) -> Float:
-    mass = target.sum(axis=-1)
-    p = softmax(phi @ row.T)[:, others]
-    gradient = (target[:, others] - mass[:, None] * p).T @ phi - ridge * (row[others] - prior[others])
-    n, size = len(others), phi.shape[1]
-    hessian = np.empty((n, size, n, size))
-    for a in range(n):
-        for b in range(a, n):
-            curvature = mass * p[:, a] * ((a == b) - p[:, b])
-            hessian[a, :, b, :] = hessian[b, :, a, :] = phi.T @ (curvature[:, None] * phi)
-        hessian[a, :, a, :] += np.diag(ridge)
-    step = np.linalg.solve(hessian.reshape(n * size, n * size), gradient.reshape(-1))
+def _newton(
+    row: Float, prior: Float, others: NDArray[np.intp], phi: Float, squares: Float, target: Float, ridge: Float
+) -> Float:  # fmt: skip
+    """A step (n, R) for the weights (K, R) of the others; phi (R, W), its squares (R (R + 1) / 2, W), target (K, W)."""
+    mass = target.sum(axis=0)
+    p = softmax(row @ phi, axis=0)[others]
+    pull = mass * p
+    gradient = (target[others] - pull) @ phi.T - ridge * (row[others] - prior[others])
+    n, size = len(others), len(phi)
+    step = np.linalg.solve(_hessian(p, pull, squares, size) + np.diag(np.tile(ridge, n)), gradient.reshape(-1))
     return np.clip(step, -LARGEST_STEP, LARGEST_STEP).reshape(n, size)
 
 
-def softmax(logits: Float) -> Float:
-    """Probabilities (..., K) of logits (..., K)."""
-    e = np.exp(logits - logits.max(axis=-1, keepdims=True))
-    result: Float = e / e.sum(axis=-1, keepdims=True)
-    return result
+def _hessian(p: Float, pull: Float, squares: Float, size: int) -> Float:
+    """(n R, n R) sum pull_a (1[a = b] - p_b) phi phi^T over windows, each of its halves once."""
+    n = len(p)
+    a, b = np.triu_indices(n)
+    blocks = (pull[a] * ((a == b)[:, None] - p[b])) @ squares.T
+    whole = np.empty((len(blocks), size, size))
+    i, j = np.triu_indices(size)
+    whole[:, i, j] = whole[:, j, i] = blocks
+    result = np.empty((n, size, n, size))
+    result[a, :, b, :] = result[b, :, a, :] = whole
+    return result.reshape(n * size, n * size)
+
+
+def softmax(logits: Float, axis: int = -1) -> Float:
+    """Probabilities of logits, which add to one along an axis."""
+    e = np.exp(logits - logits.max(axis=axis, keepdims=True))
+    e /= e.sum(axis=axis, keepdims=True)
+    return e
