@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from skillframe.demonstration.assemble import assemble
 from skillframe.demonstration.columns import POSITION, QUATERNION, WRENCH, Columns
+from skillframe.demonstration.files import BAG_FACTS
 from skillframe.demonstration.metafile import read_meta
 from skillframe.demonstration.options import ReadOptions, read_options
 from skillframe.demonstration.record import Demonstration
@@ -54,7 +55,7 @@ def read_bag(path: Path, options: Mapping[str, Any], tool_poses: ToolPoses) -> D
     """A demonstration from a ROS bag.
 
     Args:
-        path: the file; `NAME.meta.toml` beside it is read too.
+        path: the file, or the folder of a ROS 2 bag with all its parts; `NAME.meta.toml` beside it is read too.
         options: fields of `ReadOptions`; `pose_topic` and `wrench_topic` where the bag leaves a choice.
         tool_poses: forward kinematics, for joint states.
 
@@ -67,6 +68,7 @@ def read_bag(path: Path, options: Mapping[str, Any], tool_poses: ToolPoses) -> D
     _refuse_text_options(path, chosen)
     _refuse_other_files(path)
     meta = read_meta(path)
+    notes += _parts_note(path)
     with _opened(path) as bag:
         topics = _topics(path, bag)
         wanted = [_pose_topic(path, topics, chosen), _wrench_topic(path, topics, chosen, meta)]
@@ -80,6 +82,14 @@ def read_bag(path: Path, options: Mapping[str, Any], tool_poses: ToolPoses) -> D
     notes += _frame_note(recorded, chosen, meta)
     joined = replace(_plain(chosen), wrench=path)  # a second source, so that cuts keep a margin until they are joined
     return assemble(pose, {**meta, STAMP_START: zero}, joined, notes, wrench)
+
+
+def _parts_note(path: Path) -> list[str]:
+    """That a file is one of several of its bag, as the metadata in its folder says."""
+    facts = path.parent / BAG_FACTS
+    words = facts.read_text("utf-8", "replace").split() if facts.is_file() and path.is_file() else []
+    parts = {word for word in words if word.endswith((".db3", ".mcap"))}
+    return [f"{path.name} is one of {len(parts)} parts of its bag; give the folder to read all"] * (len(parts) > 1)
 
 
 def _plain(options: ReadOptions) -> ReadOptions:
@@ -97,7 +107,9 @@ def _refuse_text_options(path: Path, options: ReadOptions) -> None:
 
 
 def _refuse_other_files(path: Path) -> None:
-    """Refuse what is not a bag by its first bytes, before any library is asked."""
+    """Refuse what is not a bag by its first bytes, before any library is asked; a folder is a bag of ROS 2."""
+    if path.is_dir():
+        return
     magic = MAGIC[path.suffix.lower()]
     try:
         with path.open("rb") as file:
@@ -135,11 +147,13 @@ def _foreign(path: Path) -> Iterator[None]:
         yield
     except Exception as error:  # foreign code on foreign bytes: struct.error, apsw errors, TypeError ...
         first = str(error).strip().splitlines()
+        whole = path.is_file() and (path.parent / BAG_FACTS).is_file()
+        folder = f"its messages may be packed: give its folder, {path.parent}, or record it again"
         said = f"{type(error).__name__}: {first[0]}" if first else type(error).__name__
         raise InputError(
             path,
             f"cannot be read as a ROS bag ({said})",
-            "it may be cut off or damaged: reindex it, or record it again",
+            folder if whole else "it may be cut off or damaged: reindex it, or record it again",
         ) from None
 
 

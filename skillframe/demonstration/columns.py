@@ -191,6 +191,8 @@ def with_quaternion(columns: Columns, euler: str | None) -> Columns:
         InputError: Euler angles without their order, a bad order, or a matrix that is no rotation.
     """
     if columns.has(QUATERNION):
+        if euler is not None:
+            raise InputError(columns.source, "holds quaternions, no Euler angles", "leave --euler away")
         return columns
     for names, convert in ((EULER, _from_euler), (ROTATION_VECTOR, _from_vector), (MATRIX, _from_matrix)):
         if columns.has(names):

@@ -12,11 +12,16 @@ if TYPE_CHECKING:
     from skillframe.demonstration.record import Demonstration
 
 
+BAG_FACTS = "metadata.yaml"
+"""What the folder of a ROS 2 bag holds beside its files."""
+PACKED_BAGS = (".db3.zstd", ".mcap.zstd")
+
+
 def read_demonstration(path: Path | str, **options: Any) -> Demonstration:
     """A demonstration from a file of any registered format.
 
     Args:
-        path: the file.
+        path: the file, or the folder of a ROS 2 bag.
         **options: settings of the format; the core's readers take the fields of `options.ReadOptions`.
 
     Raises:
@@ -52,6 +57,10 @@ def _format_of(path: Path, *, reading: bool, named_columns: bool = False) -> Rea
     from skillframe.registry import registry
 
     records: list[ReaderType] = [r for r in registry().records("reader") if reading or r.write is not None]
+    if reading and (path / BAG_FACTS).is_file():
+        return registry().reader("rosbag")
+    if reading and path.name.lower().endswith(PACKED_BAGS):
+        raise InputError(path, "is a packed part of a ROS bag", f"give the bag's folder, {path.parent}")
     matches = [(len(s), r) for r in records for s in r.suffixes if path.name.lower().endswith(s)]
     if matches:
         return max(matches, key=lambda match: match[0])[1]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from skillframe.demonstration.assemble import assemble
-from skillframe.demonstration.columns import Columns
+from skillframe.demonstration.columns import KNOWN, Columns
 from skillframe.demonstration.csv import demonstration_columns
 from skillframe.demonstration.delimited import read_wrench_file
 from skillframe.demonstration.options import ReadOptions, read_options
@@ -39,8 +39,9 @@ def read_npz(path: Path, options: Mapping[str, Any]) -> Demonstration:
     _refuse_text_settings(path, chosen)
     arrays = _load(path)
     meta = _meta(path, arrays)
-    columns = Columns(_columns(path, arrays), str(path))
-    return assemble(columns, meta, chosen, [], read_wrench_file(chosen))
+    notes = list[str]()
+    columns = Columns(_columns(path, arrays, notes), str(path))
+    return assemble(columns, meta, chosen, notes, read_wrench_file(chosen))
 
 
 def _refuse_text_settings(path: Path, options: ReadOptions) -> None:
@@ -93,7 +94,8 @@ def _meta(path: Path, arrays: dict[str, Any]) -> dict[str, Any]:
             path, "holds no meta", f'store a JSON text meta with "format": "{FORMAT}", "version": {VERSION}'
         )
     try:
-        meta = json.loads(str(arrays["meta"][()]))
+        text = arrays["meta"].reshape(-1)[0] if arrays["meta"].size == 1 else arrays["meta"]
+        meta = json.loads(text if isinstance(text, bytes) else str(text))
     except (ValueError, TypeError, IndexError, RecursionError):
         meta = None
     if not isinstance(meta, dict):
@@ -110,12 +112,17 @@ def _meta(path: Path, arrays: dict[str, Any]) -> dict[str, Any]:
     return meta
 
 
-def _columns(path: Path, arrays: dict[str, Any]) -> dict[str, Float]:
+def _columns(path: Path, arrays: dict[str, Any], notes: list[str]) -> dict[str, Float]:
+    """One number per sample and name; what else the file holds beside them is left out with a note."""
     columns: dict[str, Float] = {}
     for name, array in arrays.items():
         if name == "meta":
             continue
-        if array.ndim != 1 or array.dtype.kind not in "fiub":
+        fits = array.ndim == 1 and array.dtype.kind in "fiub"
+        if not fits and "t" in arrays and _further(name):
+            notes.append(f"array {name}, {array.dtype} of shape {array.shape}, was left out")
+            continue
+        if not fits:
             raise InputError(
                 f"{path}: {name}", f"is {array.dtype} of shape {array.shape}", "store one number per sample"
             )
@@ -128,6 +135,11 @@ def _columns(path: Path, arrays: dict[str, Any]) -> dict[str, Float]:
     if not reference:
         raise InputError(path, "has no rows", "record again, or check the export")
     return columns
+
+
+def _further(name: str) -> bool:
+    """Whether a name is none of a demonstration's channels, of any arm."""
+    return not any(name == known or name.endswith(f"_{known}") for known in KNOWN)
 
 
 def write_npz(demonstration: Demonstration, path: Path) -> None:

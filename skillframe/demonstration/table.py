@@ -78,7 +78,7 @@ def read_table(path: Path, header: bool | None = None) -> Table:
     """
     lines = [(i, line.strip()) for i, line in enumerate(read_text(path).splitlines(), start=1)]
     lines = [(i, line) for i, line in lines if line]
-    delimiter = _delimiter(lines[-1][1])
+    delimiter = _delimiter(lines[0][1], lines[-1][1])
     names: list[str] = []
     while lines and lines[0][1][0] in "#%" and not header and not _looks_like_header(lines, delimiter):
         lines = lines[1:]
@@ -94,10 +94,14 @@ def read_table(path: Path, header: bool | None = None) -> Table:
     return Table(source=str(path), names=names, values=values, rows=np.array([i for i, _ in lines]), text=text)
 
 
-def _delimiter(row: str) -> str | None:
-    """The separator of a row of data; None for runs of blanks and tabs."""
+def _delimiter(first: str, row: str) -> str | None:
+    """The separator of a row of data; None for runs of blanks and tabs.
+
+    A cell may hold blanks (a date and its time) where the file's first row has as many cells and no number among them.
+    """
     for candidate in (";", ",", "\t"):
-        if candidate in row and not any(" " in cell.strip() for cell in row.split(candidate)):
+        named = first.count(candidate) == row.count(candidate) and not _is_numeric(first, candidate)
+        if candidate in row and (named or not any(" " in cell.strip() for cell in row.split(candidate))):
             return candidate
     return None
 
