@@ -55,6 +55,7 @@ class SkillType:
         check: raises `InputError` naming the key if the kind's part of a document is not as it should be; None: no more
             than the common layout is checked when a file is read.
         learn: a skill document's body (`frame`, `phases`, ...) from demonstrations; None if it is not learned.
+        settings: gives the dataclass whose fields `--set` changes when it is learned, for listings; None: not known.
         describe: the document in words, a line each.
         explain: pictures for the report, drawn from the document alone; None if there are none.
         area: (2, 3) corners of the box that a run may reach, relative to its start and in the axes of the document's
@@ -69,6 +70,7 @@ class SkillType:
     build: Callable[[Document], Skill]
     check: Callable[[Document], None] | None = None
     learn: Callable[[Sequence[Demonstration], LearnOptions], Document] | None = None
+    settings: Callable[[], type] | None = None
     describe: Callable[[Document], list[str]] | None = None
     explain: Callable[[Document], list[Illustration]] | None = None
     area: Callable[[Document], Float] | None = None

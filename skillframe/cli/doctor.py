@@ -7,7 +7,8 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from importlib.util import find_spec
@@ -137,6 +138,12 @@ def _recordings() -> Finding:
     return Finding(name="recordings", found=found, needed_for="tests on real recordings", fix=fix)
 
 
+def _provided(provides: Sequence[str]) -> str:
+    """How many of each kind: "9 worlds, 4 readers"."""
+    counts = Counter(each.split(":", 1)[0] for each in provides)
+    return ", ".join(f"{count} {kind}{'s' * (count != 1)}" for kind, count in counts.items()) or "nothing"
+
+
 def _plugins() -> Iterator[Finding]:
     from skillframe.registry import registry
 
@@ -145,6 +152,6 @@ def _plugins() -> Iterator[Finding]:
         yield Finding(
             name=f"plug-in {plugin.name}",
             found=f"{plugin.distribution} {plugin.version}",
-            needed_for=" ".join(plugin.provides) or "nothing",
+            needed_for=_provided(plugin.provides),
             fix=fix,
         )

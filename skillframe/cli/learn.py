@@ -27,7 +27,13 @@ if TYPE_CHECKING:
     "--axes", type=click.Choice(["base", "phase_start"]), default="base", show_default=True,
     help="Axes of what is learned: base, or the tool's attitude at the start of the phase.",
 )  # fmt: skip
-@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A setting of the learner (repeatable).")
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="A setting of the learner (skillframe plugins show lmc lists them; repeatable).",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the skill document as JSON on stdout as well.")
 def command(
     files: tuple[Path, ...], out: Path, skill: str, at: str | None, hand: str | None, axes: str,

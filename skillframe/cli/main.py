@@ -32,7 +32,7 @@ COMMANDS = {
     "reproduce": "The papers' results, row by row.",
     "robots": "List, check and show robots.",
     "fmu": "List, build, check and simulate FMUs.",
-    "plugins": "List, check and start plug-ins.",
+    "plugins": "List, show, check and start plug-ins.",
     "doctor": "What is installed, what is missing, what to type.",
 }
 

@@ -1,13 +1,15 @@
-"""`skillframe plugins`: list what is installed, check it against the contract, and start a new one."""
+"""`skillframe plugins`: list and show what is installed, check it against the contract, and start a new one."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from skillframe.cli.output import emit_json, table
+from skillframe.cli.catalog import by_kind
+from skillframe.cli.output import emit_json
 from skillframe.errors import UnknownName
 
 if TYPE_CHECKING:
@@ -17,11 +19,12 @@ if TYPE_CHECKING:
 
 @click.group()
 def command() -> None:
-    """List, check and start plug-ins.
+    """List, show, check and start plug-ins.
 
     \b
     Example:
       skillframe plugins list
+      skillframe plugins show peg_in_hole
       skillframe plugins new my_skill
       skillframe plugins check my_skill
     """
@@ -43,15 +46,54 @@ def list_(as_json: bool) -> None:
     if as_json:
         emit_json(rows)
     else:
-        columns = ("name", "distribution", "version", "provides", "error")
-        table(
-            columns,
-            [[r["name"], r["distribution"], r["version"], " ".join(r["provides"]), r["error"] or ""] for r in rows],
-        )
+        _list(rows)
+        click.echo("skillframe plugins show NAME says what one is, and what can be set", err=True)
     for name in known.not_installed:
         click.echo(f"SKILLFRAME_PLUGINS asks for {name!r}, which is not installed", err=True)
     if known.unselected:
         click.echo(f"SKILLFRAME_PLUGINS leaves out {', '.join(known.unselected)}", err=True)
+
+
+def _list(rows: Sequence[dict[str, Any]]) -> None:
+    """A paragraph per distribution, a line per kind of what it provides."""
+    for row in rows:
+        click.echo(f"{row['name']} ({row['distribution']} {row['version']})")
+        for kind, names in by_kind(row["provides"]).items():
+            click.echo(f"  {kind:<13} {', '.join(names)}")
+        if row["error"]:
+            click.echo(f"  error         {row['error']}")
+
+
+@command.command()
+@click.argument("name")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def show(name: str, as_json: bool) -> None:
+    """Say what a world, skill, ... is, and what --set can change: a world's parameters, a learner's settings.
+
+    \b
+    Example:
+      skillframe plugins show peg_in_hole
+      skillframe plugins show skill:lmc --json
+    """
+    from skillframe.cli.catalog import found
+    from skillframe.registry import registry
+
+    row = found(registry(), name)
+    if as_json:
+        emit_json(row)
+        return
+    click.echo(f"{row['kind']} {row['name']} ({row['distribution']} {row['version']}): {row['summary']}")
+    prefix = "world." if row["kind"] == "world" else ""
+    for each in row["settings"] or ():
+        click.echo(f"  --set {prefix}{each['name']}{_default(each['default'])}")
+        click.echo(f"      {each['about']}")
+
+
+def _default(value: Any) -> str:
+    """As it would be typed; nothing where the recordings decide."""
+    if value is None:
+        return ""
+    return f"={value:.6g}" if isinstance(value, float) else f"={str(value).lower()}"
 
 
 def distribution_rows(registry: Registry) -> list[dict[str, Any]]:
@@ -136,7 +178,9 @@ def _check_row(plugin: Plugin, finding: Finding) -> dict[str, Any]:
 def _say(plugin: Plugin, findings: list[Finding]) -> None:
     click.echo(f"{plugin.name} ({plugin.distribution} {plugin.version})")
     for finding in findings:
-        verdict = "no checks for this kind" if finding.problems is None else "FAILS" if finding.problems else "passes"
-        click.echo(f"  {finding.subject}: {verdict}")
+        if finding.problems is not None:
+            click.echo(f"  {finding.subject}: {'FAILS' if finding.problems else 'passes'}")
         for problem in finding.problems or []:
             click.echo(f"    - {problem}")
+    for kind, names in by_kind([finding.subject for finding in findings if finding.problems is None]).items():
+        click.echo(f"  {kind} {', '.join(names)}: no checks for this kind")

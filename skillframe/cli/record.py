@@ -50,7 +50,13 @@ if TYPE_CHECKING:
 @click.option("--belief", metavar="X,Y,TURN", help="Blind: deviation of goal minus start [mm, mm, degrees].")
 @click.option("--centre", metavar="X,Y,TURN", help="Blind: mean of goal minus start [mm, mm, degrees]; default 0,0,0.")
 @click.option("--rate", type=POSITIVE, help="Sample rate [Hz]; default 500, machines 100.")
-@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="world.*, start.*, fixture.* ...")
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="start.*, fixture.*, world.* (skillframe plugins show WORLD lists these) ...",
+)
 @click.option("--json", "as_json", is_flag=True, help="What was recorded as JSON on stdout.")
 def command(
     world: str, robot: str, teacher: str, out: Path, count: int, seed: int, noise: float | None, delay: float | None,

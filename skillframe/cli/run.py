@@ -26,7 +26,13 @@ QUIET_S = 5.0  # a run that is over by then needs no progress
 @click.option("--world", required=True, help="World to run in (skillframe plugins list names them).")
 @click.option("--robot", default="free_tool", show_default=True, help="Robot name, robot.toml or URDF.")
 @click.option("--coc", help='Centre of compliance: "x,y,z" in the tool frame, or a frame (tip, wrist) [as learned].')
-@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="world.*, start.*, fixture.*, grasp.* ...")
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="start.*, fixture.*, grasp.*, world.* (skillframe plugins show WORLD lists these) ...",
+)
 @click.option("--out", type=TRACE, help="Trace file (.npz).")
 @click.option("--replay", type=PAGE, help="Page with a 3-D replay and plots of the run (.html).")
 @click.option("--video", type=click.Path(path_type=Path), help="Film of the run (.mp4).")

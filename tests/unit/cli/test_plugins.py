@@ -192,3 +192,27 @@ def test_a_plugin_made_by_new_and_installed_with_pip_passes_its_suite_without_an
     assert done.returncode == 0, done.stdout + done.stderr
     check = [sys.executable, "-m", "skillframe.cli.main", "plugins", "check", "glide_slowly"]
     assert subprocess.run(check, cwd=tmp_path, env=environment, check=False, capture_output=True).returncode == 0
+
+
+def test_show_says_what_can_be_set_of_a_world_with_defaults_and_meaning(capsys):
+    assert run(["plugins", "show", "peg_in_hole", "--json"]) == 0
+    row = json.loads(capsys.readouterr().out)
+    assert (row["kind"], row["distribution"]) == ("world", "skillframe")
+    settings = {each["name"]: each for each in row["settings"]}
+    assert settings["clearance"]["default"] == 0.00025 and "[m]" in settings["clearance"]["about"]
+    assert all(each["about"] for each in row["settings"])
+    assert run(["plugins", "show", "world:peg_in_hole"]) == 0
+    assert "--set world.clearance=0.00025" in capsys.readouterr().out
+
+
+def test_show_of_what_is_not_there_names_the_nearest(capsys):
+    assert run(["plugins", "show", "peg_in_hold"]) == 2
+    assert "did you mean 'peg_in_hole'?" in capsys.readouterr().err
+
+
+@pytest.mark.needs_plugins
+def test_every_learner_that_lists_settings_says_what_they_are(capsys):
+    for name in ("lmc", "search", "replay", "dmp", "gmr", "seds"):
+        assert run(["plugins", "show", name, "--json"]) == 0
+        settings = json.loads(capsys.readouterr().out)["settings"]
+        assert settings and all(each["about"] for each in settings)

@@ -19,6 +19,7 @@ def skillframe_skills() -> Iterable[SkillType]:
         build=replay.build,
         check=replay.check,
         learn=document.learn,
+        settings=lambda: document.ReplaySettings,
         describe=document.describe,
         example=document.example,
     )
@@ -28,6 +29,7 @@ def skillframe_skills() -> Iterable[SkillType]:
         build=dmp.build,
         check=dmp.check,
         learn=dmp.learn,
+        settings=lambda: dmp.DmpSettings,
         describe=dmp.describe,
         example=dmp.example,
     )
@@ -37,6 +39,7 @@ def skillframe_skills() -> Iterable[SkillType]:
         build=gmr.build,
         check=gmr.check,
         learn=gmr.learn,
+        settings=lambda: gmr.GmrSettings,
         describe=gmr.describe,
     )
     yield SkillType(
@@ -45,5 +48,6 @@ def skillframe_skills() -> Iterable[SkillType]:
         build=seds.build,
         check=seds.check,
         learn=seds.learn,
+        settings=lambda: seds.SedsSettings,
         describe=seds.describe,
     )

@@ -24,6 +24,12 @@ def _learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Do
     return learn(demonstrations, options)
 
 
+def _settings() -> type:
+    from skillframe_lmc.settings import Settings
+
+    return Settings
+
+
 def _check(document: Document) -> None:
     from skillframe_lmc.phase import read_phase
 
@@ -57,6 +63,7 @@ def skillframe_skills() -> Iterable[SkillType]:
         build=_build,
         check=_check,
         learn=_learn,
+        settings=_settings,
         describe=_describe,
         explain=_explain,
     )

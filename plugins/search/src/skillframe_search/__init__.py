@@ -35,6 +35,12 @@ def _learn(kind: str) -> Callable[[Sequence[Demonstration], LearnOptions], Docum
     return learn
 
 
+def _settings() -> type:
+    from skillframe_search.learner import Settings
+
+    return Settings
+
+
 def _check(document: Document) -> None:
     from skillframe_search.phase import read_phase
 
@@ -79,8 +85,8 @@ def skillframe_skills() -> Iterable[SkillType]:
     """The kinds of search."""
     for kind, summary in SUMMARIES.items():
         yield SkillType(
-            name=kind, summary=summary, build=_build, check=_check, learn=_learn(kind), describe=_describe,
-            explain=_explain, example=_example(kind), area=_area,
+            name=kind, summary=summary, build=_build, check=_check, learn=_learn(kind), settings=_settings,
+            describe=_describe, explain=_explain, example=_example(kind), area=_area,
         )  # fmt: skip
 
 
