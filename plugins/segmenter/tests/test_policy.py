@@ -4,6 +4,8 @@ import re
 
 import numpy as np
 import pytest
+from skillframe_segmenter.document import skill_of
+from skillframe_segmenter.learning import pieces
 
 from skillframe.cli import main
 from skillframe.frames import Pose, matrix_from_quaternion
@@ -72,3 +74,17 @@ def test_a_report_of_a_run_shows_which_phase_ran_when_and_why_it_switched(tmp_pa
     assert re.search(r"phase 1: begins", told)
     assert re.search(r"phase 2: begins, as (the wrench asks for it|phase 1 ended: came to rest)", told)
     assert "└─ phase 2" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("skill", ["lmc", "gmr"])
+def test_every_phase_holds_all_that_its_own_pieces_taught(skill):
+    """A mixture's demonstrations stand beside its phase in the file; in a policy, each phase has its own."""
+    taught = [m.demonstration for m in made.demonstrations("ls", 2)]
+    kind = registry().skill(skill)
+    document = learned(registry().skill("policy"), taught, LearnOptions(settings={"skill": skill}))
+    count = len(document["phases"])
+    assert count == 2
+    for k in range(count):
+        body = kind.learn(pieces(document, taught, [k]), LearnOptions())
+        again = skill_of(document, k)
+        assert {key: again[key] for key in body} == body

@@ -75,7 +75,9 @@ def skill_of(document: Document, index: int) -> Document:
     phase = document["phases"][index]
     kind = _get(phase, "skill", str, f"phases[{index}].")
     shared = {key: value for key, value in document.items() if key not in SHARED}
-    return {**shared, "type": kind, "phases": [{k: v for k, v in phase.items() if k != "skill"}]}
+    own = {k: v for k, v in phase.items() if k not in ("skill", "beside")}
+    return {**shared, **coerce(phase.get("beside", {}), dict[str, Any], f"phases[{index}].beside"), "type": kind,
+            "phases": [own]}  # fmt: skip
 
 
 def _match(phases: int, successors: Float) -> None:

@@ -61,13 +61,23 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     if moves:
         found = _held(found, demonstrations, moved(found["demonstrations"], moves, names), moves, own, cutting)
     bodies = [_learn(found, demonstrations, k, own["skill"], options) for k in range(_count(found))]
-    shared = {key: value for key, value in bodies[0].items() if key != "phases"}
     return {
-        **shared,
-        "phases": [{**body["phases"][0], "skill": own["skill"]} for body in bodies],
+        **{key: value for key, value in bodies[0].items() if key in ("frame", *_alike(bodies))},
+        "phases": [_as_phase(body, own["skill"], _alike(bodies)) for body in bodies],
         "recoveries": own["recoveries"],
         **found,
     }
+
+
+def _alike(bodies: Sequence[Document]) -> list[str]:
+    """What all learned phases say alike, beside `phases`."""
+    return [key for key, value in bodies[0].items() if key != "phases" and all(b.get(key) == value for b in bodies)]
+
+
+def _as_phase(body: Document, skill: str, shared: Sequence[str]) -> Document:
+    """A learned phase as it stands in a policy: with all that it says beside `phases` and others do not, as a path."""
+    beside = {key: value for key, value in body.items() if key not in ("phases", "frame", *shared)}
+    return {**body["phases"][0], "skill": skill, **({"beside": beside} if beside else {})}
 
 
 def _sorted(options: LearnOptions) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
