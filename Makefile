@@ -23,7 +23,8 @@ $(VENV)/.installed: $(PROJECTS)
 	  { echo "skillframe needs Python 3.11 or newer; type for example: make PYTHON=python3.12 demo"; exit 1; }
 	@$(PIP) --version >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(VENV) || \
 	  { echo "could not make $(VENV); on Debian and Ubuntu type: sudo apt install python3-venv"; exit 1; }
-	$(PIP) install -e . -r plugins/all.txt
+	@echo "installing skillframe, its plug-ins and what they need into $(VENV); once, a minute or two"
+	@$(PIP) install -e . -r plugins/all.txt
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.installed

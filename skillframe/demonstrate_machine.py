@@ -15,8 +15,10 @@ import numpy as np
 
 from skillframe.control.hydraulic import plane_axes
 from skillframe.demonstrate import Recording, collect, demonstration_from, start_columns
+from skillframe.demonstration.columns import WRENCH
 from skillframe.demonstration.convention import STANDARD
 from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration.suspicions import UNMEASURED
 from skillframe.errors import InputError
 from skillframe.executor import Result, Setup, simulate
 from skillframe.frames import Float
@@ -108,7 +110,10 @@ def demonstration_of_machine(
     """What the machine knew of itself: pose, estimated wrench, the estimate's sigma, and whether pistons slid."""
     plain = demonstration_from(trace, scene, settings, None, **provenance)
     meta = {key: value for key, value in plain.meta.items() if key != "sensor"}
-    meta |= {"wrench": dict(STANDARD), "wrench_source": "estimated from chamber pressures, without a force sensor"}
+    meta |= {
+        "wrench": dict(STANDARD), "wrench_source": "estimated from chamber pressures, without a force sensor",
+        UNMEASURED: [name for name, column in zip(WRENCH, plain.wrench.T, strict=True) if not column.any()],
+    }  # fmt: skip
     sigma = trace.machine["force_sigma"]
     extra = {"sigma_1": sigma[:, 0], "sigma_2": sigma[:, 1], "force_valid": trace.machine["force_valid"]}
     return replace(plain, meta=meta, extra={name: column.copy() for name, column in extra.items()})

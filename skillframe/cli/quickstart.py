@@ -47,6 +47,7 @@ duration_s = 8.0
 "fixture.offset_x" = {{ sobol = [-0.008, 0.008] }}
 "fixture.tilt_y" = {{ sobol = [-0.12, 0.12] }}
 """
+STEPS = 9
 TASKS = (("valley", "valley", VALLEY, None), ("peg", "peg_in_hole", PEG, "tip"))
 
 
@@ -73,11 +74,14 @@ def command(out: Path, robot: str, trials: int, workers: int, seed: int) -> int:
     for name, _, template, _ in TASKS:
         text = template.format(trials=trials, robot=robot)
         (out / f"{name}.campaign.toml").write_text(text, encoding="utf-8")
-    for step in _steps(out, robot, workers, seed):
-        code = _type(step)
+    for number, step in enumerate(_steps(out, robot, workers, seed), start=1):
+        code = _type(step, number)
         if code:
             return code
-    click.echo(f"\nDone in {time.perf_counter() - began:.0f} s. Open {out / 'report.html'} in a browser.")
+    click.echo(
+        f"\nDone in {time.perf_counter() - began:.0f} s. Open {out / 'report.html'} in a browser: what was learned,"
+    )
+    click.echo("the runs in 3-D, and where the skills work, beside a plain replay of the demonstrations.")
     return 0
 
 
@@ -107,7 +111,6 @@ def _steps(out: Path, robot: str, workers: int, seed: int) -> Iterator[list[str]
             "--out", str(out / "demonstrations" / f"{name}.npz"),
         ]  # fmt: skip
         yield ["learn", *demos, "--out", skill]
-        yield ["skill", "show", skill]
         where = [] if coc is None else ["--coc", coc]
         start = "start.offset_x=0.02" if name == "valley" else "fixture.tilt_y=0.08"
         trace, plan = str(out / f"{name}.npz"), str(out / f"{name}.campaign.toml")
@@ -124,9 +127,9 @@ def _copy(files: list[str], folder: Path) -> None:
         shutil.copy(file, folder)
 
 
-def _type(step: list[str]) -> int:
+def _type(step: list[str], number: int) -> int:
     """Echo a command and run it."""
     from skillframe.cli.main import run
 
-    click.secho(f"\n$ skillframe {shlex.join(step)}", bold=True)
+    click.secho(f"\n[{number} of {STEPS}] $ skillframe {shlex.join(step)}", bold=True)
     return run(step)

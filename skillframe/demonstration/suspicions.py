@@ -18,6 +18,8 @@ from skillframe.frames import Float, norm
 Suspicion = Callable[[Demonstration], Iterator[str]]
 FARTHEST, FASTEST = 20.0, 10.0
 LARGEST_FORCE, LONGEST_LEVER = 2e4, 3.0
+UNMEASURED = "unmeasured"
+"""Metadata: names of wrench channels that nobody measured, as across a machine's plane; zero says nothing there."""
 SPIKE_SIGMAS, SPIKE_FORCE, SPIKE_WIDTH = 12.0, 5.0, 9
 
 
@@ -72,7 +74,7 @@ def motion(d: Demonstration) -> Iterator[str]:
 def channels(d: Demonstration) -> Iterator[str]:
     """Channels that stand still, are copies of each other, or hold their value between fewer true samples."""
     for i, name in enumerate(WRENCH):
-        if np.all(d.wrench[:, i] == d.wrench[0, i]):
+        if name not in d.meta.get(UNMEASURED, ()) and np.all(d.wrench[:, i] == d.wrench[0, i]):
             yield f"{name}: is exactly {d.wrench[0, i]:g} throughout"
     for i in range(6):
         for j in range(i + 1, 6):

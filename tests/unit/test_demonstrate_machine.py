@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from skillframe.demonstrate_machine import aimed, demonstration_of_machine, operate, record_operated
+from skillframe.demonstration.audit import audit
 from skillframe.demonstration.files import read_demonstration, write_demonstration
 from skillframe.errors import InputError
 from skillframe.prepare import load_robot_model, load_world
@@ -50,6 +51,7 @@ def test_a_demonstration_is_what_the_machine_knew_and_no_truth_and_reads_back_th
     assert read.meta["teacher"] == "teleoperation"
     assert (read.meta["simulated"]["delay_s"], read.meta["simulated"]["seed"]) == (0.15, 4)
     assert "sensor" not in read.meta  # there is none
+    assert not [text for text in audit(read).warnings if "is exactly" in text]  # a plane knows no force across it
 
 
 @pytest.mark.parametrize("degrees", [-90.0, -45.0, -20.0, 0.0])
