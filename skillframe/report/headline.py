@@ -107,8 +107,8 @@ def _typical(results: Results, skill: str) -> str:
         values = [r.values.get(column, math.nan) for r in results.of(skill)]
         finite = [v for v in values if math.isfinite(v)]
         if finite:
-            parts.append(f"median {what} {number(float(np.median(finite)))} {unit}")
-    return ", ".join(parts)
+            parts.append(f"{what} {number(float(np.median(finite)))} {unit}")
+    return f"median {', '.join(parts)}" if parts else ""
 
 
 def _run_sentences(chapter: Chapter) -> list[object]:
