@@ -144,7 +144,7 @@ class MachineLoop(Loop):
         self.home = self.plant.tool_pose().position[:, self.task.axes].copy()
         self.joint = z[:, 2:].copy()
         nothing = np.zeros((self.count, 2))
-        self.estimate = Estimate(nothing, nothing, np.zeros(self.count, dtype=bool), nothing)
+        self.estimate = Estimate(nothing, nothing, np.zeros(self.count, dtype=bool), nothing, nothing)
         self.demand = Demand(*(np.zeros((self.count, len(self.chain.actuated))) for _ in range(3)))
         self.estimator.start(self._measured())
         self._end_failed(0.0)
@@ -178,7 +178,7 @@ class MachineLoop(Loop):
 
     def _measured(self) -> Measured:
         gauges = self.gauges
-        return Measured(gauges.z, gauges.rate, *gauges.pressures, self.estimate.feedback)
+        return Measured(gauges.z, gauges.rate, *gauges.pressures, self.estimate.answered)
 
     def tare(self) -> None:
         """Swing in the air and identify friction and payload, then hold what was found."""
@@ -234,10 +234,11 @@ class MachineLoop(Loop):
         self._seen = self._measured()
         self.terms = self.law.terms(self._seen)
         estimate = self.estimator.step(self._seen, self.terms)
-        self.estimate = estimate if force_counts else estimate._replace(feedback=np.zeros_like(estimate.force))
+        nothing = np.zeros_like(estimate.force)
+        self.estimate = estimate if force_counts else estimate._replace(feedback=nothing, answered=nothing)
 
     def _valve(self, reference: Reference) -> None:
-        measured = self._seen._replace(z=self.gauges.now, force=self.estimate.feedback)
+        measured = self._seen._replace(z=self.gauges.now, force=self.estimate.answered)
         self.demand = self.law.step(measured, reference, self.active)
 
     def _tick(self, tick: int) -> None:

@@ -248,7 +248,7 @@ class Press:
         if t == 0.0:
             self.estimator.start(measured)
         self.estimator.calibrate(t < AIR)
-        self.force = self.estimator.step(measured, at).feedback
+        self.force = self.estimator.step(measured, at).answered
         speed = (at.arms @ self.plant.state()[1][..., None])[..., 0]
         row = measured, at, self.plant.contact(), speed
         command = self.law.step(t, measured._replace(force=self.force), at)

@@ -48,7 +48,7 @@ class CompiledEstimator(ForceEstimator):
         self._seen = [zeros((count, *shape)) for shape in ((n,), (2, n), (n, 2 * k + 1), (k,), (n,))]
         residual, jacobian, phi, _, variance = self._seen
         self._theta = zeros((count, 2 * k + 1))
-        self._told = [self.residual, self.raw, *(zeros((count, 2)) for _ in range(3))]
+        self._told = [self.residual, self.raw, *(zeros((count, 2)) for _ in range(4))]
         inputs = [*self._given, self._load, self._memory[0], self._fresh]
         self._look = Batch(
             look, inputs, [*self._seen, self._next[0]], (len(inputs) - 1,), use_compiler=use_compiler
@@ -88,5 +88,5 @@ class CompiledEstimator(ForceEstimator):
             memory[...] = after
         self._fresh[0] = 0.0
         self._tick += 1
-        _, _, force, sigma, feedback = self._told
-        return Estimate(force, sigma, (sliding > 1.0).sum(axis=-1) >= 2, feedback)
+        _, _, force, sigma, feedback, answered = self._told
+        return Estimate(force, sigma, (sliding > 1.0).sum(axis=-1) >= 2, feedback, answered)

@@ -93,7 +93,7 @@ def weigh_function(s: ForceSettings, n: int, k: int, feedback: Gain, dt: float) 
     """From the residual to the force.
 
     Inputs: residual, jacobian, phi, variance, theta, memory, fresh.
-    Outputs: what theta leaves of the residual; raw force, force, sigma, feedback (2,); memory.
+    Outputs: what theta leaves of the residual; raw force, force, sigma, feedback, answered (2,); memory.
     """
     parts = ((n, 1), (2, n), (n, 2 * k + 1), (n, 1), (2 * k + 1, 1))
     given = [_matrix(f"given{i}", *shape) for i, shape in enumerate(parts)]
@@ -108,8 +108,9 @@ def weigh_function(s: ForceSettings, n: int, k: int, feedback: Gain, dt: float) 
     sigma = ca.sqrt(ca.vertcat(a[1, 1], a[0, 0]) / determinant)
     force = _smooth(m, raw, fresh, s, dt)
     late = _steady(m, raw, fresh, feedback, dt)
+    power = ca.sumsqr(late / (s.doubted * sigma)) ** 2
     inputs = [*(pair[0] for pair in given), m.symbol, fresh]
-    return _function("weigh", inputs, [left, raw, force, sigma, late, m.after()])
+    return _function("weigh", inputs, [left, raw, force, sigma, late, late * (power / (1.0 + power)), m.after()])
 
 
 _KALMAN, _FEEDBACK = ("force", "slope", "once", "twice"), ("late", "late_slope")

@@ -17,17 +17,19 @@ from skillframe.world.scene import Geom, Sprung
 from tests.laws.crane_plants import crane
 
 STIFFNESS, LOAD = 1e5, 8500.0  # K [N/m]; the force that K and the surface's spring make together [N]
-DOWN_S, CLEARANCE, LANDING, STILL_S = 3.0, 0.01, 0.05, 1.0  # s, m above the plate, m/s, s
+DOWN_S, CLEARANCE, LANDING, EASE_S, STILL_S = 3.0, 0.1, 0.05, 0.5, 1.0  # s, m above the plate, m/s, s, s
 SLIDE, SLIDING_S, SETTLED_S = 0.1, 5.0, 2.5  # m/s, s, s of sliding after which it is steady
 
 
 class Contact(NamedTuple):
     """True (T, 2) base x and z, and the times from which it touches and from which it slides steadily.
 
-    `force`: of the plate; `seen`: what the machine took it for; `residual`: of the target dynamics with the true force.
+    `above`: of the tool's sphere over the plate at rest [m]; `force`: of the plate; `seen`: what the machine took it
+    for; `residual`: of the target dynamics with the true force.
     """
 
     time: np.ndarray
+    above: np.ndarray
     force: np.ndarray
     seen: np.ndarray
     residual: np.ndarray
@@ -58,6 +60,11 @@ class Contact(NamedTuple):
         """Time out of contact after the first touch [s]."""
         return float((self.force[self.touched :, 1] <= 0.0).sum() * (self.time[1] - self.time[0]))
 
+    @property
+    def hop(self):
+        """Largest height of the tool over the plate at rest after the first touch [m]; below 0 it never left."""
+        return self.above[self.touched :].max()
+
 
 def plate(surface):
     """A slab on a spring of so many N/m."""
@@ -71,14 +78,15 @@ def path_over(surface):
     """(path, time at which it begins to slide)."""
     depth = LOAD * (1.0 / STIFFNESS + 1.0 / surface)
     high = crane_runs.PLATE + crane_runs.RADIUS - crane_runs.ABOVE
-    slide = DOWN_S + (CLEARANCE + depth) / LANDING + STILL_S
+    slide = DOWN_S + EASE_S / 2 + (CLEARANCE + depth) / LANDING + STILL_S
 
     def place(time):
-        lower = np.clip(LANDING * (time - DOWN_S), 0.0, CLEARANCE + depth)
+        down = max(0.0, time - DOWN_S)
+        lower = LANDING * (0.5 * down**2 / EASE_S if down < EASE_S else down - 0.5 * EASE_S)
         since = max(0.0, time - slide)
         way = SLIDE * (0.5 * since**2 if since < 1.0 else since - 0.5)
         reach = crane_runs.blend(time / DOWN_S)[0]
-        return np.array([way - 0.25 * reach, 0.0, (high + CLEARANCE) * reach - lower])
+        return np.array([way - 0.25 * reach, 0.0, (high + CLEARANCE) * reach - min(lower, CLEARANCE + depth)])
 
     def path(time):
         h = 1e-4
@@ -103,7 +111,8 @@ def seen_in(trace, damping, slide):
     force = trace.wrench_true[:, axes]
     residual = damping * (rate - wanted_rate) + STIFFNESS * (x - wanted) - force
     touched, steady = int(np.argmax(force[:, 1] > 0.0)), int(np.argmax(time > slide + SETTLED_S))
-    return Contact(time, force, trace.wrench[:, axes], residual, trace.machine["valve"], touched, steady)
+    above = x[:, 1] - crane_runs.PLATE - crane_runs.RADIUS
+    return Contact(time, above, force, trace.wrench[:, axes], residual, trace.machine["valve"], touched, steady)
 
 
 def true_path(configurations):

@@ -115,7 +115,7 @@ def test_in_steady_sliding_the_residual_of_the_target_dynamics_is_below_a_percen
     row(
         f"impedance on {surface:.0e} N/m, plant's friction x{friction:g}, mass x{mass:g}",
         f"residual {100 * found.share:.2f} % ({100 * found.own_share:.2f} % with the estimate) of {load:.0f} N",
-        f"ripple {found.ripple:.0f} N, out of contact for {found.lost:.2f} s at the touch",
+        f"ripple {found.ripple:.0f} N, off the plate for {found.lost:.2f} s, up to {1e3 * max(found.hop, 0.0):.2f} mm",
     )  # fmt: skip
     later = found.time > found.time[found.touched] + 0.3
     assert found.own_share < 0.01

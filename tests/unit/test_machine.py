@@ -159,14 +159,27 @@ def test_pressing_on_a_plate_is_seen_in_the_pressures():
     assert np.hypot(*(seen - true).T).max() < 0.06 * np.hypot(*true.T).mean()
 
 
+def test_a_crane_that_is_told_to_stand_in_the_air_stands():
+    """Its stuck pistons show a force of a kilonewton; answered, it set the tool swinging by 60 to 80 mm/s."""
+    stiff = {"robot.mass_scale": np.array([1.0, 0.98]), "actuator.friction_scale": np.array([1.0, 1.2])}
+    skill = Follow(lambda time: (np.zeros(3), np.zeros(3)), PRESSING)
+    result = simulate(skill, setup(), stiff, rngs([0, 1]), duration_s=2.0, trace_hz=100.0)
+    for trace in result.traces:
+        seen = np.hypot(*trace.wrench[:, [0, 2]].T)
+        rates = np.gradient(trace.q, trace.time, axis=0)[100:]
+        assert seen.max() > 300.0  # the false force is there
+        assert np.sqrt(np.mean(rates**2, axis=0)).max() < 1e-3  # 3 mm/s of the tool; swinging it was 2e-2
+
+
 def test_the_record_holds_the_force_as_it_is_now_and_the_law_gets_the_late_one(runs):
     """Fed back, a force that looks ahead made the crane bounce to its force limit."""
     trace = runs[0].traces[0]
     loop = MachineLoop(Follow(diamond, MOVING), setup(), of(DRAWS, [0]), rngs([0]), 100.0)
-    loop.estimate = loop.estimate._replace(force=np.array([[3.0, 4.0]]), feedback=np.array([[1.0, 2.0]]))
+    force, feedback, answered = (np.array([row]) for row in ([3.0, 4.0], [1.0, 2.0], [0.5, 1.0]))
+    loop.estimate = loop.estimate._replace(force=force, feedback=feedback, answered=answered)
     loop.terms = loop.law.terms(loop._measured())
     seen = loop._observe(0.0)
     np.testing.assert_array_equal(seen.wrench[0, [0, 2]], [1.0, 2.0])
     np.testing.assert_array_equal(loop._read(seen).wrench[0, [0, 2]], [3.0, 4.0])
-    np.testing.assert_array_equal(loop._measured().force, [[1.0, 2.0]])
+    np.testing.assert_array_equal(loop._measured().force, [[0.5, 1.0]])
     assert trace.machine["force_sigma"].shape[1:] == (2,) and set(np.unique(trace.machine["force_valid"])) <= {0.0, 1.0}

@@ -8,7 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from skillframe.conditioning.momentum import ForceEstimator, ForceSettings, MomentumRate, force_from_residual
+from skillframe.conditioning.momentum import (
+    ForceEstimator,
+    ForceSettings,
+    MomentumRate,
+    force_from_residual,
+    standing_out,
+)
 from skillframe.control.hydraulic import Measured
 from skillframe.control.vdc_actuator import cylinders
 from skillframe.errors import SkillframeError
@@ -109,6 +115,17 @@ def test_the_force_is_the_weighted_least_squares_solution_and_sigma_its_standard
         scaled = j.T / np.sqrt(v)[:, None]
         np.testing.assert_allclose(f, np.linalg.lstsq(scaled, r / np.sqrt(v), rcond=None)[0], rtol=1e-6)
         np.testing.assert_allclose(s, np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled))), rtol=1e-6)
+
+
+@settings(deadline=None)
+@given(st.floats(1e-3, 1e3), st.floats(0.0, 6.28), st.floats(10.0, 1e3))
+def test_of_a_force_what_stands_out_of_its_sigma_is_answered_and_along_it(ratio, turn, sigma):
+    """Half of it at twice sigma; beyond, all but (2 sigma / f)^4; below, no more than (f / 2 sigma)^4 of it."""
+    force = 2.0 * sigma * ratio * np.array([[np.cos(turn), np.sin(turn)]])
+    found = standing_out(force, np.full((1, 2), sigma), 2.0)
+    share = np.hypot(*found[0]) / np.hypot(*force[0])
+    assert share == pytest.approx(1.0 / (1.0 + ratio**-4.0), rel=1e-9)
+    np.testing.assert_allclose(found, share * force, rtol=1e-9, atol=1e-9 * sigma)
 
 
 def test_at_standstill_the_estimate_is_not_valid_and_its_sigma_is_above_400_newtons():
