@@ -12,9 +12,10 @@ strokes; a round has no straight strokes either. Windows i to j are a round if t
     turns all the time:    at least half of its windows turn by more than half of the mean, 2 pi / (j - i),
     moves, and widely:     |u| > 1/2 in nine windows of ten, and 2 area / path, a circle's radius, is over 5 mm.
 
-Only the tightest count, those without a round inside, and they are put together to stretches of time. What a hand does
-by the way is no phase: stretches shorter than a quarter of the demonstration's longest are left out, and most
-demonstrations must have one. The law is that of the model; the constants are ours.
+Lengths that differ by a twentieth are tried, and only the tightest count, those without a round inside; they are put
+together to stretches of time. What a hand does by the way is no phase: stretches shorter than a quarter of the
+demonstration's longest are left out, and most demonstrations must have one. The law is that of the model; the constants
+are ours.
 """
 
 from __future__ import annotations
@@ -45,15 +46,15 @@ def going_round(cut: Windows, seen: Features) -> Mask:
     """Which windows (W,) of a demonstration belong to a round."""
     step = WINDOW_S * cut.motion[:, :3]
     turn = _turning(unit(step))
-    sums = _Sums(step, np.einsum("tji,tj->ti", cut.rotation, step), norm(seen.motion[:, :3]) > FAST)
+    path = _Path(step, np.einsum("tji,tj->ti", cut.rotation, step), norm(seen.motion[:, :3]) > FAST)
     result, count = np.zeros(cut.size, dtype=bool), cut.size
     first_end = np.full(count + 1, 2 * count)  # of the rounds found that begin here or later
-    for length in range(SHORTEST, min(LONGEST, count) + 1):
-        axis, fine = sums.loops(length)
-        starts = np.flatnonzero(fine & (first_end[: len(fine)] > np.arange(len(fine)) + length))
+    for length in _lengths(min(LONGEST, count)):
+        starts = path.comes_back(length)
+        starts, axis = path.loops(starts[first_end[starts] > starts + length], length)
         if len(starts):
             inside = starts[:, None] + np.arange(length - 1)
-            steady = np.vecdot(turn[inside], axis[starts, None]) > np.pi / length
+            steady = np.vecdot(turn[inside], axis[:, None]) > np.pi / length
             for i in starts[steady.mean(axis=1) >= STEADY].tolist():
                 result[i : i + length] = True
                 first_end[: i + 1] = np.minimum(first_end[: i + 1], i + length)
@@ -70,26 +71,40 @@ def _without_asides(going: Mask) -> Mask:
     return result
 
 
-class _Sums:
-    """Running sums of a path, from which any stretch of it is judged."""
+def _lengths(longest: int) -> list[int]:
+    """Windows of the stretches that are tried."""
+    result = [SHORTEST]
+    while result[-1] < longest:
+        result.append(min(longest, result[-1] + max(1, result[-1] // 20)))
+    return [length for length in result if length <= longest]
+
+
+class _Path:
+    """A path as running sums, from which any stretch of it is judged."""
 
     def __init__(self, step: Float, step_of_tool: Float, moving: Mask) -> None:
         """Steps (W, 3) in base axes, the same in the tool's, and whether it moves (W,)."""
-        self.place, self.place_of_tool = _running(step), _running(step_of_tool)
-        self.area = _running(0.5 * np.cross(self.place[:-1], step))
-        self.path = _running(norm(step))
-        self.moving = _running(moving.astype(float))
+        self._place, self._place_of_tool = _running(step), _running(step_of_tool)
+        self._area = _running(0.5 * np.cross(self._place[:-1], step))
+        self._length = _running(norm(step))
+        self._moving = _running(moving.astype(float))
+        self._axes = np.ascontiguousarray(self._place.T), np.ascontiguousarray(self._place_of_tool.T)
 
-    def loops(self, length: int) -> tuple[Float, Mask]:
-        """Axis (W + 1 - length, 3) of what stretches of `length` windows enclose, and whether they may be rounds."""
-        back, back_of_tool, area, path, moving = (
-            x[length:] - x[:-length] for x in (self.place, self.place_of_tool, self.area, self.path, self.moving)
+    def comes_back(self, length: int) -> NDArray[np.intp]:
+        """Starts of the stretches of `length` windows that end near where they began."""
+        near = BACK * (self._length[length:] - self._length[:-length])
+        back = [sum((x[length:] - x[:-length]) ** 2 for x in axes) for axes in self._axes]
+        return np.flatnonzero(np.maximum(*back) < near * near)
+
+    def loops(self, starts: NDArray[np.intp], length: int) -> tuple[NDArray[np.intp], Float]:
+        """Those that go round something, and widely, and the axis (S, 3) that they go round."""
+        back, area, path, moving = (
+            x[starts + length] - x[starts] for x in (self._place, self._area, self._length, self._moving)
         )
-        area = area - 0.5 * np.cross(self.place[:-length], back)
+        area = area - 0.5 * np.cross(self._place[starts], back)
         size = norm(area)
-        fine = (np.maximum(norm(back), norm(back_of_tool)) < BACK * path) & (2.0 * size > RADIUS_M * path)
-        fine &= (4.0 * np.pi * size > ROUND * path * path) & (moving >= MOVING * length)
-        return area / np.maximum(size, 1e-12)[:, None], fine
+        fine = (2.0 * size > RADIUS_M * path) & (4.0 * np.pi * size > ROUND * path * path) & (moving >= MOVING * length)
+        return starts[fine], area[fine] / size[fine, None]
 
 
 def _running(x: Float) -> Float:
