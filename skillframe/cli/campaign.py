@@ -199,11 +199,13 @@ def _show_rates(skills: dict[str, dict[str, Any]]) -> None:
     rows = [
         [
             label, s["trials"], s["successes"], "-" if s["rate"] is None else f"{s['rate']:.3f}",
-            f"{s['interval_95'][0]:.3f} .. {s['interval_95'][1]:.3f}", s["method"],
+            f"{s['interval_95'][0]:.3f} .. {s['interval_95'][1]:.3f}",
         ]
         for label, s in skills.items()
     ]  # fmt: skip
-    table(["skill", "trials", "successes", "rate", "95 % interval", "method"], rows)
+    table(["skill", "trials", "successes", "rate", "95 % interval"], rows)
+    for method in dict.fromkeys(s["method"] for s in skills.values()):
+        click.echo(f"  intervals: {method}")
     for label, s in skills.items():
         causes: Counter[str] = Counter()
         for text, count in s["failures"].items():

@@ -29,6 +29,9 @@ FORCE_CAPTION = (
     "What the environment does to the tool, filtered, which is what limits are held against; x, y, z are the robot's "
     "base axes."
 )
+ESTIMATE_CAPTION = (
+    "What the environment does to the tool, as estimated from the pressures; x, y, z are the robot's base axes."
+)
 POSITION_CAPTION = (
     "Of the centre of compliance, from the start. Dashed: asked for by the skill; where they part, the environment led."
 )
@@ -100,7 +103,8 @@ def _event_marks(axes: Axes, events: Sequence[tuple[float, str]]) -> Markup:
             x = round(float(axes.across(when)), 1)
             tip = tag("title", f"{told:.2f} s: {what}")
             lines.append(tag("line", tip, x1=x, x2=x, y1=axes.top, y2=axes.bottom, class_="event"))
-            together = bool(labels) and x - labels[-1][0] < LABEL_GAP
+            gap = LABEL_GAP * (2 if x > axes.right - LABEL_GAP else 1)  # the last number stands before its line
+            together = bool(labels) and x - labels[-1][0] < gap
             labels = (
                 [*labels[:-1], (labels[-1][0], f"{labels[-1][1]}, {index}")] if together else [*labels, (x, f"{index}")]
             )
@@ -108,7 +112,7 @@ def _event_marks(axes: Axes, events: Sequence[tuple[float, str]]) -> Markup:
 
 
 def _event_label(axes: Axes, x: float, label: str) -> Markup:
-    at_edge = x > axes.right - LABEL_GAP
+    at_edge = x + 6.0 * len(label) > axes.right
     return text(x - 3 if at_edge else x + 3, axes.top + 9, label, "event-text", "end" if at_edge else "start")
 
 
@@ -149,7 +153,8 @@ def run_plots(trace: Trace, force_limit: float | None = None) -> list[Markup]:
     turns = _pairs(turned(trace.desired_quaternion, first), turned(trace.quaternion, first))
     plots = [
         time_plot("Contact force", "N", time, [true_size, *_components(trace.wrench[:, :3], "thin"), size],
-                  limit=None if limit is None else float(limit), events=events, caption=FORCE_CAPTION),
+                  limit=None if limit is None else float(limit), events=events,
+                  caption=ESTIMATE_CAPTION if trace.machine else FORCE_CAPTION),
         time_plot("Position", "mm", time, moved, events=events, caption=POSITION_CAPTION),
         time_plot("Attitude", "°", time, turns, events=events, caption=ATTITUDE_CAPTION),
         time_plot("Contact torque", "Nm", time, _components(trace.wrench[:, 3:], ""), events=events,

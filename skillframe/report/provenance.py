@@ -25,7 +25,7 @@ def provenance_section(chapter: Chapter) -> Markup:
     """Facts, files, commands."""
     parts = [
         tag("h3", "Repeat it"),
-        tag("pre", "\n".join(commands(chapter))),
+        tag("pre", join((_unbroken(line) for line in commands(chapter)), "\n")),
         tag("p", _place(chapter), class_="caption"),
     ]
     blocks = [_block(title, rows) for title, rows in _facts(chapter) if rows]
@@ -41,6 +41,11 @@ def provenance_section(chapter: Chapter) -> Markup:
     if chapter.spec_text:
         parts.append(tag("details", tag("summary", "campaign.toml"), tag("pre", chapter.spec_text)))
     return join(parts)
+
+
+def _unbroken(line: str) -> Markup:
+    """A command that is broken between its words only, not after the hyphens of an option."""
+    return join((tag("span", word, class_="word") for word in line.split(" ")), " ")
 
 
 def _block(title: str, rows: Rows) -> Markup:

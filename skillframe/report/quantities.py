@@ -11,12 +11,13 @@ UNITS: tuple[tuple[str, str, float], ...] = (
     ("scale", "", 1.0),
     ("torque|joint_friction", "Nm", 1.0),
     ("force", "N", 1.0),
+    ("stiffness", "N/m", 1.0),
     ("tilt|angle|slope|roll|pitch|yaw|rotation|turn", "°", float(np.degrees(1.0))),
     ("pressure", "bar", 1e-5),
     ("payload|mass", "kg", 1.0),
     ("delay", "ms", 1e3),
     ("deadband", "%", 1e2),
-    ("offset|position|clearance|depth|radius|length|width|height|gap|tolerance|fillet", "mm", 1e3),
+    ("offset|position|clearance|depth|radius|length|width|height|gap|tolerance|fillet|above|away|along", "mm", 1e3),
 )
 """Words of a name, the unit for people, and its factor; the first that fits counts."""
 
