@@ -27,6 +27,8 @@ from skillframe.world.scene import Scene
 from skillframe.world.sensors import SensorSettings
 
 MOST_ATTEMPTS = 20
+Watch = Callable[[float, float], None]
+"""Told how many seconds are simulated, and of how many at most."""
 ESTIMATED = SensorSettings(force_noise=1.0, torque_noise=0.07)
 """A teleoperated machine's wrench is often an estimate: 0.4 to 2.3 N of noise are seen on such recordings."""
 
@@ -51,6 +53,7 @@ def record(
     duration_s: float = 12.0,
     sensors: SensorSettings | None = None,
     progress: Callable[[str], None] | None = None,
+    watch: Watch | None = None,
 ) -> Recording:
     """Demonstrate a scene `count` times; the starts of the scene's task are taken in turn.
 
@@ -65,6 +68,7 @@ def record(
         duration_s: longest demonstration.
         sensors: noise of the sensors; a wrist sensor's if not given, an estimate's for teleoperation.
         progress: told in words what happens.
+        watch: told now and then how many seconds are simulated, and of how many at most.
 
     Raises:
         SkillframeError: a slot still fails after 20 attempts; says with what.
@@ -72,7 +76,7 @@ def record(
     sensors = sensors or (ESTIMATED if settings.kind == "teleoperation" else SensorSettings())
 
     def attempt(slots: list[int], number: int) -> Result:
-        return _attempt(robot, scene, settings, slots, number, seed, draws or {}, rate_hz, duration_s, sensors)
+        return _attempt(robot, scene, settings, slots, number, seed, draws or {}, rate_hz, duration_s, sensors, watch)
 
     def keep(trace: Trace, slot: int, number: int) -> Demonstration:
         return demonstration_from(trace, scene, settings, sensors, seed=seed, slot=slot, attempt=number)
@@ -132,6 +136,7 @@ def beginning(robot: RobotModel, scene: Scene, count: int) -> str:
 def _attempt(
     robot: RobotModel, scene: Scene, settings: TeacherSettings, slots: list[int], attempt: int, seed: int,
     draws: Mapping[str, float], rate_hz: float, duration_s: float, sensors: SensorSettings | None,
+    watch: Watch | None,
 ) -> Result:  # fmt: skip
     columns = start_columns(scene, slots, draws)
     teacher = teacher_for(scene, fixture_poses(robot, columns, len(slots)), settings)
@@ -141,7 +146,13 @@ def _attempt(
         sensors=sensors or SensorSettings(), filter_wrench=False, stop_when=last.done or scene.goal,
     )  # fmt: skip
     rngs = [np.random.default_rng([seed, slot, attempt]) for slot in slots]
-    return simulate(teacher, setup, columns, rngs, duration_s=duration_s, trace_hz=rate_hz)
+    told = told_of(watch, duration_s)
+    return simulate(teacher, setup, columns, rngs, duration_s=duration_s, trace_hz=rate_hz, progress=told)
+
+
+def told_of(watch: Watch | None, duration_s: float) -> Callable[[float], None] | None:
+    """What a simulation of so many seconds at most tells; None where nobody watches."""
+    return None if watch is None else lambda now: watch(now, duration_s)
 
 
 def start_columns(scene: Scene, slots: Sequence[int], draws: Mapping[str, float]) -> dict[str, Float]:

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from skillframe.blind_teacher import LEVER, BlindSettings, BlindTeacher
-from skillframe.demonstrate import MOST_ATTEMPTS, Recording, beginning, demonstration_from
+from skillframe.demonstrate import MOST_ATTEMPTS, Recording, Watch, beginning, demonstration_from, told_of
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError, SkillframeError
 from skillframe.executor import Result, Setup, simulate
@@ -35,6 +35,7 @@ def record_blind(
     rate_hz: float = 500.0,
     sensors: SensorSettings | None = None,
     progress: Callable[[str], None] | None = None,
+    watch: Watch | None = None,
 ) -> Recording:
     """Search a scene blindly `count` times, from a start of its own each time.
 
@@ -48,6 +49,7 @@ def record_blind(
         rate_hz: sample rate of the files.
         sensors: noise of the sensors.
         progress: told in words what happens.
+        watch: told now and then how many seconds are simulated, and of how many at most.
 
     Raises:
         InputError: the world has no direction to push in.
@@ -61,7 +63,7 @@ def record_blind(
         progress(beginning(robot, scene, count))
     for attempt in range(MOST_ATTEMPTS):
         slots = [slot for slot in range(count) if slot not in done]
-        result, handle = _attempt(robot, scene, settings, slots, attempt, seed, draws or {}, rate_hz, sensors)
+        result, handle = _attempt(robot, scene, settings, slots, attempt, seed, draws or {}, rate_hz, sensors, watch)
         assert result.traces is not None
         for i, slot in enumerate(slots):
             if result.status[i] == Status.SUCCESS:
@@ -84,7 +86,7 @@ def record_blind(
 
 def _attempt(
     robot: RobotModel, scene: Scene, settings: BlindSettings, slots: list[int], attempt: int, seed: int,
-    draws: Mapping[str, float], rate_hz: float, sensors: SensorSettings | None,
+    draws: Mapping[str, float], rate_hz: float, sensors: SensorSettings | None, watch: Watch | None,
 ) -> tuple[Result, str]:  # fmt: skip
     starts = [_start(settings, np.random.default_rng([seed, slot, attempt, 1])) for slot in slots]
     for start in starts:
@@ -98,7 +100,9 @@ def _attempt(
     )  # fmt: skip
     rngs = [np.random.default_rng([seed, slot, attempt]) for slot in slots]
     teacher = BlindTeacher(np.array(scene.task.direction), settings)
-    return simulate(teacher, setup, columns, rngs, duration_s=settings.time_s + 1.0, trace_hz=rate_hz), handle
+    longest = settings.time_s + 1.0
+    told = told_of(watch, longest)
+    return simulate(teacher, setup, columns, rngs, duration_s=longest, trace_hz=rate_hz, progress=told), handle
 
 
 def _start(settings: BlindSettings, rng: np.random.Generator) -> dict[str, float]:

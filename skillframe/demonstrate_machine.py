@@ -14,7 +14,7 @@ from math import cos, sin
 import numpy as np
 
 from skillframe.control.hydraulic import plane_axes
-from skillframe.demonstrate import Recording, collect, demonstration_from, start_columns
+from skillframe.demonstrate import Recording, Watch, collect, demonstration_from, start_columns, told_of
 from skillframe.demonstration.columns import WRENCH
 from skillframe.demonstration.convention import STANDARD
 from skillframe.demonstration.record import Demonstration
@@ -46,6 +46,7 @@ def record_operated(
     rate_hz: float = 100.0,
     duration_s: float = LONGEST_S,
     progress: Callable[[str], None] | None = None,
+    watch: Watch | None = None,
 ) -> Recording:
     """Demonstrate a scene `count` times; arguments as `skillframe.demonstrate.record`.
 
@@ -59,7 +60,7 @@ def record_operated(
     def attempt(slots: list[int], number: int) -> Result:
         rngs = [np.random.default_rng([seed, slot, number]) for slot in slots]
         columns = start_columns(scene, slots, draws or {})
-        return operate(robot, scene, settings, columns, rngs, rate_hz=rate_hz, duration_s=duration_s)
+        return operate(robot, scene, settings, columns, rngs, rate_hz=rate_hz, duration_s=duration_s, watch=watch)
 
     def keep(trace: Trace, slot: int, number: int) -> Demonstration:
         return demonstration_of_machine(trace, scene, settings, seed=seed, slot=slot, attempt=number)
@@ -76,6 +77,7 @@ def operate(
     *,
     rate_hz: float = 100.0,
     duration_s: float = LONGEST_S,
+    watch: Watch | None = None,
 ) -> Result:
     """Operators teach len(rngs) machines in lock-step, each until the task is done; with traces.
 
@@ -90,11 +92,13 @@ def operate(
         rngs: a generator per trial.
         rate_hz: of the traces.
         duration_s: longest demonstration, without the swing in the air.
+        watch: told now and then how many seconds are simulated, and of how many at most.
     """
     _require_direction(scene)
     operator = Operator(scene.task, fixture_poses(robot, draws, len(rngs)), settings)
     setup = Setup(robot=robot, scene=scene, stop_when=scene.task.done or scene.goal)
-    result = simulate(operator, setup, draws, rngs, duration_s=duration_s, trace_hz=rate_hz)
+    told = told_of(watch, duration_s)
+    result = simulate(operator, setup, draws, rngs, duration_s=duration_s, trace_hz=rate_hz, progress=told)
     done = result.status == Status.SUCCESS
     return replace(result, success=done, failure=np.where(done, "", result.failure))
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from skillframe.cli.numbers import NOT_NEGATIVE, POSITIVE, SEED
+from skillframe.cli.output import progress
 
 if TYPE_CHECKING:
     from skillframe.blind_teacher import BlindSettings
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from skillframe.robot.model import RobotModel
     from skillframe.teacher import TeacherSettings
     from skillframe.world.scene import Scene
+
+QUIET_S = 5.0  # a recording that is over by then needs no progress
 
 
 @click.command(name="record")
@@ -91,18 +94,9 @@ def command(
     machine, scene = load_robot_model(robot), load_world(world, params)
     common: dict[str, Any] = {"count": count, "seed": seed, "draws": draws, "progress": _progress}
     common |= {} if rate is None else {"rate_hz": rate}
-    if machine.spec.actuation or any(map(_given, operated.values())):
-        recording = _operated(
-            machine, scene, teacher, {**operated, "noise": noise, "delay": delay, "scale": scale}, common
-        )
-    elif teacher == "blind":
-        from skillframe.demonstrate_blind import record_blind
-
-        recording = record_blind(machine, scene, _blind(scene, belief, centre), **common)
-    else:
-        from skillframe.demonstrate import record
-
-        recording = record(machine, scene, _seeing(teacher, noise, delay, scale), **common)
+    with progress("s simulated", QUIET_S) as show:
+        common["watch"] = lambda now, longest: show(round(now, 1), longest)
+        recording = _recorded(machine, scene, teacher, (noise, delay, scale), (belief, centre), operated, common)
     files = _write(recording, out, count)
     if as_json:
         click.echo(json.dumps({"files": [str(f) for f in files], "rejected": recording.rejected}))
@@ -112,6 +106,23 @@ def command(
     for text in recording.rejected:
         click.echo(f"redrawn: {text}")
     return 0
+
+
+def _recorded(
+    machine: RobotModel, scene: Scene, teacher: str, person: tuple[float | None, float | None, float | None],
+    places: tuple[str | None, str | None], operated: dict[str, Any], common: dict[str, Any],
+) -> Recording:  # fmt: skip
+    """By an operator, somebody blindfolded, or somebody who sees."""
+    if machine.spec.actuation or any(map(_given, operated.values())):
+        given = {**operated, **dict(zip(("noise", "delay", "scale"), person, strict=True))}
+        return _operated(machine, scene, teacher, given, common)
+    if teacher == "blind":
+        from skillframe.demonstrate_blind import record_blind
+
+        return record_blind(machine, scene, _blind(scene, *places), **common)
+    from skillframe.demonstrate import record
+
+    return record(machine, scene, _seeing(teacher, *person), **common)
 
 
 def _operated(
