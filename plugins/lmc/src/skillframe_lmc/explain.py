@@ -109,6 +109,6 @@ def _svg(draw: Callable[[], Figure]) -> str:
         figure: Any = draw()
         FigureCanvasSVG(figure)
         file = io.StringIO()
-        figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None}, bbox_inches="tight")
+        figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
     text = file.getvalue()
     return text[text.index("<svg") :]

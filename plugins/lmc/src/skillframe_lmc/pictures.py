@@ -27,7 +27,7 @@ def directions(name: str, part: Part, axes: str) -> Figure:
     plane = Plane(_centre(part, given))
     alpha = part.evidence["pyramid_angle_rad"]
     drawn = min(alpha, radians(20.0))
-    figure = Figure(figsize=(6.4, 5.6))
+    figure = Figure(figsize=(6.4, 5.4), layout="constrained")
     canvas = figure.add_subplot()
     reach = [30.0]
     for colour, sectors in zip(_cycle(len(given)), given, strict=True):
@@ -113,7 +113,7 @@ def _legend(canvas: Axes, count: int, part: Part) -> None:
 def axes(name: str, part: Part, frame: str) -> Figure:
     """Mean directions, principal axes and the criterion (Fig. 14)."""
     figure = Figure(figsize=(6.4, 3.6), layout="constrained")
-    left, right = figure.subplots(1, 2, width_ratios=(1.25, 1.0))
+    left, right = figure.subplots(1, 2, width_ratios=(1.25, 1.0), gridspec_kw={"wspace": 0.12})
     _means(left, part, frame)
     criterion = part.evidence["criterion"]
     best = int(np.argmin(criterion))
