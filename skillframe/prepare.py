@@ -23,6 +23,7 @@ from skillframe.robot.kinematics import UnreachablePose, inverse_kinematics
 from skillframe.robot.model import RobotModel, load_model
 from skillframe.robot.spec import load_robot
 from skillframe.skill import Skill
+from skillframe.skillfile import understood
 from skillframe.world.catalogue import make_scene
 from skillframe.world.placement import start_poses
 from skillframe.world.scene import Scene
@@ -91,15 +92,18 @@ def prepare(robot: RobotModel, scene: Scene, document: Document, coc: str | None
         InputError: the skill says where it goes, and that is outside the robot's workspace.
     """
     kind = registry().behaviour(document["type"])
+    what = f"the {kind.name} skill"
     if isinstance(kind, CoordinatorType):
-        return kind.build(document), Setup(
-            robot=robot, scene=scene, center_of_compliance=_centers(kind, document, scene, coc)
-        )
+        with understood(what):
+            coordinator = kind.build(document)
+        return coordinator, Setup(robot=robot, scene=scene, center_of_compliance=_centers(kind, document, scene, coc))
     center = center_of_compliance(document, scene, coc)
     placed = {**document, "frame": {**document["frame"], "center_of_compliance": center.tolist()}}
-    skill = kind.build(placed)
-    if kind.area is not None:
-        _check_area(robot, scene, document, kind.area(document))
+    with understood(what):
+        skill = kind.build(placed)
+        area = None if kind.area is None else kind.area(document)
+    if area is not None:
+        _check_area(robot, scene, document, area)
     return skill, Setup(robot=robot, scene=scene, center_of_compliance=center)
 
 

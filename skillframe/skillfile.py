@@ -13,6 +13,7 @@ import hashlib
 import json
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from skillframe.errors import InputError, UnknownName
 from skillframe.records import CoordinatorType, Document, SkillType
 from skillframe.registry import registry
 
-LARGEST = sys.float_info.max  # whole numbers in JSON may be longer
+LARGEST = 1e100  # beyond it squares overflow
 FORMAT, VERSION = "skillframe.skill", 1
 AXES = ("base", "phase_start")
 POINTS = ("work_at", "learned_at", "center_of_compliance")
@@ -126,10 +127,29 @@ def load(path: Path) -> Document:
         )
     try:
         if skill.check is not None:
-            skill.check(document)
+            with understood(path):
+                skill.check(document)
+        if skill.describe is not None:
+            with understood(path):
+                skill.describe(document)
     except InputError as error:
-        raise InputError(f"{path}: {error.where}", error.problem, error.fix) from None
+        where = path if error.where == str(path) else f"{path}: {error.where}"
+        raise InputError(where, error.problem, error.fix) from None
     return document
+
+
+@contextmanager
+def understood(where: object) -> Iterator[None]:
+    """What a kind of skill stumbles over in a document that keeps the common layout, as one sentence.
+
+    Raises:
+        InputError: in place of whatever Python or numpy said of a value of another type, size or shape.
+    """
+    try:
+        yield
+    except (ArithmeticError, AttributeError, LookupError, MemoryError, TypeError, ValueError) as error:
+        said = f"{type(error).__name__}: {' '.join(str(error).split())}"[:200]
+        raise InputError(where, f"holds something that its kind of skill cannot use ({said})", _AGAIN) from error
 
 
 def _parse(path: Path) -> Document:
@@ -173,8 +193,8 @@ def _check(document: Document, where: str) -> None:
         _demand(document, key, kind, where, "")
     if "type_version" in document:
         _demand(document, "type_version", int, where, "")
-    for spot in _not_finite(document, ""):
-        raise InputError(f"{where}: {spot}", "is not a finite number", "mend it, or learn the skill again")
+    for spot, problem in _no_numbers(document, ""):
+        raise InputError(f"{where}: {spot}", problem, "mend it, or learn the skill again")
     _check_frame(document["frame"], where)
     for i, source in enumerate(document["learned_from"]):
         for key in ("file", "sha256"):
@@ -210,12 +230,13 @@ def _check_point(point: Any, where: str) -> None:
         raise InputError(where, "should be a point [x, y, z] of the tool frame in metres", "mend it")
 
 
-def _not_finite(value: Any, spot: str) -> Iterator[str]:
+def _no_numbers(value: Any, spot: str) -> Iterator[tuple[str, str]]:
     if isinstance(value, float | int) and not -LARGEST <= value <= LARGEST:
-        yield spot
+        finite = abs(value) <= sys.float_info.max  # a whole number in JSON may be longer
+        yield spot, "is beyond any physical size" if finite else "is not a finite number"
     elif isinstance(value, dict):
         for key, item in value.items():
-            yield from _not_finite(item, f"{spot}.{key}" if spot else str(key))
+            yield from _no_numbers(item, f"{spot}.{key}" if spot else str(key))
     elif isinstance(value, list | tuple):
         for i, item in enumerate(value):
-            yield from _not_finite(item, f"{spot}[{i}]")
+            yield from _no_numbers(item, f"{spot}[{i}]")

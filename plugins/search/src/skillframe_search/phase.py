@@ -145,8 +145,29 @@ def _check_exploration(phase: Phase) -> None:
     if found is None:
         raise InputError("phases[0].exploration", f"is missing for the kind {phase.path.kind}", "learn the skill again")
     k = len(names)
-    shape = (found.coordinates, len(found.mean), np.shape(found.covariance))
+    shape = (found.coordinates, len(found.mean), _shape(found.covariance))
     if shape != (phase.searched, k, (k, k)) or np.linalg.eigvalsh(np.array(found.covariance)).min() <= 0.0:
         raise InputError("phases[0].exploration", "is not a Gaussian over what is searched", "learn the skill again")
-    if phase.forces is not None and len(phase.forces.means[0]) != k + 6:
+    if phase.forces is not None and not _fits(phase.forces, k):
         raise InputError("phases[0].forces", "does not fit what is searched", "learn the skill again")
+
+
+def _shape(rows: Any) -> tuple[int, ...]:
+    """The shape of nested rows, (-1,) where they are of different length."""
+    try:
+        return np.shape(rows)
+    except ValueError:
+        return (-1,)
+
+
+def _fits(forces: ForceModel, k: int) -> bool:
+    """Whether a force model is a mixture of Gaussians over k rates and a wrench."""
+    count, width = len(forces.weights), k + 6
+    shapes = _shape(forces.means), _shape(forces.covariances)
+    if count == 0 or shapes != ((count, width), (count, width, width)) or min(forces.weights) < 0.0:
+        return False
+    try:
+        np.linalg.cholesky(np.array(forces.covariances)[:, :k, :k])
+    except np.linalg.LinAlgError:
+        return False
+    return True
