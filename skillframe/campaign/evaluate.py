@@ -20,11 +20,14 @@ from skillframe.campaign.pulse import beat
 from skillframe.campaign.rows import EXTRA, OUTCOME, TRACE, ChunkJob, Row, plain_value, rows_of
 from skillframe.campaign.sampling import draws, trial_rngs
 from skillframe.campaign.spec import CampaignSpec
-from skillframe.executor import simulate
+from skillframe.executor import QUANTITIES, simulate
 from skillframe.prepare import load_robot_model, load_world, prepare
+from skillframe.robot.model import RobotModel
+from skillframe.robot.payload import with_payload
 from skillframe.skillsource import load_skill
 from skillframe.trace import Trace
 from skillframe.world.drawing import geom_json
+from skillframe.world.placement import check_quantities
 from skillframe.world.scene import Scene
 
 TRACE_HZ = 100.0
@@ -55,14 +58,18 @@ def describe(spec: CampaignSpec) -> dict[str, Any]:
     """The nominal scene as plain JSON values for scene.json; refuses what would not run.
 
     Raises:
-        SkillframeError: a skill, the robot, or a world parameter at one of its declared values cannot be used.
+        SkillframeError: a skill, the robot, or a quantity at one of its declared values cannot be used.
     """
     robot = load_robot_model(str(spec.folder / spec.robot))
     scene = _scene(spec, {})
     for text in spec.skills:
         prepare(robot, scene, load_skill(text, spec.folder)[1], spec.coc)
     for name, value in _declared_values(spec):
-        _scene(spec, {name: value})
+        if name.startswith("world."):
+            _scene(spec, {name: value})
+        _check_quantity(robot, name, value)
+    for name, value in spec.fixed.items():
+        _check_quantity(robot, name, value)
     tool = {
         "geoms": [geom_json(g) for g in scene.tool.geoms],
         "frames": {k: list(v) for k, v in scene.tool.frames.items()},
@@ -91,10 +98,17 @@ def _shapes_scene(name: str) -> bool:
 
 
 def _declared_values(spec: CampaignSpec) -> Iterator[tuple[str, Value]]:
-    """Ends and listed values of the varied world parameters."""
+    """Ends, means and listed values of what varies."""
     for name, axis in spec.vary.items():
-        if name.startswith("world.") and axis.kind != "normal":
-            yield from ((name, value) for value in axis.numbers)
+        yield from ((name, value) for value in (axis.numbers[:1] if axis.kind == "normal" else axis.numbers))
+
+
+def _check_quantity(robot: RobotModel, name: str, value: Value) -> None:
+    """Refuse a value that no trial of this robot could run with."""
+    if name in QUANTITIES:
+        check_quantities({name: np.array([value], dtype=float)}, robot)
+    if name == "robot.payload":
+        with_payload(robot.spec, float(value))
 
 
 def _scene(spec: CampaignSpec, varied: Mapping[str, Value]) -> Scene:

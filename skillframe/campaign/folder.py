@@ -61,6 +61,9 @@ def prepare(spec: CampaignSpec, out: Path, describe: Describe, params: type) -> 
         (temporary / CAMPAIGN).write_text(to_toml(ready), encoding="utf-8")
         (temporary / SCENE).write_text(json.dumps(describe(ready), sort_keys=True), encoding="utf-8")
         os.replace(temporary, out)
+    except InputError as error:  # the copies are of no use to whoever reads it
+        where = error.where.replace(f"{temporary}/skills", str(spec.folder)).replace(f"{temporary}/", "")
+        raise InputError(where, error.problem, error.fix) from None
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
     return CampaignSpec.from_toml(out / CAMPAIGN, params)

@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import dataclasses
 import typing
-from collections.abc import Iterable
 from typing import Any
 
 from skillframe.campaign.axes import Axis, Value
 from skillframe.config import coerce
-from skillframe.errors import InputError, UnknownName
+from skillframe.errors import InputError, UnknownName, suggest
 
 GROUPS = ("start", "fixture", "grasp", "world", "robot", "actuator", "sensor")
 
@@ -37,8 +36,11 @@ def check_name(name: str, params: type, where: str) -> None:
     if name in known:
         return
     group = name.partition(".")[0]
-    among: Iterable[str] = [k for k in known if k.startswith(f"{group}.")] if group in GROUPS else known
-    raise InputError(where, str(UnknownName("quantity", name, among)))
+    if group not in GROUPS:
+        near = suggest(name, known)
+        hint = f"; did you mean {near!r}?" if near else ""
+        raise InputError(where, f"unknown quantity {name!r}{hint} (there are: {', '.join(f'{g}.*' for g in GROUPS)})")
+    raise InputError(where, str(UnknownName("quantity", name, [k for k in known if k.startswith(f"{group}.")])))
 
 
 def check_value(name: str, value: Value, params: type, where: str) -> Value:

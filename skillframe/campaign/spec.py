@@ -138,9 +138,11 @@ class CampaignSpec:
         params = params or _world_params(file.world)
         _check_numbers(file, path)
         _check_skills(file, path)
-        given = flatten(file.vary)
+        given = flatten(file.vary, f"{path}: vary")
         vary = {name: _axis(name, value, params, file, path) for name, value in given.items()}
-        fixed = {name: _fixed(name, value, params, given, path) for name, value in flatten(file.set).items()}
+        fixed = {
+            name: _fixed(name, value, params, given, path) for name, value in flatten(file.set, f"{path}: set").items()
+        }
         values = {k: getattr(file, k) for k in ("seed", "trials", "robot", "world", "skills", "coc", "duration_s")}
         spec = cls(**values, name=file.name or path.stem, vary=vary, fixed=fixed, stop=file.stop, expect=file.expect,
                    folder=path.parent)  # fmt: skip
@@ -148,14 +150,19 @@ class CampaignSpec:
         return spec
 
 
-def flatten(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Quantities of a table, whether written as "start.tilt_y", as start.tilt_y or under [vary.start]."""
+def flatten(table: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """Quantities of a table, whether written as "start.tilt_y", as start.tilt_y or under [vary.start].
+
+    Raises:
+        InputError: one is written in two ways.
+    """
     flat: dict[str, Any] = {}
     for key, value in table.items():
-        if key in GROUPS and isinstance(value, Mapping):
-            flat.update({f"{key}.{name}": content for name, content in value.items()})
-        else:
-            flat[key] = value
+        grouped = key in GROUPS and isinstance(value, Mapping)
+        for name, content in {f"{key}.{inner}": v for inner, v in value.items()}.items() if grouped else [(key, value)]:
+            if name in flat:
+                raise InputError(f"{where}.{name}", "is written twice", "keep one of the two")
+            flat[name] = content
     return flat
 
 

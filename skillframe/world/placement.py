@@ -50,6 +50,8 @@ def check_quantities(draws: Mapping[str, Float], robot: RobotModel | None = None
         least, largest = float(np.min(values)), float(np.max(np.abs(values)))
         if not largest <= LARGEST.get(key.partition(".")[0], np.inf):
             raise InputError(key, f"cannot be {largest:g}", "give it in SI units, angles in radians")
+        if ".tilt_" in key and largest > np.pi:
+            raise InputError(key, f"cannot be {largest:g} rad", "give an angle in radians, not in degrees")
         if least < 0.0 and key in NOT_NEGATIVE:
             raise InputError(key, f"cannot be negative, is {least:g}", "give 0 or more")
         if least <= 0.0 and key == "robot.mass_scale":

@@ -1,0 +1,63 @@
+"""campaign.toml with what people get wrong: refused with one sentence before a folder is made."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from skillframe.cli.main import run
+from skillframe.registry import registry
+from skillframe.skillfile import save
+from skillframe.skillsource import learned
+from skillframe.testing import example_demonstrations
+
+pytestmark = pytest.mark.needs_plugins
+TEXT = """
+seed = 7
+trials = 4
+robot = "free_tool"
+world = "valley"
+duration_s = 0.02
+skills = ["push.skill.json"]
+[vary]
+"start.tilt_y" = { uniform = [-0.2, 0.2] }
+"""
+SLIPS = {
+    "degrees": ("[-0.2, 0.2]", "[-45, 45]", "start.tilt_y: cannot be 45 rad; give an angle in radians"),
+    "a quantity of machines": ("start.tilt_y", "actuator.supply_pressure", "free_tool has no actuators of its own"),
+    "a payload of none": ("start.tilt_y", "robot.payload", "the robot declares no payload"),
+    "noise below zero": ("start.tilt_y", "sensor.force_noise", "cannot be negative, is -0.2"),
+    "beyond all machines": ("[-0.2, 0.2]", "[0, 1e9]", "start.tilt_y: cannot be 1e+09"),
+    "no group": ("start.tilt_y", "tilt", "unknown quantity 'tilt'; did you mean 'start.tilt_z'? (there are: start.*"),
+    "twice": ("[vary]", "[vary.start]\ntilt_y = { grid = [0.1, 0.2] }\n[vary]", "vary.start.tilt_y: is written twice"),
+    "a skill cut off": ("push.skill", "cut.skill", "cut.skill.json: is cut off at line 1"),
+    "one skill, no list": ('["push.skill.json"]', "'push.skill.json'", "campaign.skills: expected a list"),
+}
+
+
+@pytest.fixture
+def campaign(tmp_path: Path) -> Path:
+    save(learned(registry().skill("lmc"), example_demonstrations()), tmp_path / "push.skill.json")
+    (tmp_path / "cut.skill.json").write_text('{"format": "skillframe.skill", "ver')
+    return tmp_path / "c.toml"
+
+
+@pytest.mark.parametrize("how", SLIPS)
+def test_a_slip_is_refused_before_anything_is_made(
+    campaign: Path, capsys: pytest.CaptureFixture[str], how: str
+) -> None:
+    old, new, words = SLIPS[how]
+    assert old in TEXT
+    campaign.write_text(TEXT.replace(old, new))
+    before = sorted(campaign.parent.iterdir())
+    assert run(["campaign", "run", str(campaign), "--out", str(campaign.parent / "out")]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("error: ") and said.count("\n") == 1 and len(said) < 500 and words in said, said
+    assert "tmp-" not in said  # the user's file, not our copy of it
+    assert sorted(campaign.parent.iterdir()) == before
+
+
+def test_what_is_right_runs_from_a_file_with_a_byte_order_mark(campaign: Path) -> None:
+    campaign.write_text("\ufeff" + TEXT)
+    assert run(["campaign", "run", str(campaign), "--out", str(campaign.parent / "out")]) == 0
