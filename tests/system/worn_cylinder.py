@@ -13,7 +13,7 @@ from skillframe.actuation.build import build_fmu
 from skillframe.actuation.library import fmu_folders
 from skillframe.campaign.sampling import draws
 from skillframe.campaign.spec import CampaignSpec
-from skillframe.machine_bank import instance_parameters
+from skillframe.machine.bank import instance_parameters
 from skillframe.robot.spec import load_robot
 from tests.crane_corner import SKILL
 

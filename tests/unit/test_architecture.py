@@ -21,7 +21,7 @@ FLOORS = [
     {"sequence", "skillfile", "export", "robot", "registry", "skillsource"},
     {"control", "actuation"},
     {"cosim", "world"},
-    {"executor", "arms", "machine", "machine_bank", "machine_columns", "recorder", "trace", "prepare"},
+    {"executor", "arms", "machine", "recorder", "trace", "prepare"},
     {"teacher", "staged_teacher", "blind_teacher", "teleoperation", "metrics", "campaign"},
     {"report", "demonstrate", "demonstrate_blind", "demonstrate_machine"},
     {"conformance", "testing", "quickstart", "reproduce"},
@@ -47,8 +47,6 @@ LOOP = {
     "executor",
     "arms",
     "machine",
-    "machine_bank",
-    "machine_columns",
 }
 SET_UP = {  # finds, builds and unpacks FMUs before a run, simulates one alone, holds a foreign one in its own process
     f"skillframe/actuation/{name}.py"

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from skillframe.control.vdc_actuator import Cylinders, cylinders
 from skillframe.errors import InputError, UnknownName
-from skillframe.machine_bank import instance_parameters
+from skillframe.machine.bank import instance_parameters
 from skillframe.robot.audit import audit
 from skillframe.robot.feasibility import capacity, problems, require_feasible
 from skillframe.robot.loops import ClosedChain, OutOfReach, step

@@ -23,16 +23,15 @@ from skillframe.conditioning.valve import ValveIdentification
 from skillframe.control.force_compiled import CompiledEstimator
 from skillframe.control.hydraulic import Demand, HydraulicGains, Measured, Reference, plane_task
 from skillframe.control.hydraulic_compiled import CompiledLaw
-from skillframe.control.vdc import parameters
-from skillframe.control.vdc_actuator import cylinders, friction_parameters
-from skillframe.control.vdc_adaptation import relative_bounds
+from skillframe.control.vdc_actuator import cylinders
 from skillframe.cosim.coupling import coupling_numbers, require_stable
 from skillframe.cosim.master import CosimSettings, Master
 from skillframe.errors import InputError
 from skillframe.executor import RAMP_S, Loop, Result, Setup
 from skillframe.frames import Float, Pose
-from skillframe.machine_bank import banks, instance_parameters
-from skillframe.machine_columns import EnergyBill, columns, supply_pressures
+from skillframe.machine.bank import banks, instance_parameters
+from skillframe.machine.calibration import CALIBRATION_S, SETTLE_S, hold_what_was_found, swing
+from skillframe.machine.columns import EnergyBill, columns, supply_pressures
 from skillframe.recorder import Recorder
 from skillframe.robot.feasibility import require_feasible
 from skillframe.robot.holding import require_held
@@ -43,10 +42,8 @@ from skillframe.world.machine_sensors import MachineSensors, MachineSensorSettin
 from skillframe.world.placement import check_quantities, start_poses
 from skillframe.world.plant import Draws, Kinematics
 
-__all__ = ["CALIBRATION_S", "MachineLoop", "simulate_machine"]
+__all__ = ["MachineLoop", "simulate_machine"]
 
-CALIBRATION_S, SETTLE_S, SWING_M = 6.0, 1.0, (0.10, 0.10, 0.05)
-"""Swing in the air before a run, two or three reversals of every cylinder, and a moment to come to rest (ours)."""
 IMPEDANCE_RATE, LEAST_DAMPING = 2.0, 5e4  # 1/s and N s/m; D where a skill leaves it open, from teleoperation trials
 VALVES_S = 0.5
 """So often the swing's rows are fitted anew for overlap and supply pressure of the valves (ours)."""
@@ -184,7 +181,7 @@ class MachineLoop(Loop):
         """Swing in the air and identify friction and payload, then hold what was found."""
         self.estimator.calibrate(True)
         for tick in range(round((CALIBRATION_S + SETTLE_S) / self.dt)):
-            position, velocity, joint, joint_rate = _swing(tick * self.dt)
+            position, velocity, joint, joint_rate = swing(tick * self.dt)
             stiff = LEAST_DAMPING * np.broadcast_to(np.eye(2), (self.count, 2, 2))
             zero = np.zeros((self.count, 2))
             self._sense(force_counts=False)
@@ -199,7 +196,7 @@ class MachineLoop(Loop):
             if not len(self.active):
                 break
         self.estimator.calibrate(False)
-        self._hold()
+        hold_what_was_found(self.law, self.estimator.identification)
         self.bill.start()
 
     def _look_at_valves(self, tick: int) -> None:
@@ -208,25 +205,6 @@ class MachineLoop(Loop):
         if tick and tick % round(VALVES_S / self.dt) == 0:
             self.valves.solve()
             self.law.deadband[:], self.law.supply[:] = self.valves.compensated, self.valves.supply
-
-    def _hold(self) -> None:
-        """Let the law compensate the friction and the payload that were found.
-
-        What its adaptation has come to by then is dropped: it makes the swing follow, and goes on wandering with the
-        friction of pistons that stand, by a tenth of the load's mass.
-        """
-        found, known = self.estimator.identification, self.law.cylinders
-        nominal = friction_parameters(known)
-        lower, upper = relative_bounds(nominal, self.law.gains.friction_share)
-        errors = np.stack([found.coulomb, found.viscous], axis=1)
-        self.law.adapt(False)
-        self.law.friction[:] = np.clip(nominal + errors, lower, upper)
-        theta, share = parameters(self.chain.model), self.law.gains.share
-        payload = self.setup.robot.spec.payload
-        assert payload is not None  # else the estimate has refused the robot
-        load = self.chain.model.frames[self.chain.model.getFrameId(payload.link)].parentJoint - 1
-        self.law.theta[:] = theta
-        self.law.theta[:, load] *= 1.0 + np.clip(found.payload / theta[load, 0], -share, share)[:, None]
 
     def _sense(self, force_counts: bool = True) -> None:
         """Sample the sensors, and estimate the force from them; in the air it is known to be zero."""
@@ -346,25 +324,6 @@ class MachineLoop(Loop):
 
     def _kinematics(self) -> Kinematics:
         return self.plant.kinematics(self.coc)
-
-
-def _swing(time: float) -> tuple[Float, Float, float, float]:
-    """Displacement (2,) and velocity of the tool, and of the open joint, at a time of the calibration.
-
-    Up and back to the start, to and fro along the first axis, the joint out and in: every cylinder reverses.
-    """
-    h = 1e-4
-
-    def at(t: float) -> Float:
-        fade = min(1.0, max(0.0, t / 0.5), max(0.0, (CALIBRATION_S - t) / 1.0))
-        fade = fade * fade * (3.0 - 2.0 * fade)
-        turn = 2.0 * np.pi * t / CALIBRATION_S
-        return fade * np.array(
-            [SWING_M[0] * np.sin(3 * turn), SWING_M[1] * (1.0 - np.cos(2 * turn)), SWING_M[2] * np.sin(2 * turn)]
-        )
-
-    now, rate = at(time), (at(time + h) - at(time - h)) / (2 * h)
-    return now[:2], rate[:2], float(now[2]), float(rate[2])
 
 
 def _times(matrix: Float, vector: Float) -> Float:
