@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 from skillframe_segmenter.document import skill_of
-from skillframe_segmenter.learning import pieces
+from skillframe_segmenter.learning import _alike, _as_phase, pieces
 
 from skillframe.cli import main
 from skillframe.frames import Pose, matrix_from_quaternion
@@ -76,7 +76,17 @@ def test_a_report_of_a_run_shows_which_phase_ran_when_and_why_it_switched(tmp_pa
     assert "└─ phase 2" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("skill", ["lmc", "gmr"])
+def test_what_phases_say_beside_themselves_is_kept_apart_unless_they_agree():
+    bodies = [{"frame": {"axes": "base"}, "rate": 4.0, "trajectory": [k], "phases": [{"blend": k}]} for k in (1, 2)]
+    shared = _alike(bodies)
+    assert shared == ["frame", "rate"]
+    phases = [_as_phase(body, "replay", shared) for body in bodies]
+    assert phases[1] == {"blend": 2, "skill": "replay", "beside": {"trajectory": [2]}}
+    document = {"frame": {"axes": "base"}, "rate": 4.0, "phases": phases, "phase_model": {}, "type": "policy"}
+    assert [skill_of(document, k) for k in range(2)] == [{**body, "type": "replay"} for body in bodies]
+
+
+@pytest.mark.parametrize("skill", ["lmc", pytest.param("gmr", marks=pytest.mark.slow)])
 def test_every_phase_holds_all_that_its_own_pieces_taught(skill):
     """A mixture's demonstrations stand beside its phase in the file; in a policy, each phase has its own."""
     taught = [m.demonstration for m in made.demonstrations("ls", 2)]
