@@ -23,10 +23,11 @@ extensions = [
     "docstring_maths",
     "command_help",
 ]
-exclude_patterns = ["_build", "_extensions"]
+exclude_patterns = ["_build", "_extensions", "_static"]
 myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 3
 default_role = "code"
+highlight_language = "text"  # unmarked blocks are what one types, not Python
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
@@ -40,5 +41,7 @@ napoleon_attr_annotations = False  # the docstring gives shapes and units, which
 
 html_theme = "furo"
 html_title = f"skillframe {version}"
+html_static_path = ["_static"]
+html_css_files = ["own.css"]
 html_copy_source = False
 html_show_sourcelink = False
