@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -207,6 +208,14 @@ def test_the_page_reaches_for_nothing_and_nothing_in_it_acts():
     assert "default-src &#x27;none&#x27;" in text and "http://" not in text and "https://" not in text
     assert "<script" not in text and "&lt;claim&gt;" in text and "data:image/svg+xml;base64" in text
     assert text == page.render(entries())
+
+
+def test_the_page_lists_its_rows_by_topic_and_an_older_row_without_one():
+    first, second = ({**entries()[0], "row": row, "topic": topic} for row, topic in (("1", "crane"), ("2", "search")))
+    third = {**{k: v for k, v in first.items() if k != "topic"}, "row": "3"}
+    links = page.render([first, second, third, {**first, "row": "4"}]).partition("<main>")[0]
+    shown = re.sub(r"<[^>]+>", " ", links.partition("<nav>")[2]).split()
+    assert shown == ["skillframe", "crane", "1", "4", "search", "2", "row", "3"]
 
 
 def test_the_docs_page_keeps_its_tables_whole():
