@@ -335,6 +335,7 @@ def test_wipes_of_all_kinds_are_one_phase_and_nothing_else_is(noise):
         for task in ("valley", "ls", "hose", "peg"):
             one_task = made.demonstrations(task, seed, noise=noise)
             stray += "round" in policy([t.demonstration for t in one_task])["phase_model"]
-    line(f"wipes, {noise:.0f} degrees", f"{alike}/12", f"{total.missed}/{total.changes}", total.false, total.largest)
+    missed = f"{total.missed}/{total.changes}"
+    line(f"wipes, {noise:.0f} degrees", f"{alike}/12", missed, total.false, f"{total.largest:.2f}")
     line("    other tasks with a round", f"{stray}/48")
     assert alike >= 11 and stray == 0

@@ -146,7 +146,8 @@ def test_em_never_loses_likelihood_while_the_motion_is_fitted(kind):
     steps = em._steps(data, transitions.probabilities(weights, data.regressors))
     trail = []
     for _ in range(12):
-        smoothed, _ = em._expect(data, em._maximise(data, posterior, weights), steps)
+        model, residual = em._maximise(data, posterior, weights)
+        smoothed, _ = em._expect(data, model, steps, residual)
         posterior = smoothed.posterior[data.inside]
         trail.append(float(smoothed.log_likelihood.sum()))
     assert (np.diff(trail) > -1e-3 * np.abs(trail[0])).all()

@@ -131,12 +131,13 @@ def _handed(first: Float, across: Float) -> tuple[Float, Float]:
     matrices = np.ascontiguousarray(across.transpose(3, 2, 0, 1))
     carry = np.ascontiguousarray(first.T)[:, None]
     starts = np.empty((len(matrices), *carry.shape))
-    totals = np.empty((len(matrices), len(carry), 1, 1))
+    totals = np.ones((len(matrices), len(carry), 1, 1))
     for i, matrix in enumerate(matrices):
         starts[i] = carry
         carry = carry @ matrix
-        totals[i] = carry.sum(axis=-1, keepdims=True)
-        carry /= totals[i]
+        if i % EVERY == EVERY - 1 or i == len(matrices) - 1:
+            totals[i] = carry.sum(axis=-1, keepdims=True)
+            carry /= totals[i]
     return np.ascontiguousarray(starts[:, :, 0].transpose(2, 1, 0)), np.log(totals[:, :, 0, 0]).sum(axis=0)
 
 

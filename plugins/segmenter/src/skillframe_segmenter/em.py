@@ -90,13 +90,21 @@ class Data(NamedTuple):
         return np.split(values, np.cumsum(self.lengths)[:-1])
 
 
+class Expected(NamedTuple):
+    """What a model makes of the data: its probabilities, and the log densities (B, T, K) that they are from."""
+
+    smoothed: chain.Smoothed
+    densities: Float
+
+
 class Fit(NamedTuple):
-    """A fitted model, the posterior (W, K) of its phases, its tempered log-likelihood and criterion."""
+    """A fitted model, the posterior (W, K) of its phases, its tempered log-likelihood and criterion, and its E-step."""
 
     model: Model
     posterior: Float
     log_likelihood: float
     criterion: float
+    expected: Expected
 
 
 def gather(
@@ -153,13 +161,13 @@ def converge(data: Data, posterior: Float, settings: Settings) -> Fit:
     steps = _steps(data, np.broadcast_to(constant, (count, phases, phases)))
     log_likelihood, before = -np.inf, -np.inf
     for _ in range(MOST_ROUNDS):
-        model = _maximise(data, posterior, weights)
-        smoothed, _ = _expect(data, model, steps)
-        posterior = smoothed.posterior[data.inside]
-        before, log_likelihood = log_likelihood, float(smoothed.log_likelihood.sum())
+        model, residual = _maximise(data, posterior, weights)
+        expected = _expect(data, model, steps, residual)
+        posterior = expected.smoothed.posterior[data.inside]
+        before, log_likelihood = log_likelihood, float(expected.smoothed.log_likelihood.sum())
         if abs(log_likelihood - before) < CLOSE * abs(log_likelihood):
             break
-    return _fit(data, model, posterior, log_likelihood)
+    return _fit(data, model, posterior, log_likelihood, expected)
 
 
 def with_transitions(data: Data, fit: Fit, settings: Settings) -> Fit:
@@ -171,45 +179,49 @@ def with_transitions(data: Data, fit: Fit, settings: Settings) -> Fit:
     entered = data.inside[:, 1:]
     inner = np.concatenate([np.arange(len(d)) > 0 for d in data.split(data.regressors)])
     steps = _steps(data, transitions.probabilities(model.weights, data.regressors))
-    smoothed, densities = _expect(data, model, steps)
+    expected = fit.expected
     for _ in range(WRENCH_ROUNDS):
-        joint = chain.pairs(smoothed, densities, steps)[entered]
+        joint = chain.pairs(*expected, steps)[entered]
         weights = transitions.improve(model.weights, prior, data.regressors[inner], joint)
-        model = _maximise(data, posterior, weights)
+        model, residual = _maximise(data, posterior, weights)
         steps = _steps(data, transitions.probabilities(weights, data.regressors))
-        smoothed, densities = _expect(data, model, steps)
-        posterior, log_likelihood = smoothed.posterior[data.inside], float(smoothed.log_likelihood.sum())
-    return _fit(data, model, posterior, log_likelihood)
+        expected = _expect(data, model, steps, residual)
+        posterior = expected.smoothed.posterior[data.inside]
+        log_likelihood = float(expected.smoothed.log_likelihood.sum())
+    return _fit(data, model, posterior, log_likelihood, expected)
 
 
-def log_densities(data: Data, model: Model) -> Float:
-    """(W, K) tempered log densities, with what a person has ruled out."""
-    result = model.temper * emission.log_likelihood(data.seen, model.phases)
+def log_densities(data: Data, model: Model, residual: Float | None = None) -> Float:
+    """(W, K) tempered log densities, with what a person has ruled out; residuals as `emission.fitted` gives them."""
+    result = model.temper * emission.log_likelihood(data.seen, model.phases, residual)
     if data.going is not None:
         result += NEVER * (data.going[:, None] != (np.arange(model.count) == model.count - 1))
     return result if data.ruled is None else result + data.ruled
 
 
-def _maximise(data: Data, posterior: Float, weights: Float) -> Model:
+def _maximise(data: Data, posterior: Float, weights: Float) -> tuple[Model, Float]:
+    """The model of responsibilities (W, K), and what its phases leave of the motions (K, 6, W)."""
     k = posterior.shape[1]
     firsts = posterior[np.concatenate([[0], np.cumsum(data.lengths)[:-1]])]
     initial = 0.5 / k + 0.5 * firsts.mean(axis=0)
-    return Model(phases=_moving(data, posterior), initial=initial, weights=weights, temper=data.temper)
+    phases, residual = _moving(data, posterior)
+    return Model(phases=phases, initial=initial, weights=weights, temper=data.temper), residual
 
 
-def _moving(data: Data, posterior: Float) -> Phases:
+def _moving(data: Data, posterior: Float) -> tuple[Phases, Float]:
     """How the phases move; the covariance of one that goes round is no measure for the others."""
     if data.going is None:
-        return emission.fit(data.seen, posterior)
-    parts = emission.fit(data.seen, posterior[:, :-1]), emission.fit(data.seen, posterior[:, -1:])
-    return Phases(*(np.concatenate(pair) for pair in zip(*parts, strict=True)))
+        return emission.fitted(data.seen, posterior)
+    parts = [emission.fitted(data.seen, mine) for mine in (posterior[:, :-1], posterior[:, -1:])]
+    phases = Phases(*(np.concatenate(pair) for pair in zip(*(part for part, _ in parts), strict=True)))
+    return phases, np.concatenate([residual for _, residual in parts])
 
 
-def _expect(data: Data, model: Model, steps: Float) -> tuple[chain.Smoothed, Float]:
+def _expect(data: Data, model: Model, steps: Float, residual: Float) -> Expected:
     densities = np.zeros((model.count, *data.inside.shape))
-    densities[:, data.inside] = log_densities(data, model).T
+    densities[:, data.inside] = log_densities(data, model, residual).T
     densities = np.moveaxis(densities, 0, -1)
-    return chain.smooth(model.initial, densities, steps), densities
+    return Expected(chain.smooth(model.initial, densities, steps), densities)
 
 
 def _steps(data: Data, probabilities: Float) -> Float:
@@ -221,11 +233,12 @@ def _steps(data: Data, probabilities: Float) -> Float:
     return np.moveaxis(result[..., 1:], (0, 1), (-2, -1))
 
 
-def _fit(data: Data, model: Model, posterior: Float, log_likelihood: float) -> Fit:
+def _fit(data: Data, model: Model, posterior: Float, log_likelihood: float, expected: Expected) -> Fit:
     k, m = model.count, DIMENSIONS
     parameters = k * (2 * m + 0.25 * m * (m - 1) / 2) + k * (k - 1)
     samples = max(data.temper * float(data.straight.sum()), 2.0)
-    return Fit(model, posterior, log_likelihood, float(parameters * np.log(samples) - 2.0 * log_likelihood))
+    criterion = float(parameters * np.log(samples) - 2.0 * log_likelihood)
+    return Fit(model, posterior, log_likelihood, criterion, expected)
 
 
 def paths(data: Data, model: Model) -> list[NDArray[np.intp]]:

@@ -55,16 +55,12 @@ class Observed(NamedTuple):
 
 def observe(motion: Float, contact: Float) -> Observed:
     """M and M u of windows with motions u (W, 6) and contacts a (W, 6)."""
-    u, a = motion.reshape(-1, 2, 3), contact.reshape(-1, 2, 3)
-    normal = a - (np.vecdot(a, u) / np.maximum(np.vecdot(u, u), LEAST_MOTION))[..., None] * u
-    free = np.eye(3) - normal[..., :, None] * normal[..., None, :]
-    projected = u - np.vecdot(normal, u)[..., None] * normal
-    return Observed(*(_time_last_inside(x) for x in (motion, free, projected.reshape(-1, 6))))
-
-
-def _time_last_inside(x: Float) -> Float:
-    """The same array (W, ...), the first axis last in memory."""
-    return np.moveaxis(np.ascontiguousarray(np.moveaxis(x, 0, -1)), -1, 0)
+    moved = np.ascontiguousarray(motion.T)
+    u, a = moved.reshape(2, 3, -1), np.ascontiguousarray(contact.T).reshape(2, 3, -1)
+    normal = a - (a * u).sum(axis=1, keepdims=True) / np.maximum((u * u).sum(axis=1, keepdims=True), LEAST_MOTION) * u
+    free = np.eye(3)[:, :, None] - normal[:, :, None] * normal[:, None, :]
+    projected = u - (normal * u).sum(axis=1, keepdims=True) * normal
+    return Observed(moved.T, np.moveaxis(free, -1, 0), projected.reshape(6, -1).T)
 
 
 def _residuals(seen: Observed, direction: Float) -> Float:
@@ -78,10 +74,10 @@ def _residuals(seen: Observed, direction: Float) -> Float:
     return result.reshape(-1, DIMENSIONS, count)
 
 
-def log_likelihood(seen: Observed, phases: Phases) -> Float:
-    """Log density (W, K) of (1) with eta = 1."""
+def log_likelihood(seen: Observed, phases: Phases, residual: Float | None = None) -> Float:
+    """Log density (W, K) of (1) with eta = 1; residuals (K, 6, W) as `fitted` gives them, if they are at hand."""
     lower = np.linalg.cholesky(phases.covariance)
-    white = np.linalg.inv(lower) @ _residuals(seen, phases.direction)
+    white = np.linalg.inv(lower) @ (_residuals(seen, phases.direction) if residual is None else residual)
     log_det = np.log(np.einsum("kii->ki", lower)).sum(-1)
     white *= white
     result: Float = -0.5 * white.sum(axis=1) - (log_det + 0.5 * DIMENSIONS * np.log(2.0 * np.pi))[:, None]
@@ -90,6 +86,11 @@ def log_likelihood(seen: Observed, phases: Phases) -> Float:
 
 def fit(seen: Observed, weight: Float) -> Phases:
     """Phases that (2) gives for responsibilities (W, K)."""
+    return fitted(seen, weight)[0]
+
+
+def fitted(seen: Observed, weight: Float) -> tuple[Phases, Float]:
+    """Phases that (2) gives for responsibilities (W, K), and what they leave of the motions: (K, 6, W)."""
     direction = _directions(seen, weight)
     residual = _residuals(seen, direction)
     size = weight.sum(axis=0)
@@ -98,7 +99,8 @@ def fit(seen: Observed, weight: Float) -> Phases:
     own = (scatter + 2.0 * m * PRIOR * identity) / (size + 2.0 * m)[:, None, None] + FLOOR * identity
     total, share = float(size.sum()), float(size.sum()) / len(size)
     pooled = np.einsum("k,kij->ij", size, own) / total
-    return Phases(direction, (size[:, None, None] * own + share * pooled) / (size + share)[:, None, None])
+    covariance = (size[:, None, None] * own + share * pooled) / (size + share)[:, None, None]
+    return Phases(direction, covariance), residual
 
 
 def _directions(seen: Observed, weight: Float) -> Float:
