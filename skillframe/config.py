@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import tomllib
 import types
 import typing
@@ -13,6 +14,8 @@ from typing import Any, TypeVar
 from skillframe.errors import InputError, UnknownName
 
 T = TypeVar("T")
+BARE_POINT = re.compile(r"[+-]?(\.\d+|\d+\.)([eE][+-]?\d+)?")
+"""Numbers such as .5 and 2., which people type and TOML does not know."""
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -138,4 +141,5 @@ def parse_setting(text: str) -> tuple[str, Any]:
     try:
         return key.strip(), tomllib.loads(f"x = {value}")["x"]
     except tomllib.TOMLDecodeError:
-        return key.strip(), value.strip()
+        value = value.strip()
+        return key.strip(), float(value) if BARE_POINT.fullmatch(value) else value

@@ -9,6 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+MOST_NAMES = 30
+"""Names that an error lists; more are no sentence any more."""
+
 
 class SkillframeError(Exception):
     """Base class of every error that skillframe raises on purpose: bad usage or bad input."""
@@ -43,7 +46,8 @@ class UnknownName(SkillframeError):
         text = f"{where}: " if where else ""
         text += f"unknown {kind} {name!r}"
         text += f"; did you mean {near!r}?" if near else ""
-        text += f" (there are: {', '.join(self.known) or 'none'})"
+        some = self.known if len(self.known) <= MOST_NAMES else [*self.known[:MOST_NAMES], "..."]
+        text += f" (there are: {', '.join(some) or 'none'})"
         super().__init__(text + (f"; {note}" if note else ""))
 
 

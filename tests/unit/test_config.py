@@ -108,10 +108,25 @@ def test_a_number_set_on_the_command_line_arrives_exactly(value, key):
         ("k=a=b", "a=b"),
         ("k=", ""),
         ("k=7", 7),
+        ("k=.5", 0.5),
+        ("k=-.5e-3", -0.5e-3),
+        ("k=2.", 2.0),
+        ("k=1.2.3", "1.2.3"),
+        ("k=.", "."),
     ],
 )
 def test_settings_are_read_as_toml_or_kept_as_text(text, value):
     assert parse_setting(text) == ("k", value)
+
+
+def test_one_table_for_a_list_of_tables_is_told_its_brackets():
+    with pytest.raises(InputError, match=r"write \[\[arm\]\] in place of \[arm\]"):
+        coerce({"name": "a"}, tuple[str, ...], "file.arm")
+
+
+def test_toml_with_a_byte_order_mark_is_read(tmp_path):
+    (tmp_path / "a.toml").write_text("\ufeffk = 1\r\n", newline="")
+    assert read_toml(tmp_path / "a.toml") == {"k": 1}
 
 
 @pytest.mark.parametrize("text", ["friction", "=3", " =3"])
