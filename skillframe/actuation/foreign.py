@@ -55,7 +55,7 @@ def build_from_sources(path: Path) -> BuiltFmu:
 
 
 def _sources(description: object, identifier: str) -> tuple[list[str], list[str]]:
-    """Source files and preprocessor definitions, as the description lists them (fmpy reads both versions' lists)."""
+    """Source files, definitions and include folders as listed (fmpy reads both versions' lists)."""
     files: list[str] = []
     defines: list[str] = []
     for configuration in getattr(description, "buildConfigurations", []):
@@ -64,4 +64,5 @@ def _sources(description: object, identifier: str) -> tuple[list[str], list[str]
         for group in configuration.sourceFileSets:
             files += group.sourceFiles
             defines += [f"-D{d.name}={d.value}" if d.value else f"-D{d.name}" for d in group.preprocessorDefinitions]
+            defines += [f"-I{folder}" for folder in group.includeDirectories]
     return list(dict.fromkeys(files)), defines

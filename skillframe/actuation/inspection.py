@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
@@ -126,6 +127,10 @@ def _inspect(path: Path, digest: str) -> FmuFacts:
         "scheduled_execution": description.scheduledExecution,
     }  # fmt: skip
     first = next((kind for kind in kinds.values() if kind is not None), None)
+    for kind in kinds.values():
+        if kind is not None and re.search(r"[^\w.-]|\.\.|^$", kind.modelIdentifier or ""):
+            problem = f"has the model identifier {kind.modelIdentifier!r}, which is no name of a file"
+            raise InputError(path, problem, "do not trust this file" if kind.modelIdentifier else "export it again")
     platforms = _platforms(names, first.modelIdentifier if first is not None else "")
     return FmuFacts(
         path=path,

@@ -243,6 +243,31 @@ def test_sources_that_are_not_in_the_fmu_never_reach_the_compiler(said, tmp_path
     assert code == 2 and f"lists the source {name!r}, which is not in its folder sources" in err
 
 
+def test_sources_of_fmi_3_are_built_with_their_folders_of_headers(said, tmp_path):
+    group = (
+        '<SourceFile name="lag.c"/><PreprocessorDefinition name="TWICE" value="2"/><IncludeDirectory name="include"/>'
+    )
+    listed = '<fmiBuildDescription fmiVersion="3.0"><BuildConfiguration modelIdentifier="lag"><SourceFileSet>'
+    listed += f"{group}</SourceFileSet></BuildConfiguration></fmiBuildDescription>"
+    code = fmus.source(3).replace("->u = v[at++]", "->u = TWICE * MORE * v[at++]")
+    members = [("sources/lag.c", '#include "more.h"\n' + code), ("sources/buildDescription.xml", listed)]
+    members += [("sources/include/more.h", "#define MORE 5\n")]
+    path = fmus.pack(tmp_path / "source.fmu", fmus.describe(3), members=members)
+    code, out, err = said("build", path, "--json")
+    assert code == 0, err
+    ours = simulated(said, json.loads(out)[0]["path"], tmp_path / "o.csv", "--set", "u=1")
+    assert float(ours["first"][-1]) == pytest.approx(10 * (1 - math.exp(-1)), rel=1e-13)  # rounding of ten exact steps
+
+
+def test_a_model_identifier_that_leads_elsewhere_is_refused(said, tmp_path):
+    listed = fmus.describe(sources='<SourceFiles><File name="lag.c"/></SourceFiles>')
+    listed = listed.replace('modelIdentifier="lag"', 'modelIdentifier="../../evil"')
+    path = fmus.pack(tmp_path / "bad.fmu", listed, members=[("sources/lag.c", fmus.source())])
+    for command in ("check", "build"):
+        code, _, err = said(command, path)
+        assert code == 2 and "model identifier '../../evil', which is no name of a file" in err
+
+
 def test_an_array_without_end_is_refused_before_it_is_simulated(said, lag, tmp_path):
     binary = zipfile.ZipFile(lag[3]).read("binaries/x86_64-linux/lag.so")
     path = fmus.pack(tmp_path / "wide.fmu", fmus.describe(3, columns=2_000_000_000), binary, 3)
