@@ -95,7 +95,7 @@ def refuse_w_first_header(source: str, names: Iterable[str]) -> None:
 
 
 def refuse_w_first_meta(source: str, meta: Mapping[str, Any], path: str = "") -> None:
-    """Refuse metadata that says that quaternions are w-first."""
+    """Refuse metadata that says that quaternions are w-first, or in another order than x, y, z, w."""
     for key, value in meta.items():
         name = f"{path}{key}"
         if isinstance(value, Mapping):
@@ -104,6 +104,10 @@ def refuse_w_first_meta(source: str, meta: Mapping[str, Any], path: str = "") ->
         about = "quat" in name.lower() or "orientation" in name.lower() or "rotation" in name.lower()
         flag = "".join(c for c in str(key).lower() if c.isalpha()) in ("wfirst", "scalarfirst", "quaternionwfirst")
         said_w = about and any(w in said for w in ("wxyz", "wfirst", "scalarfirst", "qwqxqyqz"))
+        if about and sorted(said) == list("wxyz") and said[0] != "w" and said != "xyzw":
+            raise InputError(
+                f"{source}: {name}", f"says that quaternions are in the order {value}", "store qx,qy,qz,qw and say xyzw"
+            )
         if said_w or (flag and value is True):
             raise InputError(
                 f"{source}: {name}",

@@ -121,6 +121,16 @@ def test_a_column_of_dates_with_blanks_in_them_does_not_hide_the_commas(
     assert "column wall clock holds words and was left out" in found.meta["reading"]
 
 
+@pytest.mark.parametrize("order", ["zyxw", "YXZW", "x,z,y,w"])
+def test_metadata_that_state_another_order_of_quaternions_are_refused(
+    tmp_path: Path, demo: Demonstration, order: str
+) -> None:
+    meta = json.dumps({**json.loads(META), "quaternion": order})
+    np.savez(tmp_path / "demo.npz", **demonstration_columns(demo), meta=meta)
+    with pytest.raises(InputError, match=f"quaternions are in the order {order}"):
+        read_demonstration(tmp_path / "demo.npz")
+
+
 def test_an_order_of_euler_angles_for_a_file_of_quaternions_is_refused(tmp_path: Path, demo: Demonstration) -> None:
     np.savez(tmp_path / "demo.npz", **demonstration_columns(demo), meta=META)
     with pytest.raises(InputError, match="holds quaternions, no Euler angles"):
