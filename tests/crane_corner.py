@@ -42,10 +42,10 @@ def draws(count, seed):
     }  # fmt: skip
 
 
-def into_the_corner(surface, count, seed, document=None, trace_hz=None):
+def into_the_corner(surface, count, seed, document=None, trace_hz=None, seconds=SECONDS):
     """So many trials on a surface, with the skill of the how-to or another document."""
     document = document or json.loads(SKILL.read_text(encoding="utf-8"))
     skill, setup = prepare(load_robot_model("hiab_xs031"), load_world("pallets", {"surface": surface}), document)
     start, drawn = draws(count, seed)
     rngs = [np.random.default_rng([seed, i]) for i in range(count)]
-    return Corner(simulate(skill, setup, drawn, rngs, duration_s=SECONDS, trace_hz=trace_hz), start)
+    return Corner(simulate(skill, setup, drawn, rngs, duration_s=seconds, trace_hz=trace_hz), start)

@@ -228,7 +228,7 @@ class Press:
         self.master.start(parameters=drawn)
         self.sensors = Filter(self.truth(), SENSOR_CORNER)
         self.estimator = ForceEstimator(crane(), cylinders(), count, DT, settings)
-        self.force = np.zeros((count, 2))
+        self.force, self.sigma = np.zeros((count, 2)), np.zeros((count, 2))
 
     def truth(self):
         """Minimal coordinates and pressures (N, 9)."""
@@ -239,7 +239,7 @@ class Press:
     def measure(self):
         noise = np.array([rng.normal(size=9) for rng in self.rngs]) * np.repeat([ENCODER, PRESSURE], [3, 6])
         x, rate = self.sensors.step(self.truth() + noise)
-        return Measured(x[:, :3], rate[:, :3], x[:, 3:6], x[:, 6:], self.force)
+        return Measured(x[:, :3], rate[:, :3], x[:, 3:6], x[:, 6:], self.force, self.sigma)
 
     def tick(self, t):
         """One millisecond; a row of the log."""
@@ -248,10 +248,11 @@ class Press:
         if t == 0.0:
             self.estimator.start(measured)
         self.estimator.calibrate(t < AIR)
-        self.force = self.estimator.step(measured, at).answered
+        estimate = self.estimator.step(measured, at)
+        self.force, self.sigma = estimate.answered, estimate.sigma
         speed = (at.arms @ self.plant.state()[1][..., None])[..., 0]
         row = measured, at, self.plant.contact(), speed
-        command = self.law.step(t, measured._replace(force=self.force), at)
+        command = self.law.step(t, measured._replace(force=self.force, sigma=self.sigma), at)
         assert self.master.step(command.ravel()), self.master.trouble()
         return row
 

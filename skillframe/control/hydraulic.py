@@ -4,11 +4,11 @@ The tool follows the first-order impedance, f the force of the environment on it
 
     D (X' - X_d') + K (X - X_d) = f + f_ff      by      X_r' = X_d' + D^-1 [K (X_d - X) + f + f_ff]             (1)
 
-(J. Koivumaki and J. Mattila, IEEE/ASME T-Mech 22(2), 2017), joints that the tool's plane leaves open follow
-zd_r = zd_d + lambda (z_d - z), the bodies get what `vdc` says they need, and each cylinder makes that force with its
-valve as in `vdc_actuator`. The required force's rate comes from a critically damped filter of 8 Hz. The force is left
-out of zdd_r (our choice: its derivative is noise). This is the readable law, written trial by trial; a generated one
-does the same in C (`hydraulic_compiled`) and is tested against it.
+(J. Koivumaki and J. Mattila, IEEE/ASME T-Mech 22(2), 2017) as far as the force's uncertainty lets it (`doubt`), joints
+that the tool's plane leaves open follow zd_r = zd_d + lambda (z_d - z), the bodies get what `vdc` says they need, and
+each cylinder makes that force with its valve as in `vdc_actuator`. The required force's rate comes from a critically
+damped filter of 8 Hz. The force is left out of zdd_r (our choice: its derivative is noise). This is the readable law,
+written trial by trial; a generated one does the same in C (`hydraulic_compiled`) and is tested against it.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.conditioning.rates import RateFilter
+from skillframe.control.doubt import pursued
 from skillframe.control.vdc import Bodies, bodies, net_forces, parameters, piston_forces
 from skillframe.control.vdc_actuator import (
     ContactFriction,
@@ -49,7 +50,7 @@ class Measured(NamedTuple):
     Attributes:
         z, rate: (N, n) minimal coordinates and their filtered rates.
         pressure_a, pressure_b: (N, k) [Pa].
-        force: (N, 2) of the environment on the tool, along the plane's axes [N].
+        force, sigma: (N, 2) of the environment on the tool, along the plane's axes, and its standard deviation [N].
     """
 
     z: Float
@@ -57,6 +58,7 @@ class Measured(NamedTuple):
     pressure_a: Float
     pressure_b: Float
     force: Float
+    sigma: Float
 
 
 class Reference(NamedTuple):
@@ -188,8 +190,7 @@ class HydraulicLaw:
     """The law with its memory, for N trials.
 
     Args:
-        chain: the controller's model.
-        cylinders: as the controller knows them.
+        chain, cylinders: as the controller knows them.
         gains: see `HydraulicGains`.
         count: number of trials N.
         dt: sample time [s].
@@ -258,9 +259,15 @@ class HydraulicLaw:
         )  # fmt: skip
         gain, push = self.gains.joint * np.eye(n), np.zeros(n)
         gain[:2, :2] = np.linalg.solve(reference.damping[i], reference.stiffness[i])
-        push[:2] = np.linalg.solve(reference.damping[i], measured.force[i] + reference.push[i])
+        push[:2] = np.linalg.solve(reference.damping[i], self._answer(measured, reference, state, i))
         required = required_motion(self._task, state, wanted, gain, push)
         return state, bodies(state, required.rate, required.acceleration)
+
+    def _answer(self, measured: Measured, reference: Reference, state: ChainState, i: int) -> Float:
+        """(2,) f + f_ff, less what of the imbalance is not pursued."""
+        pushing, error = measured.force[i] + reference.push[i], reference.position[i] - self._task.position(state)[:2]
+        imbalance = reference.damping[i] @ reference.velocity[i] + reference.stiffness[i] @ error + pushing
+        return np.asarray(pushing - (1.0 - pursued(imbalance, measured.force[i], measured.sigma[i])) * imbalance)
 
     def _pushed(self, state: ChainState, force: Float) -> Float:
         in_base = np.zeros(3)

@@ -18,7 +18,7 @@ from skillframe.control.vdc_adaptation import relative_bounds
 from skillframe.frames import Float
 from skillframe.robot.loops import ClosedChain
 
-_SHARED = tuple(range(18, 26))  # inputs of the law that are one for all trials: bounds, cylinders, gains, scalars
+_SHARED = tuple(range(19, 27))  # inputs of the law that are one for all trials: bounds, cylinders, gains, scalars
 
 
 class CompiledLaw:
@@ -46,7 +46,7 @@ class CompiledLaw:
         self.chain, self.cylinders, self.gains = chain, cylinders, gains
         n, k, nominal = len(chain.independent), len(chain.driven), parameters(chain.model)
         zeros = np.zeros
-        self._measured = Measured(zeros((count, n)), zeros((count, n)), *(zeros((count, m)) for m in (k, k, 2)))
+        self._measured = Measured(zeros((count, n)), zeros((count, n)), *(zeros((count, m)) for m in (k, k, 2, 2)))
         self._reference = Reference(
             zeros((count, 2)), zeros((count, 2)), zeros((count, 2, 2)), zeros((count, 2, 2)), zeros((count, 2)),
             zeros((count, n - 2)), zeros((count, n - 2)), zeros((count, n)),

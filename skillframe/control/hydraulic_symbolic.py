@@ -13,6 +13,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from skillframe.control.doubt import CONTACT, LEAST, SETTING_OUT
 from skillframe.control.vdc_actuator import ACROSS, Cylinders
 from skillframe.control.vdc_body import PARAMETERS
 from skillframe.frames import Float
@@ -43,14 +44,15 @@ def terms_function(chain: ClosedChain, axes: tuple[int, int]) -> ca.Function:
 def law_function(chain: ClosedChain, axes: tuple[int, int]) -> ca.Function:
     """One sample of the law for one trial.
 
-    Inputs: z, zd, pressure_a, pressure_b, force; position, velocity, stiffness, damping, push, joint, joint_rate,
-    acceleration; theta, friction (2, k), memory (3, k), deadband, supply, lower and upper bounds of theta and of
-    friction, cylinders (15, k), k_x, k_f, the scalars of `SCALARS`.
+    Inputs: z, zd, pressure_a, pressure_b, force, sigma; position, velocity, stiffness, damping, push, joint,
+    joint_rate, acceleration; theta, friction (2, k), memory (3, k), deadband, supply, lower and upper bounds of theta
+    and of friction, cylinders (15, k), k_x, k_f, the scalars of `SCALARS`.
     Outputs: valve, required and present force, theta, friction, memory: the required force's filter and the bristles.
     """
     s = SymbolicChain(chain)
     n, k, count = len(chain.independent), len(chain.driven), chain.model.njoints - 1
-    p_a, p_b, force = (ca.SX.sym(name, size) for name, size in (("p_a", k), ("p_b", k), ("force", 2)))
+    sizes = {"p_a": k, "p_b": k, "force": 2, "sigma": 2}
+    p_a, p_b, force, sigma = (ca.SX.sym(name, size) for name, size in sizes.items())
     reference = [ca.SX.sym(f"reference{i}", size) for i, size in enumerate((2, 2, 4, 4, 2, n - 2, n - 2, n))]
     scalars = ca.SX.sym("scalars", len(SCALARS))
     gain = dict(zip(SCALARS, ca.vertsplit(scalars), strict=True))
@@ -64,7 +66,7 @@ def law_function(chain: ClosedChain, axes: tuple[int, int]) -> ca.Function:
     c = {name: cylinder[i, :].T for i, name in enumerate(CYLINDER)} | {"supply_pressure": supply, "deadband": deadband}
 
     tip = s.frame(chain.robot.tool_frames[0]).origin[list(axes)]
-    rate, acceleration = _required(s, tip, reference, force, gain["joint"])
+    rate, acceleration = _required(s, tip, reference, (force, sigma), gain["joint"])
     moving = s.bodies(rate, acceleration)
     needed, drive = _needed(s, moving, rows, gain["body"], rate)
     needed = needed - ca.jacobian(tip, s.z).T @ force
@@ -82,7 +84,8 @@ def law_function(chain: ClosedChain, axes: tuple[int, int]) -> ca.Function:
     rubbed = _adapted(friction, drive_f, [b[1] for b in rub_bounds], gain["dt"])
     limits = (b[0] for b in (*bounds, *rub_bounds))
     inputs = (
-        s.z, s.zd, p_a, p_b, force, *reference, theta, rub, memory, deadband, supply, *limits, table, k_x, k_f, scalars,
+        s.z, s.zd, p_a, p_b, force, sigma, *reference, theta, rub, memory, deadband, supply, *limits, table, k_x, k_f,
+        scalars,
     )  # fmt: skip
     present = c["area_a"] * p_a - c["area_b"] * p_b
     return _function("law", inputs, (valve, f_pr, present, learned, rubbed, ca.vertcat(value.T, slope.T, bristle.T)))
@@ -125,20 +128,31 @@ def _potential(s: SymbolicChain, rows: Expression) -> Expression:
 
 
 def _required(
-    s: SymbolicChain, tip: Expression, reference: list[Expression], force: Expression, joint_gain: Expression
-) -> tuple[Expression, Expression]:
-    """zd_r and zdd_r, equation (1) of `hydraulic` and `vdc_reference.required_motion`."""
+    s: SymbolicChain, tip: Expression, reference: list[Expression], force: tuple[Expression, Expression],
+    joint_gain: Expression,
+) -> tuple[Expression, Expression]:  # fmt: skip
+    """zd_r and zdd_r, equation (1) of `hydraulic`, `doubt.pursued` and `vdc_reference.required_motion`."""
     position, velocity, stiffness, damping, push, joint, joint_rate, given = reference
     n = s.z.shape[0]
     k, d = (ca.reshape(x, 2, 2).T for x in (stiffness, damping))
     inverse = ca.inv(d)
     lead = ca.diagcat(inverse @ k, joint_gain * ca.SX.eye(n - 2))
     at, wanted = ca.vertcat(tip, s.z[2:]), ca.vertcat(position, joint)
-    ahead, pushed = ca.vertcat(velocity, joint_rate), ca.vertcat(inverse @ (force + push), ca.SX(n - 2, 1))
+    pushing = force[0] + push
+    imbalance = d @ velocity + k @ (position - tip) + pushing
+    pushing = pushing - _left(imbalance, *force) * imbalance
+    ahead, pushed = ca.vertcat(velocity, joint_rate), ca.vertcat(inverse @ pushing, ca.SX(n - 2, 1))
     jacobian = ca.jacobian(at, s.z)
     rate = ca.solve(jacobian, ahead + lead @ (wanted - at) + pushed)
     acceleration = given + lead @ (ahead - jacobian @ s.zd) - s.drift_of(jacobian, rate)
     return rate, ca.solve(jacobian, acceleration)
+
+
+def _left(imbalance: Expression, force: Expression, sigma: Expression) -> Expression:
+    """1 less `doubt.pursued`."""
+    certain = ca.fmax(sigma, LEAST)
+    touch = ca.sumsqr(force / (CONTACT * certain)) ** 2
+    return touch / (1.0 + touch) / (1.0 + ca.sumsqr(imbalance / (SETTING_OUT * certain)) ** 4)
 
 
 def _needed(

@@ -175,7 +175,7 @@ class MachineLoop(Loop):
 
     def _measured(self) -> Measured:
         gauges = self.gauges
-        return Measured(gauges.z, gauges.rate, *gauges.pressures, self.estimate.answered)
+        return Measured(gauges.z, gauges.rate, *gauges.pressures, self.estimate.answered, self.estimate.sigma)
 
     def tare(self) -> None:
         """Swing in the air and identify friction and payload, then hold what was found."""
@@ -213,10 +213,12 @@ class MachineLoop(Loop):
         self.terms = self.law.terms(self._seen)
         estimate = self.estimator.step(self._seen, self.terms)
         nothing = np.zeros_like(estimate.force)
-        self.estimate = estimate if force_counts else estimate._replace(feedback=nothing, answered=nothing)
+        self.estimate = (
+            estimate if force_counts else estimate._replace(sigma=nothing, feedback=nothing, answered=nothing)
+        )
 
     def _valve(self, reference: Reference) -> None:
-        measured = self._seen._replace(z=self.gauges.now, force=self.estimate.answered)
+        measured = self._seen._replace(z=self.gauges.now, force=self.estimate.answered, sigma=self.estimate.sigma)
         self.demand = self.law.step(measured, reference, self.active)
 
     def _tick(self, tick: int) -> None:

@@ -123,7 +123,7 @@ class Coupled:
     def measure(self):
         noise = np.array([rng.normal(size=9) for rng in self.rngs]) * np.repeat([ENCODER, PRESSURE], [3, 6])
         x, rate = self.filter.step(self.true() + self.noise[:, None] * noise)
-        return Measured(x[:, :3] + LEAD * rate[:, :3], rate[:, :3], x[:, 3:6], x[:, 6:], np.zeros((self.count, 2)))
+        return Measured(x[:, :3] + LEAD * rate[:, :3], rate[:, :3], x[:, 3:6], x[:, 6:], *np.zeros((2, self.count, 2)))
 
 
 def free_reference(path, count, outer=OUTER):

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.figures
 SEEDS, FEW = range(300, 312), range(300, 304)
 SECONDS = 31.0
 FULL = ForceSettings()
-LATE = "with the Kalman filter for white noise, which the law is fed"
+LATE = "with the Kalman filter for white noise, late"
 STATIC = "without the momentum: gravity alone"
 NOMINAL = "without either (nominal model)"
 PARTS = {
@@ -81,7 +81,7 @@ def still(terms):
 
 
 def test_force_while_sliding_is_within_two_and_a_half_percent_rms_and_six_percent_at_most():
-    log, force, sigma, valid, _ = pressed()
+    log, force, sigma, valid, *_ = pressed()
     chosen, fast = window(log, valid)
     found = score(log, force, chosen)
     standing = ~valid & (np.arange(len(valid)) * DT > LANDED)[:, None]
@@ -99,7 +99,7 @@ def test_force_while_sliding_is_within_two_and_a_half_percent_rms_and_six_percen
 
 
 def test_the_full_filter_is_the_best_row_in_rms_of_those_with_a_part_left_out():
-    log, _, _, valid, _ = pressed()
+    log, _, _, valid, *_ = pressed()
     chosen, _ = window(log, valid)
     found = {}
     for name, settings in PARTS.items():
@@ -117,7 +117,7 @@ def test_the_full_filter_is_the_best_row_in_rms_of_those_with_a_part_left_out():
 
 def test_on_a_soft_surface_the_estimate_is_as_good_in_newtons():
     """3e4 N/m: a third of the load, so the bar is 4 %."""
-    log, force, _, valid, _ = pressed(FEW, 3e4)
+    log, force, _, valid, *_ = pressed(FEW, 3e4)
     found = score(log, force, window(log, valid)[0])
     row("crane, soft surface, 4 seeds", str(found))
     assert found.rms.max() < 4.0
@@ -125,7 +125,7 @@ def test_on_a_soft_surface_the_estimate_is_as_good_in_newtons():
 
 def test_a_lightly_damped_contact_rings_after_reversals_faster_than_the_estimate_follows():
     """D = 2.5e4 N s/m on 1e6 N/m: some 6 Hz, which the corner of 8 Hz of the residual passes late."""
-    log, force, _, valid, _ = pressed(FEW, damping=2.5e4)
+    log, force, _, valid, *_ = pressed(FEW, damping=2.5e4)
     found = score(log, force, window(log, valid)[0])
     row("crane, D = 2.5e4 N s/m, 4 seeds", str(found))
     assert found.rms.max() < 2.5

@@ -44,7 +44,7 @@ def measured(z, zd, push):
     """Pressures of these piston forces (3,)."""
     low = np.full(3, 20e5)
     pressure = (push + oiled().area_b * low) / oiled().area_a
-    return Measured(z[None], zd[None], pressure[None], low[None], np.zeros((1, 2)))
+    return Measured(z[None], zd[None], pressure[None], low[None], *np.zeros((2, 1, 2)))
 
 
 def estimates(force, seconds=0.5, load=0.0, plain=False, arms=lambda at: at):

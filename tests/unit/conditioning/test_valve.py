@@ -17,7 +17,7 @@ NOISE = 1e-3  # m/s of the piston rates, as of the crane's lift and tilt behind 
 
 def machine(x, velocity, pressures):
     nothing = np.zeros((len(x), 1))
-    measured = Measured(nothing, nothing, *pressures, nothing)
+    measured = Measured(nothing, nothing, *pressures, nothing, nothing)
     return measured, Terms(*(nothing for _ in range(5)), x, velocity, nothing, nothing)
 
 

@@ -30,7 +30,7 @@ def motions(count, ticks=80):
         z = START + 0.02 * phase * np.sin(turn)
         rate = 0.3 * phase * np.cos(turn)
         pressures = 90e5 + 3e6 * np.sin(turn + phase), 60e5 + 2e6 * np.cos(turn)
-        measured = Measured(z, rate, *pressures, np.zeros((count, 2)))
+        measured = Measured(z, rate, *pressures, *np.zeros((2, count, 2)))
         at = law.terms(measured)
         yield measured, type(at)(*(x.copy() for x in at))
 

@@ -27,7 +27,8 @@ def draw(rng, count):
     z = around(START, 0.3, 3)
     rising = around(0.0, 1.0, 2, 2)
     measured = Measured(
-        z, around(0.0, 0.3, 3), around(100e5, 89e5, 3), around(100e5, 89e5, 3), around(0.0, 8e3, 2)
+        z, around(0.0, 0.3, 3), around(100e5, 89e5, 3), around(100e5, 89e5, 3), around(0.0, 8e3, 2),
+        around(700.0, 700.0, 2),
     )  # fmt: skip
     reference = Reference(
         around([3.0, 1.0], 0.3, 2), around(0.0, 0.3, 2), 3e4 * rising @ np.swapaxes(rising, -1, -2),
