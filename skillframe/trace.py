@@ -33,6 +33,15 @@ COLUMNS = {
 }
 
 
+LARGEST = 1e100  # beyond it squares overflow
+DRAWN = ("time", "position", "quaternion", "body_position", "body_quaternion")
+META_KINDS: dict[str, type | tuple[type, ...]] = {
+    **dict.fromkeys(("analytic", "draws", "frames", "limits", "params"), dict),
+    **dict.fromkeys(("actuators", "bodies", "center_of_compliance", "events", "notes"), list),
+    **dict.fromkeys(("duration_s", "peak_force_n", "final_error_m", "final_error_rad"), (int, float)),
+}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trace:
     """One trial over time.
@@ -94,7 +103,7 @@ class Trace:
         try:
             with np.load(path, allow_pickle=False) as file:
                 arrays = {name: file[name] for name in file.files}
-            meta = json.loads(str(arrays.pop("meta")))
+            meta = json.loads(str(arrays.pop("meta")), parse_int=_whole)
         except FileNotFoundError:
             raise InputError(path, "no such file", "check the path") from None
         except Exception:
@@ -108,6 +117,8 @@ class Trace:
             raise InputError(path, f"is of version {meta.get('version')}, newer than {VERSION}", "update skillframe")
         machine = {name: arrays.pop(name) for name in list(arrays) if name.startswith(MACHINE)}
         _check_arrays(path, arrays)
+        _check_numbers(path, {**arrays, **machine})
+        _check_meta(path, meta)
         for name, array in machine.items():
             if not array.ndim or len(array) != len(arrays["time"]):
                 raise InputError(path, f"array {name} has the shape {array.shape}", "write the trace again")
@@ -126,3 +137,35 @@ def _check_arrays(path: Path, arrays: dict[str, Float]) -> None:
     for name in ("q", "body_position", "body_quaternion"):
         if rows[name] != rows["time"]:
             raise InputError(path, f"array {name} has {rows[name]} rows, time {rows['time']}", "write the trace again")
+
+
+def _check_numbers(path: Path, arrays: dict[str, Float]) -> None:
+    """Numbers everywhere, none that overflows when squared, and places that can be drawn."""
+    for name, array in arrays.items():
+        if array.dtype.kind not in "fiub":
+            raise InputError(path, f"array {name} holds {array.dtype}, no numbers", "write the trace again")
+        size = np.abs(array.astype(float))
+        good = size < LARGEST if name in DRAWN else ~(size >= LARGEST)
+        if not good.all():
+            row = int(np.argwhere(~good)[0][0])
+            raise InputError(path, f"array {name} holds a number out of all bounds in row {row}", "run it again")
+    if np.any(np.diff(arrays["time"]) <= 0.0):
+        raise InputError(path, "its time does not increase", "write the trace again")
+
+
+def _whole(text: str) -> int:
+    """A whole number of JSON, which may be longer than any that is meant."""
+    if len(text) > 100:
+        raise ValueError(text)
+    return int(text)
+
+
+def _check_meta(path: Path, meta: dict[str, Any]) -> None:
+    """Metadata of the kinds that are written; what is absent or null is not known."""
+    for key, kind in META_KINDS.items():
+        if meta.get(key) is not None and not isinstance(meta[key], kind):
+            raise InputError(f"{path}: meta.{key}", f"is {meta[key]!r:.60}", "write the trace again")
+    for i, body in enumerate(meta.get("bodies") or []):
+        geoms = body.get("geoms", []) if isinstance(body, dict) else None
+        if not isinstance(geoms, list) or not all(isinstance(geom, dict) for geom in geoms):
+            raise InputError(f"{path}: meta.bodies[{i}]", "is no body with its geoms", "write the trace again")
