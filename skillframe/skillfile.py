@@ -154,7 +154,7 @@ def understood(where: object) -> Iterator[None]:
 
 def _parse(path: Path) -> Document:
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise InputError(path, "no such file", "check the path") from None
     except UnicodeDecodeError:
@@ -193,6 +193,9 @@ def _check(document: Document, where: str) -> None:
         _demand(document, key, kind, where, "")
     if "type_version" in document:
         _demand(document, "type_version", int, where, "")
+    for key in ("version", "type_version"):
+        if document.get(key, 1) < 1:
+            raise InputError(f"{where}: {key}", f"is {document[key]}, and versions count from 1", "mend it")
     for spot, problem in _no_numbers(document, ""):
         raise InputError(f"{where}: {spot}", problem, "mend it, or learn the skill again")
     _check_frame(document["frame"], where)

@@ -76,6 +76,18 @@ def test_an_edit_that_once_broke_the_program_is_refused(document: Any, judged: A
     assert judged(edits.edited(document(kind), path, value))[-1] == 2
 
 
+@pytest.mark.parametrize("key", ["version", "type_version"])
+@pytest.mark.parametrize("value", [0, -1])
+def test_a_version_below_the_first_is_refused(document: Any, judged: Any, key: str, value: int) -> None:
+    assert judged({**document("lmc"), key: value}) == [2]
+
+
+def test_a_skill_file_with_a_byte_order_mark_is_read(document: Any, tmp_path: Path) -> None:
+    path = tmp_path / "skill.json"
+    path.write_text("\ufeff" + json.dumps(document("lmc")))
+    assert run(["skill", "show", str(path)]) == 0
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_of_any_edit_comes_a_run_or_a_sentence(document: Any, judged: Any, kind: str) -> None:
