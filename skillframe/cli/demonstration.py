@@ -163,7 +163,7 @@ def check(files: tuple[Path, ...], as_json: bool, **options: Any) -> int:
       skillframe demonstration check demo1.npz demo2.npz
       skillframe demonstration check rim0.csv --columns t,px,py,pz,qx,qy,qz,qw,fx,fy,fz,tx,ty,tz --json
     """
-    from skillframe.demonstration.audit import audit, odd_ones
+    from skillframe.demonstration.audit import audit, compared
     from skillframe.demonstration.files import read_demonstration
     from skillframe.errors import SkillframeError
 
@@ -175,7 +175,7 @@ def check(files: tuple[Path, ...], as_json: bool, **options: Any) -> int:
             if len(files) == 1:
                 raise
             click.echo(f"error: {error}", err=True)
-    audits = odd_ones(demonstrations, [audit(d) for d in demonstrations])
+    audits = compared(demonstrations, [audit(d) for d in demonstrations])
     if as_json:
         emit_json([found.as_json() for found in audits])
     else:

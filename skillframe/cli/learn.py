@@ -73,8 +73,8 @@ def command(
 
 def _warn(demonstrations: Sequence[Demonstration]) -> None:
     """What looks wrong in the recordings, on stderr: a skill learned from a biased wrench is learned from the bias."""
-    from skillframe.demonstration.audit import audit, odd_ones
+    from skillframe.demonstration.audit import audit, compared
 
-    for found in odd_ones(list(demonstrations), [audit(d) for d in demonstrations]):
+    for found in compared(list(demonstrations), [audit(d) for d in demonstrations]):
         for text in found.warnings:
             click.echo(f"warning: {found.file}: {text}", err=True)

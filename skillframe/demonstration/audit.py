@@ -170,22 +170,36 @@ def _wrench_warnings(
     return result
 
 
-def odd_ones(demonstrations: list[Demonstration], audits: list[Audit]) -> list[Audit]:
-    """Audits of one set, with a warning where one of three or more goes another way than the rest.
+def compared(demonstrations: list[Demonstration], audits: list[Audit]) -> list[Audit]:
+    """Audits of one set, with warnings of what shows beside each other: a recording given twice, an odd way."""
+    said = zip(audits, _repeats(demonstrations), _odd_ways(demonstrations), strict=True)
+    return [dataclasses.replace(a, warnings=[*a.warnings, *filter(None, texts)]) for a, *texts in said]
+
+
+def _repeats(demonstrations: list[Demonstration]) -> list[str]:
+    """A sentence for each that holds what one before it holds: it counts as another although it tells nothing new."""
+    names = [d.source for d in demonstrations]
+    twins = [next(i for i in range(k + 1) if _same(demonstrations[i], d)) for k, d in enumerate(demonstrations)]
+    return [f"repeated: the same samples as {names[i]}" if i != k else "" for k, i in enumerate(twins)]
+
+
+def _same(one: Demonstration, other: Demonstration) -> bool:
+    pairs = ((one.position, other.position), (one.quaternion, other.quaternion), (one.wrench, other.wrench))
+    return all(np.array_equal(a, b) for a, b in pairs)
+
+
+def _odd_ways(demonstrations: list[Demonstration]) -> list[str]:
+    """A sentence where one of three or more goes another way than the rest.
 
     The way is the direction from the first to the last tool point; odd is more than 15 degrees from the others' mean
     and at least three times as far as their typical member.
     """
     ways = [d.position[-1] - d.position[0] for d in demonstrations]
     if len(ways) < 3 or min(float(norm(w)) for w in ways) < 0.01:
-        return audits
+        return [""] * len(ways)
     unit = np.array([w / norm(w) for w in ways])
     rest = unit.sum(axis=0) - unit
     angles = np.arccos(np.clip((unit * rest).sum(axis=1) / np.maximum(norm(rest), 1e-9), -1.0, 1.0))
-    typical = float(np.median(angles))
+    odd = angles > max(np.deg2rad(15.0), 3.0 * float(np.median(angles)))
     said = [f"direction: {np.rad2deg(angle):.0f} degrees off the other recordings' mean" for angle in angles]
-    odd = angles > max(np.deg2rad(15.0), 3.0 * typical)
-    return [
-        dataclasses.replace(a, warnings=[*a.warnings, text]) if is_odd else a
-        for a, text, is_odd in zip(audits, said, odd, strict=True)
-    ]
+    return [text if is_odd else "" for text, is_odd in zip(said, odd, strict=True)]

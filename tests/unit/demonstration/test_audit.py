@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from skillframe.demonstration.audit import audit, odd_ones
+from skillframe.demonstration.audit import audit, compared
 from skillframe.demonstration.record import Demonstration
 from skillframe.frames import Float, rotate_spatial
 
@@ -153,10 +153,18 @@ def test_the_one_demonstration_of_five_that_wanders_off_is_named(demo: Demonstra
     turn = np.array([[np.cos(0.42), -np.sin(0.42), 0], [np.sin(0.42), np.cos(0.42), 0], [0, 0, 1]])
     flat = replace(demo, position=demo.position * [1, 1, 0])
     demos = [flat, flat, replace(flat, position=flat.position @ turn.T), flat, flat]
-    found = odd_ones(demos, [audit(d) for d in demos])
+    found = compared(demos, [audit(d) for d in demos])
     assert ["direction: 24 degrees off the other recordings' mean" in a.warnings for a in found] == [
         False, False, True, False, False,
     ]  # fmt: skip
+
+
+def test_a_recording_given_twice_is_named_with_the_one_that_it_repeats(demo: Demonstration) -> None:
+    first, other, copy = (replace(demo, source=name) for name in ("a.npz", "b.npz", "copy.npz"))
+    other = replace(other, position=demo.position + 0.001)
+    found = [a.warnings for a in compared([first, other, copy], [audit(d) for d in (first, other, copy)])]
+    assert [any("repeated" in text for text in warnings) for warnings in found] == [False, False, True]
+    assert "repeated: the same samples as a.npz" in found[2]
 
 
 def test_a_recording_of_two_samples_can_be_audited() -> None:
