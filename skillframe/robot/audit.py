@@ -23,6 +23,7 @@ from skillframe.robot.link_checks import (
     oversized_inertias,
     toy_masses,
 )
+from skillframe.robot.machine_checks import machine_warnings
 from skillframe.robot.mass_matrix import ILL_CONDITIONED, SINGULAR, joint_of, smallest_pivots
 from skillframe.robot.model import ROOT_JOINT, RobotModel, load_model
 from skillframe.robot.problems import Problem
@@ -60,6 +61,7 @@ def audit(robot: RobotSpec | RobotModel) -> Audit:
         *missing_inertias(robot, given, bodies),
         *toy_masses(robot, given),
         *joint_warnings(robot),
+        *machine_warnings(robot),
     ]
     return Audit(
         usable=not any(p.severity == "fatal" for p in problems),

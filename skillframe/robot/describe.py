@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from skillframe.errors import SkillframeError
 from skillframe.frames import quaternion_from_matrix, rotation_vector
 from skillframe.robot.bodies import rigid_bodies
 from skillframe.robot.kinematics import tool_pose
 from skillframe.robot.link_checks import given_inertias
+from skillframe.robot.loops import ClosedChain
 from skillframe.robot.model import RobotModel
 
 
 def describe(robot: RobotModel) -> str:
-    """Joints with limits and home, mass, arms with the tool's pose at home."""
+    """Joints with limits and home, mass, arms with the tool's pose at home, what drives and loads a machine."""
+    robot = _closed(robot)
     spec, model = robot.spec, robot.model
     mass, moving = _mass(robot), _moving(robot)
     lines = [
         f"{spec.name}: {spec.summary}" if spec.summary else spec.name,
         f"  base {spec.base}, {moving} moving bodies, nq {model.nq}, nv {model.nv}, {mass:.4g} kg",
         f"  control {spec.control.rate_hz:g} Hz, fixture at {_triple(spec.workspace.fixture)} m in base",
-        f"  limits {_limits(robot)}",
+        f"  limits: {_limits(robot)}",
     ]
     lines += ["", "  joints that turn in rad, rad/s and Nm, joints that slide in m, m/s and N"]
     lines += [f"  {'joint':<20}{'home':>16}{'lower':>12}{'upper':>12}{'velocity':>12}{'effort':>10}"]
@@ -34,11 +37,34 @@ def describe(robot: RobotModel) -> str:
         lines += ["", f"  arm {arm.name!r}: tool frame {arm.tool_frame!r}"]
         lines += [f"    at home {_triple(pose.position)} m, turned by the rotation vector {_triple(turn, 1)} degrees"]
         lines += [f"    z axis (out along the tool) {_triple(pose.rotation[:, 2])}"]
-    return "\n".join(lines)
+    return "\n".join([*lines, *_machine(robot)])
+
+
+def _closed(robot: RobotModel) -> RobotModel:
+    """The robot with the joints of its loops where they stand at home; as it is where the loops do not close."""
+    if not robot.spec.loop:
+        return robot
+    try:
+        chain = ClosedChain(robot)
+        return replace(robot, home=chain.configuration(chain.minimal(robot.home)))
+    except SkillframeError:
+        return robot
+
+
+def _machine(robot: RobotModel) -> list[str]:
+    """Lines on loops, actuators and payload; none for a robot without them."""
+    spec = robot.spec
+    lines = [f"  loop: {loop.frame_a} meets {loop.frame_b}" for loop in spec.loop]
+    lines += [f"  {drive.joint} is driven by {drive.fmu}" for drive in spec.actuation]
+    if spec.payload is not None:
+        load = spec.payload
+        lines.append(f"  payload {load.mass:g} kg in {load.link!r}, rated for {load.rating:g} kg")
+    return ["", *lines] if lines else []
 
 
 def as_json(robot: RobotModel) -> dict[str, Any]:
     """The same for scripts, in SI units and radians; null where there is no limit, or no home of its own."""
+    robot = _closed(robot)
     spec, model = robot.spec, robot.model
     return {
         "name": spec.name, "summary": spec.summary, "base": spec.base, "nq": model.nq, "nv": model.nv,
@@ -111,8 +137,11 @@ def _unit(joint: pin.JointModel) -> str:
 
 def _limits(robot: RobotModel) -> str:
     limits = robot.spec.limits
-    units = {"force_n": "N", "torque_n_m": "N m", "torque_rate_nm_s": "N m/s", "energy_j": "J"}
-    given = [f"{getattr(limits, key):g} {unit}" for key, unit in units.items() if getattr(limits, key) is not None]
+    words = {
+        "force_n": "contact force {:g} N", "torque_n_m": "contact torque {:g} Nm",
+        "torque_rate_nm_s": "rate of joint torques {:g} Nm/s", "energy_j": "energy {:g} J",
+    }  # fmt: skip
+    given = [text.format(getattr(limits, key)) for key, text in words.items() if getattr(limits, key) is not None]
     if limits.workspace_m is not None:
         given.append(f"box {_triple(limits.workspace_m[0])} to {_triple(limits.workspace_m[1])} m")
     return ", ".join(given) or "none"

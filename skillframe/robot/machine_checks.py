@@ -1,0 +1,45 @@
+"""What is worth knowing about a driven machine before it runs: do its loops close, can it stand at home, its limits.
+
+All are warnings: the tree's dynamics are usable either way, and `skillframe run` refuses what it cannot run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from skillframe.errors import InputError, SkillframeError
+from skillframe.robot.feasibility import problems
+from skillframe.robot.loops import ClosedChain
+from skillframe.robot.model import RobotModel
+from skillframe.robot.problems import Problem
+from skillframe.robot.spec import Limits
+
+
+def machine_warnings(robot: RobotModel) -> Iterator[Problem]:
+    """Loops that do not close, a home where the machine cannot stand, limits that were made for arms."""
+    if not (robot.spec.loop and robot.spec.actuation):
+        return
+    try:
+        chain = ClosedChain(robot)
+        unfit = problems(chain, chain.minimal(robot.home))
+    except SkillframeError as error:
+        text, fix = (error.problem, error.fix) if isinstance(error, InputError) else (str(error), "mend robot.toml")
+        yield _warning("cannot_run", f"{text}: it can be checked and shown, not run", fix)
+        return
+    for text in unfit:
+        yield _warning("impossible_home", f"at home {text}", "choose another [home]")
+    yield from _limits(robot.spec.limits)
+
+
+def _limits(given: Limits) -> Iterator[Problem]:
+    default = Limits()
+    if given.force_n == default.force_n:
+        text = f"[limits] force_n is {default.force_n:g} N, the default for arms; a machine exceeds it at once"
+        yield _warning("arm_limits", text, "write force_n = 15000.0, or what the machine may push, under [limits]")
+    if given.torque_rate_nm_s == default.torque_rate_nm_s:
+        text = f"[limits] torque_rate_nm_s is {default.torque_rate_nm_s:g} N m/s, the default for arms"
+        yield _warning("arm_limits", text, "write torque_rate_nm_s = 1e7, or what the machine may do, under [limits]")
+
+
+def _warning(code: str, message: str, fix: str) -> Problem:
+    return Problem(code=code, severity="warning", where="robot.toml", message=message, fix=fix)
