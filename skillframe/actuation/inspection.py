@@ -21,7 +21,7 @@ class FmuVariable:
     Attributes:
         name, reference: its name and value reference; type: "Real", "Float64", "Boolean" ...
         causality: "input", "output", "parameter" ...; size: number of scalars (FMI 3 arrays).
-        start: as written in the model description, or None; unit: or "".
+        start: as written in the model description, or None; unit, text: unit and what it is, or "".
     """
 
     name: str
@@ -31,6 +31,7 @@ class FmuVariable:
     size: int = 1
     start: str | None = None
     unit: str = ""
+    text: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -242,4 +243,5 @@ def _variable(v: Any) -> FmuVariable:
     return FmuVariable(
         name=v.name, reference=v.valueReference, type=v.type, causality=v.causality or "local", size=size,
         start=start, unit=v.unit or "",
+        text=" ".join((v.description or "").split()),
     )  # fmt: skip

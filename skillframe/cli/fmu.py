@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -99,10 +100,27 @@ def check(file: str, as_json: bool, allow: bool) -> int:
     if as_json:
         click.echo(json.dumps(found))
     else:
-        for key, value in found.items():
-            text = ", ".join(map(str, value)) if isinstance(value, list) else str(value)
-            click.echo(f"{key.replace('_', ' ')}: {text or 'none'}")
+        _print_check(path, found)
     return 1 if found["problems"] else 0
+
+
+def _print_check(path: Path, found: dict[str, Any]) -> None:
+    """What was found, a line each; then what can be connected and set, with units and start values."""
+    from skillframe.actuation.inspection import inspect_fmu
+    from skillframe.cli.output import table
+
+    for key, value in found.items():
+        text = ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+        click.echo(f"{key.replace('_', ' ')}: {text or 'none'}")
+    shown = ("input", "output", "parameter")
+    rows = [v for kind in shown for v in inspect_fmu(path).variables.values() if v.causality == kind]
+    if rows:
+        click.echo("")
+        starts = [v.start if v.causality != "output" else "" for v in rows]
+        table(
+            ("variable", "what", "start", "unit", "description"),
+            [(v.name, v.causality, start or "", v.unit, v.text) for v, start in zip(rows, starts, strict=True)],
+        )
 
 
 @command.command("simulate")

@@ -1,6 +1,7 @@
 """`skillframe fmu`: the contract's keys, exit codes and one-sentence refusals."""
 
 import json
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from skillframe.actuation.toolchain import find_compiler
 from skillframe.cli.main import run
 from tests.fmu_cache import own_cache  # noqa: F401
 
+TABLE = Path(__file__).resolve().parents[3] / "fmus" / "hydraulic_cylinder" / "fmu.toml"
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
 
@@ -44,6 +46,15 @@ def test_check_has_the_keys_of_the_contract_and_finds_nothing(built, capsys, ver
     ]  # fmt: skip
     assert found["fmi_version"] == version and found["problems"] == [] and found["state_capability"] == "exact"
     assert found["kinds"] == ["co_simulation", "model_exchange"]
+
+
+def test_check_lists_every_variable_that_can_be_connected_or_set_with_its_unit_and_start_value(built, capsys):
+    code, out, _ = said(capsys, "check", built["3.0"])
+    lines = {line.split()[0]: line.split() for line in out.partition("variable")[2].splitlines()[1:]}
+    assert code == 0
+    assert lines["bore"] == ["bore", "parameter", "0.08", "m", "diameter", "of", "the", "piston"]
+    assert lines["velocity"][1:4] == ["input", "0.0", "m/s"] and lines["force"][1:3] == ["output", "N"]
+    assert len(lines) == 5 + 11 + len(tomllib.loads(TABLE.read_text(encoding="utf-8"))["parameter"])
 
 
 def test_simulate_writes_time_and_then_every_output_by_its_name(built, capsys, tmp_path):
