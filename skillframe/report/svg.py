@@ -16,6 +16,7 @@ from skillframe.frames import Float
 from skillframe.report.markup import Markup, join, number, tag
 
 LEFT, RIGHT, TOP, BOTTOM = 52.0, 12.0, 34.0, 40.0
+LEGEND_MARK, LEGEND_LETTER = 28.0, 7.0  # width of a stroke with its gaps, and of a letter of 12.5 px
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,8 +142,12 @@ def envelope(x: Float, y: Float, most: int = 260) -> tuple[Float, Float]:
 
 
 def legend(axes: Axes, entries: Sequence[tuple[str, str]], start: float = 60.0) -> Markup:
-    """Names of curves in one line above the plot, right-aligned: (name, class of its stroke)."""
-    widths = [24.0 + 6.6 * len(name) for name, _ in entries]
+    """Names of curves in one line above the plot, right-aligned: (name, class of its stroke); long ones are cut."""
+    letters = (axes.right - start - LEGEND_MARK * len(entries)) / LEGEND_LETTER / max(len(entries), 1)
+    longest = max(int(letters), 4) if sum(len(name) for name, _ in entries) > letters * len(entries) else 1000
+    entries = [(name if len(name) <= longest else name[: longest - 1] + "\N{HORIZONTAL ELLIPSIS}", class_)
+               for name, class_ in entries]  # fmt: skip
+    widths = [LEGEND_MARK + LEGEND_LETTER * len(name) for name, _ in entries]
     x = max(start, axes.right - sum(widths))
     parts = []
     for (name, class_), width in zip(entries, widths, strict=True):
