@@ -123,11 +123,11 @@ def simulate(
         from skillframe.arms import simulate_arms
 
         return simulate_arms(skill, setup, draws, rngs, duration_s=duration_s, trace_hz=trace_hz, progress=progress)
+    check_quantities(draws, setup.robot)
     if setup.robot.spec.actuation:
         from skillframe.machine import simulate_machine
 
         return simulate_machine(skill, setup, draws, rngs, duration_s=duration_s, trace_hz=trace_hz, progress=progress)
-    check_quantities(draws, setup.robot)
     with np.errstate(invalid="ignore", over="ignore"):  # a diverging trial is the limits' business, not a warning
         loop = Loop(skill, setup, draws, rngs, trace_hz)
         loop.tare()

@@ -107,6 +107,6 @@ def _overloaded(state: ChainState) -> list[str]:
             pressure = actuation.known["supply_pressure"] / 1e5
             found.append(
                 f"{actuation.joint} would have to {way} {abs(force) / 1e3:.1f} kN, more than the"
-                f" {bound / 1e3:.1f} kN that {pressure:.0f} bar can give"
+                f" {max(bound, 0.0) / 1e3:.1f} kN that {pressure:.4g} bar can give"
             )
     return found

@@ -37,4 +37,4 @@ def _overload(actuation: Actuation, force: float, pressure: float) -> str:
     if abs(force) <= bound:
         return ""
     needed = f"{actuation.joint} would have to {way} {abs(force) / 1e3:.1f} kN"
-    return f"{needed}, more than the {bound / 1e3:.1f} kN that {pressure / 1e5:.0f} bar can give"
+    return f"{needed}, more than the {max(bound, 0.0) / 1e3:.1f} kN that {pressure / 1e5:.4g} bar can give"

@@ -36,7 +36,7 @@ def check_quantities(draws: Mapping[str, Float], robot: RobotModel | None = None
 
     Args:
         draws: values (N,) by quantity.
-        robot: who runs; refuses quantities of actuators that it does not have.
+        robot: who runs; refuses quantities of actuators or sensors that it does not have.
 
     Raises:
         UnknownName: with the nearest name.
@@ -45,8 +45,8 @@ def check_quantities(draws: Mapping[str, Float], robot: RobotModel | None = None
     for key, values in draws.items():
         if key not in QUANTITIES:
             raise UnknownName("quantity", key, QUANTITIES)
-        if robot is not None and key in _ACTUATOR and not robot.spec.actuation:
-            raise InputError(key, f"{robot.spec.name} has no actuators of its own", "leave it out")
+        if robot is not None and (lacking := _lacking(key, robot)):
+            raise InputError(key, f"{robot.spec.name} {lacking}", "leave it out")
         least, largest = float(np.min(values)), float(np.max(np.abs(values)))
         if not largest <= LARGEST.get(key.partition(".")[0], np.inf):
             raise InputError(key, f"cannot be {largest:g}", "give it in SI units, angles in radians")
@@ -56,6 +56,15 @@ def check_quantities(draws: Mapping[str, Float], robot: RobotModel | None = None
             raise InputError(key, f"cannot be negative, is {least:g}", "give 0 or more")
         if least <= 0.0 and key == "robot.mass_scale":
             raise InputError(key, f"must be positive, is {least:g}", "give 1 for the nominal masses")
+
+
+def _lacking(key: str, robot: RobotModel) -> str:
+    """Why a quantity would do nothing on this robot; "" if it does something."""
+    if not robot.spec.actuation:
+        return "has no actuators of its own" if key in _ACTUATOR else ""
+    if key.startswith("sensor."):
+        return "has no wrench sensor: its contact force is estimated from pressures"
+    return "moves in a plane, and does not turn its tool to a start" if key.startswith("start.tilt_") else ""
 
 
 def nominal_fixture(robot: RobotModel) -> Pose:

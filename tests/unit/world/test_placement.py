@@ -83,3 +83,11 @@ def test_rates_that_divide_give_their_ratio_and_others_are_refused_in_words():
     for slow in (300.0, 2000.0):
         with pytest.raises(SkillframeError, match="not a whole multiple"):
             ratio(1000.0, slow, "control", "the trace")
+
+
+@pytest.mark.parametrize("key", ["sensor.force_noise", "sensor.torque_bias_x", "start.tilt_y"])
+def test_what_would_do_nothing_on_a_hydraulic_machine_is_refused_there_and_taken_elsewhere(key):
+    draws = {key: np.array([0.1])}
+    check_quantities(draws, load_model(load_robot("panda")))
+    with pytest.raises(InputError, match=f"{key}: hiab_xs031 (has no wrench sensor|moves in a plane)"):
+        check_quantities(draws, load_model(load_robot("hiab_xs031")))
