@@ -42,7 +42,9 @@ class SandboxBank:
         self.y = np.full((self.count, len(self.outputs)), np.nan)
         self.active, self.status = np.ones(self.count, np.uint8), np.zeros(self.count, np.int64)
         files = ", ".join(dict.fromkeys(fact.path.name for fact in facts))
-        self.notes: tuple[str, ...] = (f"{files}: not allowed in this process, so in child processes",)
+        self.notes: tuple[str, ...] = (
+            f"{files}: in child processes (skillframe fmu check FILE --allow lets a file run inside)",
+        )
         self.limits = limits or SandboxLimits()
         self._specs, self._facts = list(specs), list(facts)
         self._time = 0.0

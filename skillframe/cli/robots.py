@@ -116,6 +116,9 @@ def _not_loaded(robot: str, message: str) -> dict[str, object]:
 def _print_audit(robot: str, result: Audit) -> None:
     verdict = "usable for dynamics" if result.usable else "NOT usable for dynamics"
     click.echo(f"{robot}: {verdict} (nq {result.nq}, nv {result.nv}, {result.mass_kg:.4g} kg)")
+    said: set[str] = set()
     for problem in result.problems:
         click.echo(f"\n{problem.severity} {problem.code} at {problem.where}\n  {problem.message}")
-        click.echo("  fix: " + problem.fix.replace("\n", "\n    "))
+        lines = problem.fix.splitlines()
+        click.echo("  fix: " + ("as above" if len(lines) > 1 and said.issuperset(lines) else "\n    ".join(lines)))
+        said.update(lines)

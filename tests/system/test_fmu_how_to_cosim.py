@@ -15,7 +15,9 @@ def test_the_python_of_the_page_runs(capsys):
     names = {}
     for block in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL):
         exec(compile(block, "co-simulation.md", "exec"), names)
-    assert capsys.readouterr().out.rstrip().endswith("{}")  # no trouble
+    out = capsys.readouterr().out.rstrip()
+    assert out.endswith("{}")  # no trouble
+    assert re.search(r"prints `(.*), residual", PAGE).group(1) in out
     mass, master = names["mass"], names["master"]
     assert 0.3 < mass.position[0] < 0.59
     # speed is the valve's flow over the piston's area once the oil has settled, to its compression

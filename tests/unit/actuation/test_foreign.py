@@ -272,7 +272,7 @@ def test_only_what_is_foreign_runs_in_children_and_its_end_leaves_the_others(bui
     specs = [ActuatorSpec(fmu=str(built(k)), name=k, outputs=outputs) for k in ("trusted", "crash")]
     bank = open_actuators(specs, trials=2)
     assert isinstance(bank, MixedBank)
-    assert bank.notes == ("crash2.fmu: not allowed in this process, so in child processes",)
+    assert bank.notes == ("crash2.fmu: in child processes (skillframe fmu check FILE --allow lets a file run inside)",)
     bank.u[:, bank.inputs.index("command")] = [1.0, 1.0, 3.0, 3.0]
     bank.start()
     run(bank)
