@@ -109,6 +109,9 @@ class MachineLoop(Loop):
     def _configurations(self, draws: Draws) -> Float:
         """Closed configurations (N, nq) with the tool's point at its start, the other joints as at home."""
         robot, axes = self.setup.robot, self.task.axes
+        across = f"start.offset_{'xyz'[({0, 1, 2} - set(axes)).pop()]}"
+        if np.any(draws.get(across, 0.0)):
+            raise InputError(across, f"{robot.spec.name} moves its tool in a plane, and not across it", "leave it out")
         home = self.chain.minimal(robot.home)
         points = start_poses(robot, self.setup.scene, draws, self.count).position[:, axes]
         rows = []

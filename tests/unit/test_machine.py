@@ -159,6 +159,12 @@ def test_pressing_on_a_plate_is_seen_in_the_pressures():
     assert np.hypot(*(seen - true).T).max() < 0.06 * np.hypot(*true.T).mean()
 
 
+def test_a_start_across_the_plane_is_refused():
+    aside = {"start.offset_y": np.array([0.0, 0.1])}
+    with pytest.raises(InputError, match=r"start\.offset_y: hiab_xs031 moves its tool in a plane"):
+        simulate(Follow(diamond, MOVING), setup(), aside, rngs([0, 1]), duration_s=0.1)
+
+
 def test_a_crane_that_is_told_to_stand_in_the_air_stands():
     """Its stuck pistons show a force of a kilonewton; answered, it set the tool swinging by 60 to 80 mm/s."""
     stiff = {"robot.mass_scale": np.array([1.0, 0.98]), "actuator.friction_scale": np.array([1.0, 1.2])}
