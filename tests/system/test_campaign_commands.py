@@ -79,6 +79,7 @@ def test_run_status_and_replay_tell_one_story(campaign, tmp_path, capsys):
     assert (scene["world"], len(scene["fixture"]) > 0) == ("valley", True)
 
 
+@pytest.mark.slow
 def test_workers_chunks_and_a_resume_end_in_the_identical_table(campaign, tmp_path):
     path = campaign()
     tables = []
@@ -92,6 +93,7 @@ def test_workers_chunks_and_a_resume_end_in_the_identical_table(campaign, tmp_pa
     assert len(set(tables)) == 1
 
 
+@pytest.mark.slow
 def test_a_campaign_runs_again_from_its_own_folder(campaign, tmp_path):
     assert run(["campaign", "run", campaign(), "--out", str(tmp_path / "a")]) == 0
     for name in ("demo.npz", "valley.toml"):

@@ -73,6 +73,7 @@ def test_exactly_the_guilty_trial_is_named(out, reference, misbehave, cause):
     assert summary["complete"]
 
 
+@pytest.mark.slow
 def test_a_hang_in_a_small_chunk_is_ended_and_named(out, reference):
     fakes.run(out, fakes.hangs_holding_the_lock, **{**LIMITS, "chunk": 2, "time_limit_s": 1.0})
     (line,) = changed(out, reference)

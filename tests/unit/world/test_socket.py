@@ -35,6 +35,7 @@ def test_pins_and_key_stand_in_free_space_when_plugged_in(scene):
             assert not covered(scene, x, y)
 
 
+@pytest.mark.slow
 def test_everything_else_of_the_face_is_solid(scene):
     """No gap between rings and plates: a grid of 0.4 mm over the face, leaving out the holes and the key's slot."""
     for x in np.arange(-0.03, 0.03, 0.0004) + 1e-5:
