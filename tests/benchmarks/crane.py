@@ -14,6 +14,8 @@ from unittest import mock
 
 import numpy as np
 
+from tests.benchmarks import driver
+
 COUNT, SECONDS, WINDOW_MS = 32, 4.0, 250
 
 
@@ -94,24 +96,6 @@ def second_run():
     return (time.process_time() - before) / 20
 
 
-def driver(show):
-    """Three cylinders through our driver against fmpy's list interface, and one cylinder by itself."""
-    from skillframe.actuation.inspection import inspect_fmu
-    from skillframe.actuation.library import find_fmu
-    from tests.system.test_fmu_driver import H, bank, list_interface, side_by_side
-
-    for version in (2, 3):
-        facts = inspect_fmu(find_fmu("hydraulic_cylinder", version=version))
-        fast, plain = bank(facts), bank(facts, compiled=False)
-        best = side_by_side(
-            {"list": list_interface(facts), "c": lambda t: fast.step(t, H), "ctypes": lambda t: plain.step(t, H)}  # noqa: B023
-        )
-        for how, bound in (("c", 6.0), ("ctypes", 3.0)):
-            what = f"3 cylinders, FMI {version}, fmpy's lists over our driver ({how})"
-            show(what, best["list"] / best[how], "x", bound, below=False)
-        show(f"1 cylinder, FMI {version}, a millisecond at constant input", 1e6 * best["c"] / 3, "us", 4.0)
-
-
 def rows(show):
     """Print the crane's rows with `run.show`."""
     from skillframe.actuation.toolchain import find_compiler
@@ -132,4 +116,4 @@ def rows(show):
     best, mean = timed(COUNT, 3.5)
     show(f"crane, batch of {COUNT}: simulated seconds of all trials per second, mean", mean, "x", 8.0, below=False)
     show("crane: starting its cylinders again in the same process", 1e3 * second_run(), "ms", 5.0)
-    driver(show)
+    driver.rows(show)
