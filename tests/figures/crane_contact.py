@@ -66,11 +66,11 @@ class Contact(NamedTuple):
         return self.above[self.touched :].max()
 
 
-def plate(surface):
-    """A slab on a spring of so many N/m."""
+def plate(surface, ratio):
+    """A slab on a spring of so many N/m; `ratio`: damping of the slab on it by itself."""
     slab = Geom(kind="box", size=(2.0, 0.5, 0.1), position=(0.0, 0.0, crane_runs.PLATE - 0.1))
     air = crane_runs.scene(np.array([crane_runs.FIXTURE[0], 0.0, crane_runs.ABOVE]), plate=False)
-    part = Sprung(name="plate", geoms=(slab,), axis=(0.0, 0.0, 1.0), stiffness=surface)
+    part = Sprung(name="plate", geoms=(slab,), axis=(0.0, 0.0, 1.0), stiffness=surface, damping_ratio=ratio)
     return dataclasses.replace(air, sprung=(part,))
 
 
@@ -95,12 +95,12 @@ def path_over(surface):
     return path, slide
 
 
-def pressed(surface, damping=5e4, mass=1.0, friction=1.0, seed=1):
-    """One run on a surface [N/m]; mass and friction of the plant over what is believed."""
+def pressed(surface, damping=5e4, mass=1.0, friction=1.0, seed=1, ratio=0.5):
+    """One run on a surface [N/m] with a damping ratio; mass and friction of the plant over what is believed."""
     path, slide = path_over(surface)
     truth = {"robot.mass_scale": np.array([mass]), "actuator.friction_scale": np.array([friction])}
     gains = crane_runs.Stiffness(STIFFNESS, damping)
-    result = crane_runs.run(path, gains, plate(surface), truth, seconds=slide + SLIDING_S, seed=seed)
+    result = crane_runs.run(path, gains, plate(surface, ratio), truth, seconds=slide + SLIDING_S, seed=seed)
     return seen_in(result.traces[0], damping, slide)
 
 

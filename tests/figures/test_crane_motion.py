@@ -124,6 +124,19 @@ def test_in_steady_sliding_the_residual_of_the_target_dynamics_is_below_a_percen
 
 
 @pytest.mark.figures
+@pytest.mark.parametrize(("surface", "ratio"), [(1e6, 1.0), (1e6, 2.0), (5e6, 1.0), (5e6, 2.0)])
+def test_the_more_a_surface_is_damped_the_less_the_tool_hops(surface, ratio):
+    """The hop is the surface's: what it gives back of the speed of the load."""
+    found, livelier = pressed(surface, ratio=ratio), pressed(surface, ratio=ratio / 2.0)
+    row(
+        f"landing on {surface:.0e} N/m, damping ratio {ratio:g}",
+        f"off the plate for {found.lost:.2f} s, up to {1e3 * max(found.hop, 0.0):.2f} mm",
+    )
+    assert found.lost == 0.0 or found.hop < livelier.hop
+    assert found.lost == 0.0 or surface > 1e6
+
+
+@pytest.mark.figures
 def test_with_too_little_damping_contact_ends_in_a_limit_cycle_with_the_valve_at_its_stop():
     """D = 2.5e3 N s/m, a twentieth of ours: K/D = 40 1/s asks for more than oil of 1.4 Hz can follow."""
     calm, wild = pressed(1e6), pressed(1e6, damping=2.5e3)
