@@ -16,6 +16,7 @@ import numpy as np
 
 from skillframe.errors import InputError
 from skillframe.frames import Float
+from skillframe.tracemeta import LARGEST, check_meta
 
 FORMAT, VERSION = "skillframe.trace", 1
 MACHINE = "machine_"
@@ -31,15 +32,7 @@ COLUMNS = {
     "desired_quaternion": (4,),
     "command_wrench": (6,),
 }
-
-
-LARGEST = 1e100  # beyond it squares overflow
 DRAWN = ("time", "position", "quaternion", "body_position", "body_quaternion")
-META_KINDS: dict[str, type | tuple[type, ...]] = {
-    **dict.fromkeys(("analytic", "draws", "frames", "limits", "params"), dict),
-    **dict.fromkeys(("actuators", "bodies", "center_of_compliance", "events", "notes"), list),
-    **dict.fromkeys(("duration_s", "peak_force_n", "final_error_m", "final_error_rad"), (int, float)),
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,7 +111,7 @@ class Trace:
         machine = {name: arrays.pop(name) for name in list(arrays) if name.startswith(MACHINE)}
         _check_arrays(path, arrays)
         _check_numbers(path, {**arrays, **machine})
-        _check_meta(path, meta)
+        check_meta(path, meta)
         for name, array in machine.items():
             if not array.ndim or len(array) != len(arrays["time"]):
                 raise InputError(path, f"array {name} has the shape {array.shape}", "write the trace again")
@@ -158,14 +151,3 @@ def _whole(text: str) -> int:
     if len(text) > 100:
         raise ValueError(text)
     return int(text)
-
-
-def _check_meta(path: Path, meta: dict[str, Any]) -> None:
-    """Metadata of the kinds that are written; what is absent or null is not known."""
-    for key, kind in META_KINDS.items():
-        if meta.get(key) is not None and not isinstance(meta[key], kind):
-            raise InputError(f"{path}: meta.{key}", f"is {meta[key]!r:.60}", "write the trace again")
-    for i, body in enumerate(meta.get("bodies") or []):
-        geoms = body.get("geoms", []) if isinstance(body, dict) else None
-        if not isinstance(geoms, list) or not all(isinstance(geom, dict) for geom in geoms):
-            raise InputError(f"{path}: meta.bodies[{i}]", "is no body with its geoms", "write the trace again")

@@ -21,7 +21,7 @@ FLOORS = [
     {"sequence", "skillfile", "export", "robot", "registry", "skillsource"},
     {"control", "actuation"},
     {"cosim", "world"},
-    {"executor", "arms", "machine", "recorder", "trace", "prepare"},
+    {"executor", "arms", "machine", "recorder", "trace", "tracemeta", "prepare"},
     {"teacher", "staged_teacher", "blind_teacher", "teleoperation", "metrics", "campaign"},
     {"report", "demonstrate", "demonstrate_blind", "demonstrate_machine"},
     {"conformance", "testing", "quickstart", "reproduce"},

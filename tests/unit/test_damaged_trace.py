@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from skillframe.cli.main import run
 from skillframe.errors import InputError
 from skillframe.trace import COLUMNS, Trace
 
@@ -61,8 +62,30 @@ def test_arrays_that_cannot_be_drawn_are_refused(read: Callable[..., Trace], nam
         ("bodies", [2.5], r"meta\.bodies\[0\]: is no body"),
         ("bodies", [{"geoms": 0}], r"meta\.bodies\[0\]: is no body"),
         ("duration_s", 10**400, "is no trace file, or a damaged one"),
+        ("center_of_compliance", [0.0, np.nan, 0.0], r"t\.npz: meta\.center_of_compliance: is no.*; run it again"),
+        ("center_of_compliance", [0.0, 0.0], r"meta\.center_of_compliance: is no point"),
+        ("frames", {"tip": [0.0, 0.0, np.inf]}, r"meta\.frames\.tip: is no point of three finite numbers"),
+        ("limits", {"force_n": "80"}, r"meta\.limits\.force_n: is '80'"),
+        ("bodies", [{"geoms": [{"kind": ["box"]}]}], r"meta\.bodies\[0\]\.geoms\[0\]\.kind"),
+        ("bodies", [{"geoms": [{"kind": "cylinder", "size": [0.1]}]}], r"geoms\[0\]\.size: is \[0\.1\]"),
+        ("bodies", [{"geoms": [{"kind": "box", "size": [0.1, 0.1, np.nan]}]}], r"geoms\[0\]\.size: is"),
+        ("bodies", [{"geoms": [{"kind": "plane", "quaternion": [0, 0, 0, 0]}]}], r"geoms\[0\]\.quaternion: is"),
+        ("bodies", [{"geoms": [{"kind": "plane", "rgba": [1, 1, 1]}]}], r"geoms\[0\]\.rgba: is"),
+        ("bodies", [{"geoms": [{"kind": "mesh", "vertices": [[0, 0, np.nan]]}]}], r"geoms\[0\]\.vertices: are no"),
+        ("bodies", [{"geoms": [{"kind": "mesh", "vertices": [[0, 0, 0]], "faces": [[0, 0, 3]]}]}], r"\.faces: are no"),
     ],
 )
-def test_metadata_of_another_kind_are_refused(read: Callable[..., Trace], key: str, value: Any, words: str) -> None:
+def test_metadata_that_cannot_be_used_are_refused(read: Callable[..., Trace], key: str, value: Any, words: str) -> None:
     with pytest.raises(InputError, match=words):
         read(meta=json.dumps({**META, key: value}))
+
+
+def test_a_damaged_trace_is_an_input_error_of_report_and_leaves_no_page(
+    read: Callable[..., Trace], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(InputError):
+        read(meta=json.dumps({**META, "center_of_compliance": [np.nan, 0.0, 0.0]}))
+    page = tmp_path / "page.html"
+    assert run(["report", str(tmp_path / "t.npz"), "--out", str(page)]) == 2
+    assert "t.npz: meta.center_of_compliance: is no point" in capsys.readouterr().err
+    assert not page.exists()
