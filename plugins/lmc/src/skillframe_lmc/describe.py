@@ -60,7 +60,7 @@ def _details(phase: Phase) -> list[str]:
             facts.append(f"work of the teacher {seen['work_teacher_j']:.3g} {unit}, of the environment "
                          f"{seen['work_environment_j']:.3g} {unit}")  # fmt: skip
         lines.append(f"{name}: {'; '.join(facts)}")
-    if phase.pitch is not None:
+    if phase.pitch is not None and all(p.desired_direction is not None for p in (phase.translation, phase.rotation)):
         lines.append(f"pitch: {1e3 * phase.pitch:.3g} mm of translation per radian of rotation")
     return lines
 
@@ -72,7 +72,7 @@ def _direction(part: Part) -> str:
     angle, area = part.evidence.get("pyramid_angle_rad"), part.evidence.get("feasible_solid_angle_sr")
     if angle is None or area is None:
         return text
-    return f"{text} (pyramids of {degrees(angle):.0f} degrees meet; directions that explain it: {area:.2f} sr)"
+    return f"{text} (hand taken to waver by {degrees(angle):.0f} degrees; {area:.2f} sr of directions explain all)"
 
 
 def _free(part: Part) -> list[str]:

@@ -90,7 +90,8 @@ def _no_direction_message(part: Learned, choice: Choice, settings: Settings) -> 
     angle, allowed = degrees(choice.pyramid_angle), degrees(settings.pyramid_max_rad)
     taken = f"{angle:.0f} degrees" if angle < 90.0 else "more than 90 degrees"
     text = (
-        f"no one {_push(part)} explains what was seen: it would take pyramids of {taken}, and {allowed:.0f} are allowed"
+        f"no one {_push(part)} explains what was seen: the hand would have had to waver by {taken}, and {allowed:.0f} "
+        "are allowed"
     )
     if not any(given.contact.any() for given in part.given):
         text += "; nothing was touched, so it is an assumption that the axes left free are the environment's doing"
