@@ -252,7 +252,7 @@ def _lines() -> Callable[[Progress], None]:
             spent = time.monotonic() - began
             left = spent * (1.0 - share) / (share - first) if share > first else 0.0
             guess = f", about {_span(left)} left" if left >= 1.0 else ""
-            click.echo(f"{share:.0%}: {progress.done} of {progress.total} runs done{guess}", err=True)
+            click.echo(f"{share:.0%} simulated, {progress.done} of {progress.total} runs complete{guess}", err=True)
         if progress.note:
             click.echo(progress.note, err=True)
 

@@ -18,8 +18,8 @@ from skillframe.cli.numbers import SEED
 
 MARKER = ".skillframe-quickstart"
 VALLEY = """\
-# Where does the learned slide work, when the valley is shifted and tipped and nobody tells the robot?
-name = "Valley: shifted and tipped"
+# Where does the learned slide work, when the valley is shifted and tilted and nobody tells the robot?
+name = "Valley: shifted and tilted"
 seed = 11
 trials = {trials}
 robot = "{robot}"
@@ -27,7 +27,7 @@ world = "valley"
 skills = ["valley.skill.json", "replay:demonstrations/valley1.npz"]
 duration_s = 6.0
 [set]
-"start.offset_z" = 0.035     # above the steeper flank of the most tipped valley
+"start.offset_z" = 0.035     # above the steeper flank of the most tilted valley
 "world.friction" = 0.5       # it was taught at 0.2
 [vary]
 "fixture.offset_x" = {{ sobol = [-0.015, 0.015] }}

@@ -147,7 +147,7 @@ def run_plots(trace: Trace, force_limit: float | None = None) -> list[Markup]:
     time, events = np.asarray(trace.time, dtype=float), events_of(trace)
     limit = (trace.meta.get("limits") or {}).get("force_n", force_limit)
     true_size = Curve(name="in the simulator", values=norm(trace.wrench_true[:, :3]), stroke="line faint")
-    size = Curve(name="size", values=norm(trace.wrench[:, :3]), stroke="line ink")
+    size = Curve(name="|F|", values=norm(trace.wrench[:, :3]), stroke="line ink")
     origin, first = trace.position[0], trace.quaternion[:1]
     moved = _pairs(1e3 * (trace.desired_position - origin), 1e3 * (trace.position - origin))
     turns = _pairs(turned(trace.desired_quaternion, first), turned(trace.quaternion, first))
@@ -169,11 +169,11 @@ def demonstration_plots(demonstration: Demonstration) -> Markup:
     moved = 1e3 * (demonstration.position - demonstration.position[0])
     turn = turned(demonstration.quaternion, demonstration.quaternion[:1])
     force = demonstration.wrench[:, :3]
-    size = Curve(name="size", values=norm(force), stroke="line ink")
+    size = Curve(name="|F|", values=norm(force), stroke="line ink")
     return join([
         time_plot("Force", "N", time, [*_components(force, "thin"), size], width=350),
-        time_plot("Motion", "mm", time, _components(moved, ""), width=350),
-        time_plot("Turn", "°", time, _components(turn, ""), width=350),
+        time_plot("Position", "mm", time, _components(moved, ""), width=350),
+        time_plot("Attitude", "°", time, _components(turn, ""), width=350),
     ])  # fmt: skip
 
 

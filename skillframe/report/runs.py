@@ -160,5 +160,7 @@ def demonstrations_section(chapter: Chapter) -> Markup:
                 tag("div", demonstration_plots(demonstration), class_="grid three"),
             )
         )
-    lead = "What the teacher did: the environment's force on the tool and the tool's motion, in the robot's base axes."
+    lead = (
+        "What the teacher did: the environment's force on the tool and the tool's motion since the start, in base axes."
+    )
     return join([tag("p", lead, class_="lead"), *blocks])

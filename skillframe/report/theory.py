@@ -107,10 +107,15 @@ def theory_sentence(found: Sequence[Region], varied: Sequence[str]) -> Markup:
     """What the dashed lines are."""
     if not found:
         return Markup("")
-    text = f" Dashed: the border of the region that closed-form theory predicts, {'; '.join(map(_said, found))}"
+    text = f" Dashed: the border within which closed-form theory predicts success from any start, {_all(found)}"
     worlds = [n for n in varied if n.startswith("world.") and not any(n in region.over for region in found)]
     nominal = f" (at the nominal {', '.join(quantity(n).label for n in worlds)}, which varied)" if worlds else ""
-    return tag("p", tag("span", class_="key theory-key"), escape(f"{text}{nominal}."))
+    beyond = "; beyond it, some starts may succeed."
+    return tag("p", tag("span", class_="key theory-key"), escape(f"{text}{nominal}{beyond}"))
+
+
+def _all(found: Sequence[Region]) -> str:
+    return "; ".join(map(_said, found))
 
 
 def _said(region: Region) -> str:
