@@ -83,6 +83,7 @@ _OPTIONS = [
         help="Whether the tool's weight is still in it.",
     ),
     click.option("--pose-topic", help="Topic of a ROS bag with the tool's pose, or with --robot its joint states."),
+    click.option("--pose-frames", metavar="BASE,TOOL", help="Frames of a ROS bag's transforms (/tf, /tf_static)."),
     click.option("--wrench-topic", help="Topic of a ROS bag with the wrench (WrenchStamped)."),
     click.option("--robot", help="The robot whose joint states a ROS bag holds (name or path of its robot.toml)."),
 ]  # fmt: skip

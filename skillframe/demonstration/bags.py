@@ -1,36 +1,43 @@
 """ROS recordings: ROS 1 `.bag`, ROS 2 `.db3` and `.mcap`, read through `rosbags`, which needs no ROS.
 
 The pose is a topic of `PoseStamped`, `PoseWithCovarianceStamped`, `TransformStamped` or `Odometry`, or of `JointState`
-with the robot whose forward kinematics it is; the wrench is a topic of `WrenchStamped`. Every topic keeps its own
-clock, and both are joined on time as two files are. The clock is that of the headers, because a bag's receive times are
-late by up to seconds and jitter; it starts at 0 with the pose's first stamp, which the metadata keeps, because seconds
-since 1970 leave a double no more than 0.24 us.
+with the robot whose forward kinematics it is, or what the bag's transforms say of one frame in another (`transforms`);
+the wrench is a topic of `WrenchStamped`. Every topic keeps its own clock, and both are joined on time as two files are.
+The clock is that of the headers, because a bag's receive times are late by up to seconds and jitter; it starts at 0
+with the pose's first stamp, which the metadata keeps, because seconds since 1970 leave a double no more than 0.24 us.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skillframe.demonstration.assemble import assemble
+from skillframe.demonstration.bagfile import (
+    TREES,
+    Recorded,
+    opened,
+    parts_note,
+    read_topic,
+    read_transforms,
+    refuse_other_files,
+    topics_of,
+)
 from skillframe.demonstration.columns import POSITION, QUATERNION, WRENCH, Columns
-from skillframe.demonstration.files import BAG_FACTS
 from skillframe.demonstration.metafile import read_meta
 from skillframe.demonstration.options import ReadOptions, read_options
 from skillframe.demonstration.record import Demonstration
-from skillframe.errors import InputError, MissingDependency, UnknownName
+from skillframe.demonstration.transforms import tool_in_base, tree
+from skillframe.errors import InputError, UnknownName
 from skillframe.frames import Float, Pose, quaternion_from_matrix
 
 ToolPoses = Callable[[str, "str | None", Sequence[str], Float], Pose]
 """(robot, arm, joint names, positions (T, joints)) -> poses of the tool; raises `InputError` or `UnknownName`."""
 
-MAGIC = {".bag": b"#ROSBAG V2.0\n", ".db3": b"SQLite format 3\0", ".mcap": b"\x89MCAP0\r\n"}
 POSES: Mapping[str, Callable[[Any], tuple[Any, Any]]] = {
     "geometry_msgs/msg/PoseStamped": lambda m: (m.pose.position, m.pose.orientation),
     "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: (m.pose.pose.position, m.pose.pose.orientation),
@@ -42,21 +49,12 @@ STAMP_START = "header_stamp_start_ns"
 """Metadata key of the header stamp at time 0 [ns]."""
 
 
-class Recorded(NamedTuple):
-    """One topic's messages in the order of their header stamps [ns]."""
-
-    topic: str
-    kind: str
-    stamps: NDArray[np.int64]
-    messages: list[Any]
-
-
 def read_bag(path: Path, options: Mapping[str, Any], tool_poses: ToolPoses) -> Demonstration:
     """A demonstration from a ROS bag.
 
     Args:
         path: the file, or the folder of a ROS 2 bag with all its parts; `NAME.meta.toml` beside it is read too.
-        options: fields of `ReadOptions`; `pose_topic` and `wrench_topic` where the bag leaves a choice.
+        options: fields of `ReadOptions`; `pose_topic`, `pose_frames` and `wrench_topic` where the bag leaves a choice.
         tool_poses: forward kinematics, for joint states.
 
     Raises:
@@ -66,13 +64,16 @@ def read_bag(path: Path, options: Mapping[str, Any], tool_poses: ToolPoses) -> D
     """
     chosen, notes = read_options(options), list[str]()
     _refuse_text_options(path, chosen)
-    _refuse_other_files(path)
+    refuse_other_files(path)
     meta = read_meta(path)
-    notes += _parts_note(path)
-    with _opened(path) as bag:
-        topics = _topics(path, bag)
-        wanted = [_pose_topic(path, topics, chosen), _wrench_topic(path, topics, chosen, meta)]
-        recorded = [_recorded(path, bag, name, topics[name], notes) for name in wanted if name is not None]
+    notes += parts_note(path)
+    with opened(path) as bag:
+        topics = topics_of(path, bag)
+        wrenches = _wrench_topic(path, topics, chosen, meta)
+        recorded = [
+            _recorded_pose(path, bag, topics, chosen, notes),
+            *(read_topic(path, bag, name, topics[name], notes) for name in [wrenches] if name is not None),
+        ]
     zero = int(recorded[0].stamps[0])
     pose = _pose(path, recorded[0], zero, chosen, tool_poses)
     if len(recorded) == 1:
@@ -84,17 +85,9 @@ def read_bag(path: Path, options: Mapping[str, Any], tool_poses: ToolPoses) -> D
     return assemble(pose, {**meta, STAMP_START: zero}, joined, notes, wrench)
 
 
-def _parts_note(path: Path) -> list[str]:
-    """That a file is one of several of its bag, as the metadata in its folder says."""
-    facts = path.parent / BAG_FACTS
-    words = facts.read_text("utf-8", "replace").split() if facts.is_file() and path.is_file() else []
-    parts = {word for word in words if word.endswith((".db3", ".mcap"))}
-    return [f"{path.name} is one of {len(parts)} parts of its bag; give the folder to read all"] * (len(parts) > 1)
-
-
 def _plain(options: ReadOptions) -> ReadOptions:
     """The settings without those that only a bag has."""
-    return replace(options, pose_topic=None, wrench_topic=None, robot=None, arm=None)
+    return replace(options, pose_topic=None, pose_frames=None, wrench_topic=None, robot=None, arm=None)
 
 
 def _refuse_text_options(path: Path, options: ReadOptions) -> None:
@@ -104,67 +97,6 @@ def _refuse_text_options(path: Path, options: ReadOptions) -> None:
                 path, f"is a ROS bag, which has topics and SI units; --{name.replace('_', '-')} is for text files",
                 "choose topics with --pose-topic and --wrench-topic",
             )  # fmt: skip
-
-
-def _refuse_other_files(path: Path) -> None:
-    """Refuse what is not a bag by its first bytes, before any library is asked; a folder is a bag of ROS 2."""
-    if path.is_dir():
-        return
-    magic = MAGIC[path.suffix.lower()]
-    try:
-        with path.open("rb") as file:
-            head = file.read(len(magic))
-    except FileNotFoundError:
-        raise InputError(path, "no such file", "check the path") from None
-    except OSError as error:
-        raise InputError(path, f"cannot be read ({error.strerror})", "check the path") from None
-    if not head:
-        raise InputError(path, "is empty", "record it again")
-    if head != magic:
-        raise InputError(path, f"is no {path.suffix} recording", "check what wrote it; ROS 1 bags must be version 2.0")
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[Any]:
-    try:
-        from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError:
-        raise MissingDependency("rosbags", f"reading {path}", "pip install 'skillframe[ros]'") from None
-    with _foreign(path):
-        bag = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))  # older .db3 carry no types
-        bag.open()
-    try:
-        yield bag
-    finally:
-        bag.close()
-
-
-@contextmanager
-def _foreign(path: Path) -> Iterator[None]:
-    """Whatever the library raises on a damaged file, as one sentence."""
-    try:
-        yield
-    except Exception as error:  # foreign code on foreign bytes: struct.error, apsw errors, TypeError ...
-        first = str(error).strip().splitlines()
-        whole = path.is_file() and (path.parent / BAG_FACTS).is_file()
-        folder = f"its messages may be packed: give its folder, {path.parent}, or record it again"
-        said = f"{type(error).__name__}: {first[0]}" if first else type(error).__name__
-        raise InputError(
-            path,
-            f"cannot be read as a ROS bag ({said})",
-            folder if whole else "it may be cut off or damaged: reindex it, or record it again",
-        ) from None
-
-
-def _topics(path: Path, bag: Any) -> dict[str, str]:
-    """Message type by topic."""
-    with _foreign(path):
-        topics = {name: str(info.msgtype) for name, info in bag.topics.items()}
-        empty = bag.message_count == 0
-    if empty:
-        raise InputError(path, "holds no messages", "record it again, and check that the topics are published")
-    return topics
 
 
 def _pose_topic(path: Path, topics: Mapping[str, str], options: ReadOptions) -> str:
@@ -207,22 +139,34 @@ def _chosen(
 
 def _remedy(what: str, topics: Mapping[str, str]) -> str:
     if what == "pose":
-        return "name the robot with --robot" if JOINTS in topics.values() else "record the tool's pose or joint states"
+        named = ["name the robot with --robot"] * (JOINTS in topics.values())
+        named += ["name base and tool with --pose-frames BASE,TOOL"] * any(kind in TREES for kind in topics.values())
+        return ", or ".join(named) or "record the tool's pose or joint states"
     return "record the wrench too, or state contact = false in NAME.meta.toml beside it"
 
 
-def _recorded(path: Path, bag: Any, topic: str, kind: str, notes: list[str]) -> Recorded:
-    with _foreign(path):
-        connections = [c for c in bag.connections if c.topic == topic]
-        messages = [bag.deserialize(raw, c.msgtype) for c, _, raw in bag.messages(connections)]
-    if not messages:
-        raise InputError(f"{path}: {topic}", "holds no messages", "choose another topic, or record it again")
-    stamps = np.array([m.header.stamp.sec * 1_000_000_000 + m.header.stamp.nanosec for m in messages], dtype=np.int64)
-    if np.all(np.diff(stamps) >= 0):
-        return Recorded(topic, kind, stamps, messages)
-    order = np.argsort(stamps, kind="stable")
-    notes.append(f"{int((np.diff(stamps) < 0).sum())} messages of {topic} came late and were sorted by header stamp")
-    return Recorded(topic, kind, stamps[order], [messages[i] for i in order])
+def _recorded_pose(path: Path, bag: Any, topics: Mapping[str, str], options: ReadOptions, notes: list[str]) -> Recorded:
+    if options.pose_frames is None:
+        name = _pose_topic(path, topics, options)
+        return read_topic(path, bag, name, topics[name], notes)
+    base, tool = _frames(options)
+    published = [name for name, kind in topics.items() if kind in TREES]
+    if not published:
+        raise InputError(path, "holds no transforms (TFMessage)", "choose a topic with --pose-topic, or record /tf")
+    stamps, rows = tool_in_base(tree(read_transforms(path, bag, published), str(path)), base, tool, str(path))
+    return Recorded(f"{base} to {tool}", "tf", stamps, rows, base)
+
+
+def _frames(options: ReadOptions) -> tuple[str, str]:
+    names = [name.strip().lstrip("/") for name in str(options.pose_frames).split(",")]
+    if len(names) != 2 or not all(names) or names[0] == names[1]:
+        raise InputError(
+            f"--pose-frames {options.pose_frames}", "names no two frames", "give base and tool: base_link,tool0"
+        )
+    if options.pose_topic is not None or options.robot is not None:
+        other = "--pose-topic" if options.pose_topic is not None else "--robot"
+        raise InputError("--pose-frames", f"says where the pose is, and so does {other}", "give one of them")
+    return names[0], names[1]
 
 
 def _clock(path: Path, recorded: Recorded, zero: int, rate: float | None, option: str) -> dict[str, Float]:
@@ -238,7 +182,9 @@ def _clock(path: Path, recorded: Recorded, zero: int, rate: float | None, option
 
 def _pose(path: Path, recorded: Recorded, zero: int, options: ReadOptions, tool_poses: ToolPoses) -> Columns:
     columns = _clock(path, recorded, zero, options.rate, "--rate")
-    if recorded.kind == JOINTS:
+    if recorded.kind == "tf":
+        values = recorded.messages
+    elif recorded.kind == JOINTS:
         assert options.robot is not None
         names, positions = _joint_positions(path, recorded)
         pose = tool_poses(options.robot, options.arm, names, positions)
@@ -279,7 +225,7 @@ def _wrench(path: Path, recorded: Recorded, zero: int, options: ReadOptions) -> 
 
 def _frame_note(recorded: Sequence[Recorded], options: ReadOptions, meta: Mapping[str, Any]) -> list[str]:
     """What the headers say about axes, which only a person can relate to base and tool."""
-    pose, wrench = (str(r.messages[0].header.frame_id) for r in recorded)
+    pose, wrench = (r.frame for r in recorded)
     declared = options.wrench_frame is not None or "frame" in dict(meta.get("wrench", {}))
     if declared or not wrench or wrench == pose:
         return []

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from skillframe.demonstration.bags import ToolPoses
     from skillframe.demonstration.record import Demonstration
 
-BAG_OPTIONS = ("pose_topic", "wrench_topic", "robot")
+BAG_OPTIONS = ("pose_topic", "pose_frames", "wrench_topic", "robot")
 
 
 def _reader(module: str, function: str) -> Callable[[Path, Mapping[str, Any]], Demonstration]:

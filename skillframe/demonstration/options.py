@@ -48,6 +48,7 @@ class ReadOptions:
         wrench_sign: whose wrench it is; "teacher" is turned round, which holds while inertia is small.
         wrench_includes_tool_weight: whether the tool's weight is still in it.
         pose_topic: topic of a ROS bag with the tool's pose or, with `robot`, its joint states.
+        pose_frames: "BASE,TOOL", frames of a ROS bag's transforms: the tool's pose is that of the second in the first.
         wrench_topic: topic of a ROS bag with the wrench.
         robot: the robot whose joint states a ROS bag holds.
     """
@@ -72,6 +73,7 @@ class ReadOptions:
     wrench_sign: Literal["environment", "teacher"] | None = None
     wrench_includes_tool_weight: bool | None = None
     pose_topic: str | None = None
+    pose_frames: str | None = None
     wrench_topic: str | None = None
     robot: str | None = None
 
