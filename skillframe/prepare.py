@@ -19,6 +19,7 @@ from skillframe.executor import QUANTITIES, Setup
 from skillframe.frames import Float, Pose
 from skillframe.records import CoordinatorType, Document
 from skillframe.registry import registry
+from skillframe.robot.figures import require_figures
 from skillframe.robot.kinematics import UnreachablePose, inverse_kinematics
 from skillframe.robot.model import RobotModel, load_model
 from skillframe.robot.spec import load_robot
@@ -66,10 +67,12 @@ def load_robot_model(name: str) -> RobotModel:
     """A robot by name or path, ready to be simulated.
 
     Raises:
-        SkillframeError: unknown, does not load, has no arm, or needs loops or actuators that a run does not simulate.
+        SkillframeError: unknown, does not load, has no arm, needs loops or actuators that a run does not simulate, or
+            cylinders whose figures are missing or impossible.
     """
     spec = load_robot(name)
     spec.require_simulated()
+    require_figures(spec)
     return load_model(spec)
 
 

@@ -14,11 +14,11 @@ import numpy as np
 
 from skillframe.errors import InputError
 from skillframe.frames import Float
+from skillframe.robot.figures import CYLINDER
 from skillframe.robot.loops import ChainState, ClosedChain, OutOfReach
 from skillframe.robot.spec import Actuation
 
 LEAST_ARM = 0.1  # m; ours: below it a force error of 1 kN at the piston is felt three times less than at mid stroke
-CYLINDER = "hydraulic_cylinder"
 _NEEDED = ("bore", "rod", "stroke", "supply_pressure", "return_pressure")
 
 

@@ -1,4 +1,4 @@
-"""What is worth knowing about a driven machine before it runs: do its loops close, can it stand at home, its limits.
+"""What is worth knowing about a driven machine before it runs: its cylinders' figures, its loops, its home, its limits.
 
 All are warnings: the tree's dynamics are usable either way, and `skillframe run` refuses what it cannot run.
 """
@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 from skillframe.errors import InputError, SkillframeError
 from skillframe.robot.feasibility import problems
+from skillframe.robot.figures import unfit_figures
 from skillframe.robot.loops import ClosedChain
 from skillframe.robot.model import RobotModel
 from skillframe.robot.problems import Problem
@@ -16,12 +17,14 @@ from skillframe.robot.spec import Limits
 
 
 def machine_warnings(robot: RobotModel) -> Iterator[Problem]:
-    """Loops that do not close, a home where the machine cannot stand, limits that were made for arms."""
+    """Figures that no cylinder has, loops that do not close, a home where it cannot stand, limits made for arms."""
+    slips = [_warning("cannot_run", *slip) for one in robot.spec.actuation for slip in unfit_figures(one)]
+    yield from slips
     if not (robot.spec.loop and robot.spec.actuation):
         return
     try:
         chain = ClosedChain(robot)
-        unfit = problems(chain, chain.minimal(robot.home))
+        unfit = [] if slips else problems(chain, chain.minimal(robot.home))
     except SkillframeError as error:
         text, fix = (error.problem, error.fix) if isinstance(error, InputError) else (str(error), "mend robot.toml")
         yield _warning("cannot_run", f"{text}: it can be checked and shown, not run", fix)

@@ -1,15 +1,24 @@
 """What `robots check` says of a machine with loops, and that `robots show` closes them."""
 
+import json
+import re
 import shutil
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from skillframe.cli.main import run
+from skillframe.control.vdc_actuator import cylinders
+from skillframe.errors import InputError
+from skillframe.prepare import load_robot_model
 from skillframe.robot.audit import audit
 from skillframe.robot.describe import as_json, describe
+from skillframe.robot.figures import BELOW, NEEDED, NOT_NEGATIVE, POSITIVE, unfit_figures
 from skillframe.robot.loops import ClosedChain
 from skillframe.robot.model import load_model
-from skillframe.robot.spec import load_robot, robot_names
+from skillframe.robot.spec import Actuation, load_robot, robot_names
 
 
 @pytest.fixture
@@ -64,3 +73,80 @@ def test_show_closes_the_loops_whatever_home_says_of_their_rods(changed):
     assert np.abs(ClosedChain(robot).gaps(np.array(homes))).max() < 1e-12  # as closed as `configuration` makes them
     np.testing.assert_allclose(homes, given.home, atol=1e-9)
     assert "payload 475 kg in 'end_object', rated for 475 kg" in describe(robot)
+
+
+LIFT = load_robot("hiab_xs031").actuation[0]
+
+
+def with_figure(name, value):
+    return replace(LIFT, parameters={**LIFT.parameters, name: value})
+
+
+def test_check_and_the_controller_need_the_same_figures():
+    for name in NEEDED:
+        rest = {key: value for key, value in LIFT.parameters.items() if key != name}
+        bare = [Actuation(joint="lift_piston", fmu=LIFT.fmu, parameters=rest)]
+        with pytest.raises(InputError) as refused:
+            cylinders(bare)
+        assert [unfit.problem for unfit in unfit_figures(bare[0])] == [refused.value.problem]
+    only = {name: LIFT.parameters[name] for name in NEEDED}
+    one = Actuation(joint="lift_piston", fmu=LIFT.fmu, parameters=only)
+    assert unfit_figures(one) == []
+    cylinders([one])
+
+
+@pytest.mark.parametrize("name", NEEDED)
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -1.0, "0.08", [1.0], True, 0.0])
+def test_a_figure_that_cannot_be_is_named_with_its_actuator(name, value):
+    found = unfit_figures(with_figure(name, value))
+    if value == 0.0 and name in NOT_NEGATIVE:
+        assert found == []
+        return
+    assert len(found) == 1
+    assert found[0].problem.startswith(f"parameters.{name} of the cylinder on lift_piston is {value!r}; it must be ")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("rod", 0.08, "has rod 0.08, not below its bore 0.08"),
+        ("return_pressure", 191e5, "has return_pressure 1.91e+07, not below its supply_pressure 1.9e+07"),
+        ("rated_drop_is_per_edge", "false", "must be true or false"),
+        ("deadband", 1.0, "must be below 1"),
+        ("spool_frequency", 0.0, "must be greater than zero"),
+        ("presliding_length", -1e-4, "must be greater than zero"),
+        ("deadvolume_a", 3e-3, "unknown figure 'deadvolume_a'; did you mean 'dead_volume_a'?"),
+    ],
+)
+def test_figures_that_contradict_each_other_or_are_misspelled_are_named(name, value, words):
+    assert [words in unfit.problem for unfit in unfit_figures(with_figure(name, value))] == [True]
+
+
+def test_another_makers_parameters_are_its_own_and_only_what_stands_for_ours_is_judged():
+    theirs = replace(LIFT, fmu="winch.fmu", parameters={"stroke": -590, "d": "x"}, nominal=dict(LIFT.parameters))
+    assert unfit_figures(theirs) == []
+    wrong = replace(theirs, nominal={**LIFT.parameters, "bore": 0})
+    assert [unfit.problem[:33] for unfit in unfit_figures(wrong)] == ["nominal.bore of the cylinder on l"]
+
+
+def test_the_ranges_are_those_that_the_fmu_itself_refuses_outside():
+    source = (Path(__file__).parents[3] / "fmus" / "hydraulic_cylinder" / "checks.h").read_text(encoding="utf-8")
+    positive, not_negative = (
+        {word.lower() for word in re.findall(r"[A-Z_]+", body)} for body in re.findall(r"\[\] = \{([^}]*)\}", source)
+    )
+    assert POSITIVE - {"supply_pressure"} == positive  # that one is above return_pressure in the source
+    assert NOT_NEGATIVE - {"return_pressure"} == not_negative  # ours, as the module says
+    for name, limit in BELOW.items():
+        assert f"v[{name.upper()}] < {limit}" in source
+
+
+def test_check_finds_what_a_run_refuses_and_both_say_it_in_the_same_words(changed, tmp_path, capsys):
+    robot = changed(("dead_volume_b = 4e-3, ", ""), ("leakage = 1e-16", "leakage = nan"))
+    found = [problem for problem in audit(robot).problems if problem.code == "cannot_run"]
+    assert "the cylinder on tilt_piston has no dead_volume_b" in [problem.message for problem in found]
+    assert sum("parameters.leakage of the cylinder on" in problem.message for problem in found) == 3
+    assert run(["robots", "check", str(tmp_path / "crane"), "--json"]) == 0
+    assert [one["code"] for one in json.loads(capsys.readouterr().out)["problems"]] == ["cannot_run"] * 4
+    with pytest.raises(InputError) as refused:
+        load_robot_model(str(tmp_path / "crane"))
+    assert str(refused.value) == f"{tmp_path / 'crane' / 'robot.toml'}: {found[0].message}; {found[0].fix}"
