@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from skillframe.actuation.delay import require_delay
 from skillframe.errors import UnknownName
 from skillframe.frames import Float, Pose, matrix_from_quaternion, norm, rotate, rotation_matrix, rotation_vector, unit
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
@@ -90,6 +91,7 @@ class TeacherSettings:
     def __post_init__(self) -> None:
         if self.kind not in ("kinesthetic", "teleoperation"):
             raise UnknownName("teacher", self.kind, ["kinesthetic", "teleoperation"])
+        require_delay(self.delay_s, "teacher: delay_s")
 
 
 class Teacher(Skill):

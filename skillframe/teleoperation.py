@@ -26,7 +26,7 @@ from math import hypot, inf, pi, radians
 
 import numpy as np
 
-from skillframe.actuation.delay import CommandDelay
+from skillframe.actuation.delay import CommandDelay, require_delay
 from skillframe.conditioning.rates import RateFilter
 from skillframe.errors import InputError
 from skillframe.frames import Float, Pose
@@ -38,7 +38,6 @@ __all__ = ["Channel", "Operator", "OperatorSettings", "loop_gain", "require_stab
 
 BLOCK = 500
 TREMOR_MEMORY = 0.2  # s; the tremor's bandwidth is 1 / (pi x 0.2 s) = 1.6 Hz (ours)
-LONGEST_DELAY = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,14 +81,14 @@ class OperatorSettings:
     kind: str = "teleoperation"
 
     def __post_init__(self) -> None:
-        for name in ("delay_s", "aim_noise", "tremor", "quantum"):
+        for name in ("aim_noise", "tremor", "quantum"):
             self._require(name, 0.0 <= getattr(self, name) < inf, "must not be negative")
         for name in (
             "scale", "force_scale", "hand_stiffness", "hand_damping", "mass", "speed", "force_max", "tremor_hz",
             "packet_hz", "force_clip", "filter_hz", "stiffness", "damping",
         ):  # fmt: skip
             self._require(name, 0.0 < getattr(self, name) < inf, "must be positive")
-        self._require("delay_s", self.delay_s <= LONGEST_DELAY, f"must be at most {LONGEST_DELAY:g} s")
+        require_delay(self.delay_s, "teleoperation: delay_s")
 
     def _require(self, name: str, fine: bool, text: str) -> None:
         if not fine:

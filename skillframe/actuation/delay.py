@@ -5,7 +5,27 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.errors import InputError
 from skillframe.frames import Float
+
+LONGEST_DELAY = 1.0
+"""Of a channel or a valve [s]; buses and valves take milliseconds, so more is a number in another unit (our choice)."""
+
+
+def require_delay(seconds: float, where: object) -> None:
+    """Refuse a delay that no channel has.
+
+    Args:
+        seconds: [s].
+        where: what it is called, for the message.
+
+    Raises:
+        InputError: negative, longer than a second, or no number.
+    """
+    if not 0.0 <= seconds <= LONGEST_DELAY:
+        text = f"cannot be {seconds:g} s, a delay lies between 0 and {LONGEST_DELAY:g} s"
+        hint = f": {seconds:g} ms is {1e-3 * seconds:g}" if LONGEST_DELAY < seconds <= 1e3 * LONGEST_DELAY else ""
+        raise InputError(where, text, f"give it in seconds{hint}")
 
 
 class CommandDelay:

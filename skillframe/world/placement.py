@@ -10,6 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from skillframe.actuation.delay import require_delay
 from skillframe.errors import InputError, UnknownName
 from skillframe.frames import Float, Pose, matrix_from_quaternion
 from skillframe.robot.kinematics import inverse_kinematics
@@ -40,7 +41,7 @@ def check_quantities(draws: Mapping[str, Float], robot: RobotModel | None = None
 
     Raises:
         UnknownName: with the nearest name.
-        InputError: a negative friction or noise, no mass, or a value beyond all machines.
+        InputError: a negative friction or noise, no mass, a delay that no valve has, or a value beyond all machines.
     """
     for key, values in draws.items():
         if key not in QUANTITIES:
@@ -52,6 +53,8 @@ def check_quantities(draws: Mapping[str, Float], robot: RobotModel | None = None
             raise InputError(key, f"cannot be {largest:g}", "give it in SI units, angles in radians")
         if ".tilt_" in key and largest > np.pi:
             raise InputError(key, f"cannot be {largest:g} rad", "give an angle in radians, not in degrees")
+        if key == "actuator.delay":
+            require_delay(least if least < 0.0 else largest, key)
         if least < 0.0 and key in NOT_NEGATIVE:
             raise InputError(key, f"cannot be negative, is {least:g}", "give 0 or more")
         if least <= 0.0 and key == "robot.mass_scale":

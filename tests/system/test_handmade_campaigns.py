@@ -34,6 +34,7 @@ SLIPS = {
     "a skill cut off": ("push.skill", "cut.skill", "cut.skill.json: is cut off at line 1"),
     "one skill, no list": ('["push.skill.json"]', "'push.skill.json'", "campaign.skills: expected a list"),
 }
+MACHINE = {"free_tool": "hiab_xs031", "valley": "pallets", "start.tilt_y": "actuator.delay", "[-0.2, 0.2]": "[0, 5]"}
 
 
 @pytest.fixture
@@ -61,3 +62,16 @@ def test_a_slip_is_refused_before_anything_is_made(
 def test_what_is_right_runs_from_a_file_with_a_byte_order_mark(campaign: Path) -> None:
     campaign.write_text("\ufeff" + TEXT)
     assert run(["campaign", "run", str(campaign), "--out", str(campaign.parent / "out")]) == 0
+
+
+def test_a_delay_in_milliseconds_is_refused_before_anything_is_made(
+    campaign: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = TEXT
+    for old, new in MACHINE.items():
+        text = text.replace(old, new)
+    campaign.write_text(text)
+    assert run(["campaign", "run", str(campaign), "--out", str(campaign.parent / "out")]) == 2
+    words = "actuator.delay: cannot be 5 s, a delay lies between 0 and 1 s; give it in seconds: 5 ms is 0.005"
+    assert words in capsys.readouterr().err
+    assert not (campaign.parent / "out").exists()

@@ -7,6 +7,7 @@ from skillframe import teleoperation
 from skillframe.errors import InputError
 from skillframe.frames import Pose
 from skillframe.skill import Observation
+from skillframe.teacher import TeacherSettings
 from skillframe.teleoperation import Channel, Operator, OperatorSettings, loop_gain, require_stable_loop
 from skillframe.world.scene import Task
 
@@ -117,10 +118,12 @@ def test_what_must_be_positive_is_named(name):
         replace(STEADY, **{name: 0.0})
 
 
-@pytest.mark.parametrize("delay", [-0.01, 2.0])
-def test_a_delay_that_makes_no_sense_is_refused(delay):
-    with pytest.raises(InputError, match="delay_s"):
-        replace(STEADY, delay_s=delay)
+@pytest.mark.parametrize("delay", [-0.01, 2.0, float("nan")])
+@pytest.mark.parametrize("settings", [OperatorSettings, TeacherSettings])
+def test_a_delay_that_makes_no_sense_is_refused(settings, delay):
+    settings(delay_s=1.0)
+    with pytest.raises(InputError, match=r"delay_s: cannot be .* give it in seconds"):
+        settings(delay_s=delay)
 
 
 @pytest.mark.parametrize("ticks", [0, 1, 50, 150])

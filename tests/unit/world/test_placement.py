@@ -85,6 +85,22 @@ def test_rates_that_divide_give_their_ratio_and_others_are_refused_in_words():
             ratio(1000.0, slow, "control", "the trace")
 
 
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        (5.0, "cannot be 5 s, a delay lies between 0 and 1 s; give it in seconds: 5 ms is 0.005"),
+        (-0.01, "cannot be -0.01 s.*; give it in seconds$"),
+        (1e4, "cannot be 10000 s.*; give it in seconds$"),
+        (np.nan, "cannot be nan"),
+    ],
+)
+def test_a_delay_that_no_valve_has_is_refused_with_its_unit(value, message):
+    crane = load_model(load_robot("hiab_xs031"))
+    check_quantities({"actuator.delay": np.array([0.0, 1.0])}, crane)
+    with pytest.raises(InputError, match=f"actuator.delay: {message}"):
+        check_quantities({"actuator.delay": np.array([0.01, value])}, crane)
+
+
 @pytest.mark.parametrize("key", ["sensor.force_noise", "sensor.torque_bias_x", "start.tilt_y"])
 def test_what_would_do_nothing_on_a_hydraulic_machine_is_refused_there_and_taken_elsewhere(key):
     draws = {key: np.array([0.1])}
