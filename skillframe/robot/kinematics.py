@@ -11,7 +11,7 @@ Joint limits by clipping each step and leaving clipped joints out of the next, a
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import pinocchio as pin
@@ -34,14 +34,20 @@ class UnreachablePose(SkillframeError):
 
     Attributes:
         arm: name of the arm; residual_m, residual_rad: what the nearest configuration found still misses.
+        limits: the limit [rad or m], by name, of every joint that stands there and would have to go on.
     """
 
-    def __init__(self, arm: str, pose: Pose, residual_m: float, residual_rad: float) -> None:
-        self.arm, self.residual_m, self.residual_rad = arm, residual_m, residual_rad
+    def __init__(
+        self, arm: str, pose: Pose, residual_m: float, residual_rad: float, limits: Mapping[str, float] | None = None
+    ) -> None:
+        self.arm, self.residual_m, self.residual_rad, self.limits = arm, residual_m, residual_rad, dict(limits or {})
         place = ", ".join(f"{x:.3f}" for x in pose.position)
+        stuck = ", ".join(f"{name} at {limit:.4g}" for name, limit in self.limits.items())
         super().__init__(
             f"arm {arm!r} does not reach the pose at ({place}) m: the nearest configuration found misses it by "
-            f"{1e3 * residual_m:.1f} mm and {np.degrees(residual_rad):.1f} degrees; move the fixture or the start"
+            f"{1e3 * residual_m:.1f} mm and {np.degrees(residual_rad):.1f} degrees"
+            + (f", held by joint limits (rad or m): {stuck}" if stuck else "")
+            + "; move the fixture or the start"
         )
 
 
@@ -118,9 +124,9 @@ def inverse_kinematics(robot: RobotModel, arm: str | int, pose: Pose, q0: Float)
         if left @ left < error @ error:
             best, error = q, left
     residual = _error(pose, tool_pose(robot.model, best, frame))
-    raise UnreachablePose(
-        robot.spec.arm[index].name, pose, float(np.linalg.norm(residual[:3])), float(np.linalg.norm(residual[3:]))
-    )
+    missed, turned = float(np.linalg.norm(residual[:3])), float(np.linalg.norm(residual[3:]))
+    held = _holding_limits(robot.model, frame, best, residual)
+    raise UnreachablePose(robot.spec.arm[index].name, pose, missed, turned, held)
 
 
 def random_configuration(model: pin.Model, rng: np.random.Generator) -> Float:
@@ -192,6 +198,19 @@ def _descend(model: pin.Model, frame: int, pose: Pose, q0: Float) -> tuple[Float
             break
         q = clipped
     return q, error
+
+
+def _holding_limits(model: pin.Model, frame: int, q: Float, error: Float) -> dict[str, float]:
+    """Limits that joints stand at by name, of those that the error (6,) would drive on: J^T e points out of them."""
+    low, high, bounded = _bounds(model)
+    drive = pin.computeFrameJacobian(model, model.createData(), q, frame, _LWA).T @ error
+    found = {}
+    for name, joint in zip(list(model.names)[1:], list(model.joints)[1:], strict=True):
+        if joint.nq == 1 and bounded[i := joint.idx_q]:
+            limit = high[i] if drive[joint.idx_v] > 0.0 else low[i]
+            if abs(q[i] - limit) < _TOLERANCE and abs(drive[joint.idx_v]) > _TOLERANCE:
+                found[name] = float(limit)
+    return found
 
 
 def _columns(model: pin.Model, bounded: Flags) -> tuple[list[int], list[int]]:

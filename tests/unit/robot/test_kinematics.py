@@ -1,5 +1,7 @@
 """Laws of kinematics and dynamics, and inverse kinematics as the inverse of forward kinematics."""
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -123,6 +125,40 @@ def test_a_pose_out_of_reach_is_refused_with_what_is_missing(panda):
     with pytest.raises(UnreachablePose, match="arm 'arm' does not reach") as error:
         inverse_kinematics(panda, "arm", Pose(np.array([1.5, 0.0, 0.3]), DOWN), panda.home)
     assert 0.3 < error.value.residual_m < 1.0  # 1.5 m against 0.855 m of reach from 0.333 m of height
+
+
+def _narrowed(panda, name, upper):
+    """The arm with less range [rad] in one joint."""
+    model = panda.model.copy()
+    limits = model.upperPositionLimit
+    limits[model.joints[model.getJointId(name)].idx_q] = upper
+    model.upperPositionLimit = limits
+    return replace(panda, model=model)
+
+
+@pytest.mark.parametrize("upper", [-1.8, -2.1, -2.4])
+def test_a_joint_named_in_a_refusal_stands_at_its_limit_and_that_limit_is_what_holds_the_arm(panda, upper):
+    name = "joint4"  # the elbow alone decides how far the arm reaches; every other joint has a way round
+    pose = Pose(np.array([0.7, 0.0, 0.45]), DOWN)  # the whole arm reaches it
+    inverse_kinematics(panda, "arm", pose, panda.home)
+    with pytest.raises(UnreachablePose, match=rf"held by joint limits \(rad or m\): .*{name} at {upper}") as error:
+        inverse_kinematics(_narrowed(panda, name, upper), "arm", pose, panda.home)
+    assert error.value.limits[name] == upper
+    less = upper - 0.1  # the further the limit is in the way, the more is missing
+    with pytest.raises(UnreachablePose) as worse:
+        inverse_kinematics(_narrowed(panda, name, less), "arm", pose, panda.home)
+    assert worse.value.residual_m + worse.value.residual_rad > error.value.residual_m + error.value.residual_rad
+
+
+def test_no_limit_is_named_where_none_holds_the_arm(save, urdf):
+    parts = [urdf.link("l0")]
+    for i, axis in enumerate(["0 0 1", "1 0 0", "1 0 0", "0 0 1", "1 0 0", "0 0 1"]):
+        parts += [urdf.link(f"l{i + 1}", urdf.inertial(1, 0.3))]
+        parts += [urdf.joint(f"j{i}", f"l{i}", f"l{i + 1}", "continuous", axis, inside="")]
+    arm = load_model(load_robot(save(urdf.robot(*parts), '[[arm]]\nname = "arm"\ntool_frame = "l6"')))
+    with pytest.raises(UnreachablePose) as error:
+        inverse_kinematics(arm, "arm", Pose(np.array([50.0, 0.0, 0.0]), DOWN), arm.home)
+    assert error.value.limits == {} and "limits" not in str(error.value)
 
 
 @pytest.mark.parametrize("base", ["free_tool", "tree"])
