@@ -7,6 +7,8 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import zip_longest
+from textwrap import wrap
 from typing import Any
 
 import click
@@ -17,15 +19,36 @@ def emit_json(value: Any) -> None:
     click.echo(json.dumps(value, indent=2, sort_keys=True, allow_nan=False, ensure_ascii=False))
 
 
-def table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
-    """Print rows under headings: a drawn table on a terminal, plain aligned columns in a pipe."""
+PAGE_WIDTH = 110
+"""Columns of text that a page or an editor shows without breaking lines of its own accord."""
+
+
+def table(columns: Sequence[str], rows: Sequence[Sequence[object]], width: int | None = None) -> None:
+    """Print rows under headings: a drawn table on a terminal, plain aligned columns in a pipe.
+
+    Args:
+        columns: headings.
+        rows: cells.
+        width: in a pipe, of the whole; what does not fit goes on below in its own column. None: a line per row.
+    """
     texts = [[str(cell) for cell in row] for row in rows]
     if sys.stdout.isatty():
         _drawn(columns, texts)
         return
-    widths = [max(len(line[i]) for line in [columns, *texts]) for i in range(len(columns))]
-    for line in [columns, *texts]:
-        click.echo("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip())
+    natural = [max(len(line[i]) for line in [columns, *texts]) for i in range(len(columns))]
+    widths = natural if width is None else _narrowed(natural, width - 2 * (len(columns) - 1))
+    for i, line in enumerate([columns, *texts]):
+        if i > 1 and widths != natural:
+            click.echo()  # rows of several lines are told apart by an empty one
+        cells = [wrap(cell, at) if len(cell) > at else [cell] for cell, at in zip(line, widths, strict=True)]
+        for parts in zip_longest(*cells, fillvalue=""):
+            click.echo("  ".join(part.ljust(at) for part, at in zip(parts, widths, strict=True)).rstrip())
+
+
+def _narrowed(natural: Sequence[int], room: int) -> list[int]:
+    """Widths that share a room: as wide as they are, but none above a cap that makes them fit."""
+    cap = next((c for c in range(max(natural), 0, -1) if sum(min(c, n) for n in natural) <= room), 1)
+    return [min(cap, n) for n in natural]
 
 
 @contextmanager

@@ -39,7 +39,7 @@ def command(
     \b
     Example:
       skillframe reproduce --quick --out reproduce
-      skillframe reproduce 2 --set world.friction=0.3 --out steeper
+      skillframe reproduce 2 --set world.friction=0.3 --out rougher
     """
     from skillframe.config import parse_setting
     from skillframe.registry import registry
@@ -60,7 +60,7 @@ def _tell(text: str) -> None:
 
 
 def _list(rows: Sequence[Any], as_json: bool) -> int:
-    from skillframe.cli.output import emit_json, table
+    from skillframe.cli.output import PAGE_WIDTH, emit_json, table
 
     keys = ("summary", "published", "source", "bar", "calibrated")
     found = [{"row": r.name, **{k: getattr(r, k) for k in keys}, "settings": dict(r.settings)} for r in rows]
@@ -68,7 +68,7 @@ def _list(rows: Sequence[Any], as_json: bool) -> int:
         emit_json(found)
     else:
         lines = [(f["row"], f["summary"], f["published"], _settings(f["settings"])) for f in found]
-        table(("row", "what", "published", "settings"), lines)
+        table(("row", "what", "published", "settings"), lines, PAGE_WIDTH)
     return 0
 
 
@@ -108,7 +108,7 @@ def _end(outcome: Outcome, out: Path, quick: bool, as_json: bool) -> int:
 
 
 def _show(entries: Sequence[Mapping[str, Any]], as_json: bool) -> None:
-    from skillframe.cli.output import emit_json, table
+    from skillframe.cli.output import PAGE_WIDTH, emit_json, table
     from skillframe.reproduce import store
 
     if as_json:
@@ -116,4 +116,4 @@ def _show(entries: Sequence[Mapping[str, Any]], as_json: bool) -> None:
         return
     columns = ("row", "summary", "published", "ours", "verdict", "values_are", "wall_s")
     head = ("row", "what", "published", "ours", "verdict", "values", "wall [s]")
-    table(head, [[each[c] for c in columns] for each in entries])
+    table(head, [[each[c] for c in columns] for each in entries], PAGE_WIDTH)

@@ -1,6 +1,13 @@
-import pytest
+from contextlib import redirect_stdout
+from io import StringIO
 
-from skillframe.cli.output import progress
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from skillframe.cli.main import run
+from skillframe.cli.output import PAGE_WIDTH, progress, table
+from skillframe.cli.reproduce import _show
 
 
 def test_long_work_in_a_pipe_says_a_line_per_tenth_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
@@ -16,3 +23,36 @@ def test_work_that_is_over_soon_says_nothing_in_a_pipe(capsys: pytest.CaptureFix
     with progress("s simulated", after_s=3600.0) as show:
         show(0.5, 1.0)
     assert capsys.readouterr().err == ""
+
+
+WORDS = st.lists(st.text("abc-.", min_size=1, max_size=30), max_size=30).map(" ".join)
+
+
+@given(
+    st.lists(st.lists(WORDS, min_size=4, max_size=4), min_size=1, max_size=5), st.integers(40, 120)
+)  # headings fit in 40
+def test_a_table_of_a_width_keeps_it_in_a_pipe_and_every_cell_whole_in_its_column(
+    rows: list[list[str]], width: int
+) -> None:
+    out = StringIO()
+    with redirect_stdout(out):
+        table(("one", "two", "three", "four"), rows, width)
+    lines = out.getvalue().splitlines()
+    assert max(map(len, lines)) <= width
+    starts = [lines[0].index(head) for head in ("one", "two", "three", "four")]
+    columns = [slice(a, b) for a, b in zip(starts, [*starts[1:], None], strict=True)]
+    said = ["".join(line[column] for line in lines[1:]).replace(" ", "") for column in columns]
+    assert said == ["".join(row[i] for row in rows).replace(" ", "") for i in range(4)]
+
+
+def test_a_table_that_fits_its_width_has_a_line_per_row(capsys: pytest.CaptureFixture[str]) -> None:
+    table(("name", "what"), [["a", "x y"], ["b", "z"]], 12)
+    assert capsys.readouterr().out.splitlines() == ["name  what", "a     x y", "b     z"]
+
+
+def test_what_reproduce_says_in_a_pipe_fits_a_page(capsys: pytest.CaptureFixture[str]) -> None:
+    keys = ("row", "summary", "published", "ours", "verdict", "values_are", "wall_s")
+    entries = [dict.fromkeys(keys, "published figures of which there is much to say " * 4)]
+    _show(entries, as_json=False)
+    assert run(["reproduce", "--list"]) == 0
+    assert max(map(len, capsys.readouterr().out.splitlines())) <= PAGE_WIDTH
