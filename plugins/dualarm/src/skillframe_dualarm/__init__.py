@@ -20,6 +20,12 @@ def _learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Do
     return learn(demonstrations, options)
 
 
+def _settings() -> type:
+    from skillframe_dualarm.learner import Settings
+
+    return Settings
+
+
 def _check(document: Document) -> None:
     from skillframe_dualarm.document import read_phase
 
@@ -55,6 +61,7 @@ def skillframe_coordinators() -> Iterable[CoordinatorType]:
         build=_build,
         check=_check,
         learn=_learn,
+        settings=_settings,
         describe=_describe,
         centers=_centers,
     )
