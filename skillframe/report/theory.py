@@ -107,7 +107,7 @@ def theory_sentence(found: Sequence[Region], varied: Sequence[str]) -> Markup:
     """What the dashed lines are."""
     if not found:
         return Markup("")
-    text = f" Dashed: the border within which closed-form theory predicts success from any start, {_all(found)}"
+    text = f" Dashed: closed-form theory predicts that a compliant push succeeds from any start within {_all(found)}"
     worlds = [n for n in varied if n.startswith("world.") and not any(n in region.over for region in found)]
     nominal = f" (at the nominal {', '.join(quantity(n).label for n in worlds)}, which varied)" if worlds else ""
     beyond = "; beyond it, some starts may succeed."
