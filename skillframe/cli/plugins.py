@@ -93,7 +93,9 @@ def _default(value: Any) -> str:
     """As it would be typed; nothing where the recordings decide."""
     if value is None:
         return ""
-    return f"={value:.6g}" if isinstance(value, float) else f"={str(value).lower()}"
+    if isinstance(value, bool):
+        return f"={str(value).lower()}"
+    return f"={value:.6g}" if isinstance(value, float) else f"={value}"
 
 
 def distribution_rows(registry: Registry) -> list[dict[str, Any]]:

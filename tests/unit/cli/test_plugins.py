@@ -205,6 +205,14 @@ def test_show_says_what_can_be_set_of_a_world_with_defaults_and_meaning(capsys):
     assert "--set world.clearance=0.00025" in capsys.readouterr().out
 
 
+@pytest.mark.needs_plugins
+def test_a_default_is_shown_as_it_would_be_typed(capsys):
+    assert run(["plugins", "show", "dual_arm"]) == 0
+    assert "--set configuration=B" in capsys.readouterr().out
+    assert run(["plugins", "show", "lmc"]) == 0
+    assert "--set contact_only=false" in capsys.readouterr().out
+
+
 def test_show_of_what_is_not_there_names_the_nearest(capsys):
     assert run(["plugins", "show", "peg_in_hold"]) == 2
     assert "did you mean 'peg_in_hole'?" in capsys.readouterr().err

@@ -29,8 +29,8 @@ class Settings:
     """What `learn --set` can change; the other keys go to the learner of the primitive.
 
     Attributes:
-        configuration: "A" to "E", which arm gives way in what: A the first about its wrist, B the first about the tip, C
-            the second, D both in rotation only, E both.
+        configuration: "A" to "E", which arm gives way in what: A the first about its wrist, B the first about the tip,
+            C the second, D both in rotation only, E both.
         mode: "independent", or "relative" for the relative task. Any other setting is one of `lmc`, which finds the
             push and the axes; speeds and stiffnesses are `dual_arm`'s own.
     """
