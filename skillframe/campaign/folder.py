@@ -124,9 +124,7 @@ def _copy_robot(spec: CampaignSpec, target: Path) -> str:
         if (folder / spec.robot / "robot.toml").is_file():
             return _copy_robot_file(folder / spec.robot / "robot.toml", target)
     known = [p.parent.name for folder in data_dirs("robots") for p in folder.glob("*/robot.toml")]
-    raise UnknownName(
-        "robot", spec.robot, known, "or give the path of a robot.toml or URDF, relative to the campaign file"
-    )
+    raise UnknownName("robot", spec.robot, known, "or give the path of a robot.toml, relative to the campaign file")
 
 
 def _copy_robot_file(source: Path, target: Path) -> str:

@@ -74,7 +74,7 @@ class CampaignSpec:
         name: for people; the file's name if it has none.
         seed: of every draw; trial i of a seed is the same whatever else runs.
         trials: total number per skill.
-        robot: a robot's name or a path to a robot.toml or URDF, relative to `folder`.
+        robot: a robot's name or a path to a robot.toml or its folder, relative to `folder`.
         world: a world's name.
         skills: "FILE.skill.json" or "TYPE:DEMO,..." (see `entries`), relative to `folder`.
         vary: what varies, by quantity.

@@ -23,7 +23,7 @@ QUIET_S = 5.0  # a recording that is over by then needs no progress
 
 @click.command(name="record")
 @click.option("--world", required=True, help="World to demonstrate (skillframe plugins list names them).")
-@click.option("--robot", default="free_tool", show_default=True, help="Robot name, robot.toml or URDF.")
+@click.option("--robot", default="free_tool", show_default=True, help="Robot name, or its robot.toml or folder.")
 @click.option(
     "--teacher", type=click.Choice(["kinesthetic", "teleoperation", "blind"]), default="kinesthetic", show_default=True
 )

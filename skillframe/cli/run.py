@@ -24,7 +24,7 @@ QUIET_S = 5.0  # a run that is over by then needs no progress
 @click.command(name="run")
 @click.argument("skill")
 @click.option("--world", required=True, help="World to run in (skillframe plugins list names them).")
-@click.option("--robot", default="free_tool", show_default=True, help="Robot name, robot.toml or URDF.")
+@click.option("--robot", default="free_tool", show_default=True, help="Robot name, or its robot.toml or folder.")
 @click.option("--coc", help='Centre of compliance: "x,y,z" in the tool frame, or a frame (tip, wrist) [as learned].')
 @click.option(
     "--set",

@@ -145,6 +145,7 @@ class RobotSpec:
     Attributes:
         name: folder's name, or the URDF's stem; summary: one line for people.
         folder: where relative paths start; urdf: absolute path of the URDF.
+        declared: whether a robot.toml says all this; False for a bare URDF.
         base: "fixed", or "free" for a free-flying body.
         mimic: joints with a URDF mimic tag follow their leader; False makes every joint independent.
         home: joint positions by joint name [rad or m]; joints not named stand at the neutral position.
@@ -156,6 +157,7 @@ class RobotSpec:
     name: str
     folder: Path
     urdf: Path
+    declared: bool = True
     summary: str = ""
     base: Literal["fixed", "free"] = "fixed"
     mimic: bool = True
@@ -179,6 +181,11 @@ class RobotSpec:
         where = self.folder / "robot.toml"
         if self.loop and not self.actuation:
             raise InputError(where, "has [[loop]] and no [[actuation]]", "say which joints of the loops are driven")
+        if not self.declared:
+            write = "write a robot.toml beside it with name and tool_frame of an [[arm]]"
+            raise InputError(
+                self.urdf, "a URDF alone names no arm to run", f"give {where}" if where.is_file() else write
+            )
         if not self.arm:
             raise InputError(where, "names no arm", 'add [[arm]] with name = "arm" and tool_frame = "<a URDF link>"')
 
@@ -220,7 +227,7 @@ def robot_names() -> dict[str, Path]:
 
 def _from_urdf(path: Path) -> RobotSpec:
     path = path.resolve()
-    return RobotSpec(name=path.stem, folder=path.parent, urdf=path)
+    return RobotSpec(name=path.stem, folder=path.parent, urdf=path, declared=False)
 
 
 def _from_toml(path: Path) -> RobotSpec:

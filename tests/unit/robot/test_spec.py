@@ -32,8 +32,14 @@ def test_a_users_own_robots_come_before_the_shipped_ones(save, urdf, tmp_path, m
 def test_a_bare_urdf_is_a_robot_on_a_fixed_base_without_arms(save, urdf):
     spec = load_robot(save(urdf.tree(0, 2)))
     assert (spec.base, spec.arm, spec.mimic) == ("fixed", (), True)
-    with pytest.raises(InputError, match="names no arm"):
+    with pytest.raises(InputError, match=r"a URDF alone names no arm to run; write a robot\.toml beside it"):
         spec.require_simulated()
+
+
+def test_a_bare_urdf_that_cannot_run_names_the_robot_toml_beside_it(save, urdf):
+    toml = save(urdf.tree(0, 2), '[[arm]]\nname = "arm"\ntool_frame = "a"')
+    with pytest.raises(InputError, match=f"a URDF alone names no arm to run; give {toml}"):
+        load_robot(toml.with_name("made.urdf")).require_simulated()
 
 
 @pytest.mark.parametrize(
