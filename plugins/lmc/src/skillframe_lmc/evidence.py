@@ -88,7 +88,8 @@ def _direction_message(part: Learned, settings: Settings, open_direction: bool) 
 def _no_direction_message(part: Learned, choice: Choice, settings: Settings) -> str:
     """Why there is no direction: the demonstrations disagree, or each by itself bends too much."""
     angle, allowed = degrees(choice.pyramid_angle), degrees(settings.pyramid_max_rad)
-    taken = f"{angle:.0f} degrees" if angle < 90.0 else "more than 90 degrees"
+    digits = 1 if round(angle) == round(allowed) else 0  # 25.3 and not 25 degrees, where 25 are allowed
+    taken = f"{angle:.{digits}f} degrees" if angle < 90.0 else "more than 90 degrees"
     text = (
         f"no one {_push(part)} explains what was seen: the hand would have had to waver by {taken}, and {allowed:.0f} "
         "are allowed"
