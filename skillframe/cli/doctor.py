@@ -56,7 +56,10 @@ def command(as_json: bool) -> int:
     if as_json:
         emit_json([asdict(finding) for finding in findings])
     else:
-        table(("what", "found", "needed for"), [[f.name, f.found or "MISSING", f.needed_for] for f in findings])
+        table(
+            ("what", "found", "needed for"),
+            [[f.name, f.found or ("MISSING" if f.required else "not found"), f.needed_for] for f in findings],
+        )
         for finding in findings:
             if finding.fix:
                 click.echo(f"{finding.name}: {finding.fix}")

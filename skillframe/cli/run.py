@@ -146,9 +146,10 @@ def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) ->
     click.echo("success" if meta["success"] else f"failure: {meta['failure']}")
     ended = f"  ended after {meta['duration_s']:.2f} s ({meta['reason']})"
     if None not in outcome.values():
+        missed, turned = _hundredths(meta["final_error_m"] * 1000), _hundredths(math.degrees(meta["final_error_rad"]))
         ended += (
-            f"; largest contact force {meta['peak_force_n']:.1f} N; {_hundredths(meta['final_error_m'] * 1000)} mm and "
-            f"{_hundredths(math.degrees(meta['final_error_rad']))} degrees from the goal"
+            f"; peak contact force in the simulator {meta['peak_force_n']:.1f} N; "
+            f"{missed} mm and {turned} degrees from the goal"
         )
     click.echo(ended)
     for what, path in files.items():
