@@ -69,6 +69,10 @@ def test_every_python_block_in_the_docs_parses():
             ast.parse(block, filename=str(page))
 
 
+def test_maths_in_the_pages_is_marked_as_the_builder_reads_it():
+    assert not [page.name for page in DOCS.rglob("*.md") if r"\(" in page.read_text(encoding="utf-8")]
+
+
 def commands():
     """Every command by the words that call it; "" is the program itself."""
     from skillframe.cli.main import cli
