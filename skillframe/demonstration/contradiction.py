@@ -16,7 +16,7 @@ Two signatures, both our choice:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,13 @@ LEAST_RESIDUAL, RESIDUAL_RATIO = 0.5, 5.0
 LEAST_PATH, WORK_COSINE, WORK_RATE, WORK_FORCE = 0.02, 0.3, 20.0, 3.0
 LEAST_WEIGHT = 2.0
 LEVEL_TIME = 0.25
+
+
+class Turning(NamedTuple):
+    """A tool's attitude (T, 3, 3) in base, and the torque on it (T, 3) at its point, base axes [N m]."""
+
+    rotation: Float
+    torque: Float
 
 
 def refuse_contradiction(columns: Columns, rotation: Float, declared: Mapping[str, Any]) -> None:
@@ -113,10 +120,12 @@ def _still_weight(force: Float, rotation: Float, frame: str) -> str | None:
     return None
 
 
-def work_cosine(position: Float, force: Float, time: Float) -> tuple[float, float]:
+def work_cosine(position: Float, force: Float, time: Float, turning: Turning | None = None) -> tuple[float, float]:
     """Work of a force over the motion in contact, as a share of \\(\\int |F| |dx|\\), and that motion's length [m].
 
     Contact is where the force exceeds 3 N and 30 % of its 95th percentile; steps are taken at 20 Hz, to keep noise out.
+    With `turning`, work and share are those of the whole wrench, \\(\\int F \\cdot dx + T \\cdot d\\varphi\\) over
+    \\(\\int |F| |dx| + |T| |d\\varphi|\\): where a tool levers, force and torque do opposite work.
     """
     stride = max(1, round(1.0 / (WORK_RATE * float(np.median(np.diff(time))))))
     step = np.diff(position[::stride], axis=0)
@@ -126,6 +135,11 @@ def work_cosine(position: Float, force: Float, time: Float) -> tuple[float, floa
     length = norm(step)[touching]
     total = float((strength[touching] * length).sum())
     work = float((middle[touching] * step[touching]).sum())
+    if turning is not None:
+        attitude, torque = turning.rotation[::stride], turning.torque[::stride][: len(step)][touching]
+        turn = rotate(attitude[:-1], rotation_vector(np.swapaxes(attitude[:-1], -1, -2) @ attitude[1:]))[touching]
+        total += float((norm(torque) * norm(turn)).sum())
+        work += float((torque * turn).sum())
     return (work / total if total > 0.0 else 0.0), float(length.sum())
 
 

@@ -11,12 +11,13 @@ import numpy as np
 
 from skillframe.demonstration.checks import GAP
 from skillframe.demonstration.columns import WRENCH
-from skillframe.demonstration.contradiction import WORK_COSINE, weight_evidence, work_cosine
+from skillframe.demonstration.contradiction import WORK_COSINE, Turning, weight_evidence, work_cosine
 from skillframe.demonstration.record import Demonstration
 from skillframe.frames import Float, norm
 
 Suspicion = Callable[[Demonstration], Iterator[str]]
 FARTHEST, FASTEST = 20.0, 10.0
+PAST_HALF = 0.05  # of the scalar part, 6 degrees beyond half a turn: less is no change of sign that means anything
 LARGEST_FORCE, LONGEST_LEVER = 2e4, 3.0
 UNMEASURED = "unmeasured"
 """Metadata: names of wrench channels that nobody measured, as across a machine's plane; zero says nothing there."""
@@ -45,18 +46,38 @@ def clock(d: Demonstration) -> Iterator[str]:
 
 
 def quaternions(d: Demonstration) -> Iterator[str]:
-    """Values that look w-first where neither header nor metadata say the order."""
+    """Values that look w-first where neither header nor metadata say the order.
+
+    A wrong order is a rotation of the whole curve, as smooth and as fast as the right one, so that no jump tells it.
+    A recorder that writes w >= 0 does: it turns the sign of all four where w passes zero, and the one number that stays
+    on its side is w. Without such a turn only likelihood is left.
+    """
     if d.meta.get("quaternion") is not None:
         return
     q = d.quaternion
     first, last = q[:, 0], q[:, 3]
-    if np.abs(first).min() > 0.9:
+    kept, turns = _kept_positive(q)
+    if kept == [0]:
+        yield (
+            f"quaternion: its sign is turned {turns} times so that qx is never negative, as recorders do for w: "
+            "the values look w-first; store them as qx,qy,qz,qw"
+        )
+    elif kept == [3]:
+        return
+    elif np.abs(first).min() > 0.9:
         yield (
             f"quaternion: the first value stays near 1 (|qx| >= {np.abs(first).min():.3f}): the tool is turned half "
             'about x, or the values are w-first; say quaternion = "xyzw" in the metadata if they are right'
         )
-    elif (first.min() >= 0.0 or first.max() <= 0.0) and last.min() < -0.01 and last.max() > 0.01:
+    elif (first.min() >= 0.0 or first.max() <= 0.0) and last.min() < -PAST_HALF and last.max() > PAST_HALF:
         yield "quaternion: qx never changes sign, but qw does: the values may be w-first"
+
+
+def _kept_positive(q: Float) -> tuple[list[int], int]:
+    """Which numbers of (T, 4) stay on the positive side although the sign is turned now and then, and how often."""
+    turns = int(np.count_nonzero((q[:-1] * q[1:]).sum(axis=1) < 0.0))
+    kept = [i for i in range(4) if turns and q[:, i].min() >= -1e-6 and q[:, i].max() > 1e-6]
+    return kept, turns
 
 
 def motion(d: Demonstration) -> Iterator[str]:
@@ -122,16 +143,23 @@ def spike_indices(force: Float) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
 
 
 def frame_and_sign(d: Demonstration) -> Iterator[str]:
-    """A wrench that looks like one of tool axes, or like the teacher's own."""
+    """A wrench that looks like one of tool axes, or like the teacher's own.
+
+    A passive environment does no work on the tool on balance. Both the force alone and the whole wrench must seem to:
+    a lever's force does work that its torque takes back, and a torque about another point than the tool's does none
+    that means anything. Friction below 0.3 or so is not enough to tell the teacher's wrench (our choice: recordings of
+    real snaps reach +0.2 with the force alone).
+    """
     evidence = weight_evidence(d.wrench[:, :3], d.pose.rotation, "base")
     if evidence is not None:
         yield f'wrench frame: {evidence}; is it in tool axes (wrench.frame = "tool")?'
-    cosine, path = work_cosine(d.position, d.wrench[:, :3], d.time)
-    if cosine > WORK_COSINE and path > 0.02:
+    force, path = work_cosine(d.position, d.wrench[:, :3], d.time)
+    whole, _ = work_cosine(d.position, d.wrench[:, :3], d.time, Turning(d.pose.rotation, d.wrench[:, 3:]))
+    if min(force, whole) > WORK_COSINE and path > 0.02:
         yield (
-            f"wrench sign: it pushes the tool along ({cosine:+.0%} of |F||dx| over {path * 1e3:.0f} mm), which a "
-            'passive environment cannot: the teacher\'s force (wrench.sign = "teacher"), weight or bias in it, or '
-            "another frame"
+            f"wrench sign: it pushes the tool along ({force:+.0%} of |F||dx| over {path * 1e3:.0f} mm, {whole:+.0%} "
+            "with the torque's work), which a passive environment cannot: the teacher's force "
+            '(wrench.sign = "teacher"), weight or bias in it, or another frame'
         )
 
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from skillframe.demonstration.audit import audit, compared
+from skillframe.demonstration.convention import weight_wrench
 from skillframe.demonstration.record import Demonstration
-from skillframe.frames import Float, rotate_spatial
+from skillframe.frames import Float, quaternion_from_matrix, rotate_spatial, rotation_matrix
 
 
 def with_time(demo: Demonstration, change: Callable[[Float], Float]) -> Demonstration:
@@ -136,10 +137,44 @@ def test_stating_the_quaternions_order_silences_the_suspicion(demo: Demonstratio
     assert not any("w-first" in w for w in audit(replace(down, meta={"quaternion": "xyzw"})).warnings)
 
 
-def test_a_wrench_left_in_tool_axes_is_suspected(demo: Demonstration) -> None:
-    from skillframe.demonstration.convention import weight_wrench
-    from skillframe.frames import quaternion_from_matrix, rotation_matrix
+@pytest.mark.parametrize("axis", [[1.0, 0.2, 0.1], [0.1, -1.0, 0.3], [0.4, 0.3, 0.8]])
+def test_a_recorder_that_keeps_w_positive_tells_which_number_is_w(demo: Demonstration, axis: list[float]) -> None:
+    turn = np.linspace(np.pi - 0.3, np.pi + 0.3, 200)[:, None] * np.array(axis) / np.linalg.norm(axis)
+    right = replace(demo, quaternion=quaternion_from_matrix(rotation_matrix(turn)))  # w >= 0: its sign turns at pi
+    assert not any("w-first" in w for w in audit(right).warnings)
+    wrong = replace(right, quaternion=np.roll(right.quaternion, 1, axis=1).copy())
+    assert any("its sign is turned 1 times so that qx is never negative" in w for w in audit(wrong).warnings)
 
+
+def test_a_tool_that_points_down_and_turns_a_little_is_not_taken_for_w_first(demo: Demonstration) -> None:
+    tilt = rotation_matrix(0.02 * np.random.default_rng(0).normal(size=(200, 3)).cumsum(axis=0) / 10.0)
+    down = replace(demo, quaternion=quaternion_from_matrix(tilt @ np.diag([1.0, -1.0, -1.0])))
+    assert np.abs(down.quaternion[:, 0]).min() > 0.9
+    assert not any("w-first" in w for w in audit(down).warnings)
+
+
+@pytest.mark.parametrize(("least", "told"), [(-0.2, True), (-0.02, False)])
+def test_a_scalar_part_that_hardly_passes_zero_is_no_evidence(demo: Demonstration, least: float, told: bool) -> None:
+    w = np.linspace(least, 0.4, 200)
+    rest = np.sqrt(1.0 - w**2)[:, None] * np.array([0.4, 0.8, -np.sqrt(0.2)])
+    found = audit(replace(demo, quaternion=np.column_stack([rest, w]))).warnings
+    assert any("the values may be w-first" in text for text in found) == told
+
+
+def test_a_lever_s_torque_takes_back_what_its_force_gives_and_is_not_taken_for_the_teacher_s(
+    demo: Demonstration,
+) -> None:
+    rotation = rotation_matrix(np.linspace(0.0, 0.8, 200)[:, None] * np.array([0.0, 1.0, 0.0]))
+    arm = rotation @ np.array([0.0, 0.0, 0.1])  # from the edge that the tool turns on to the tool's point
+    push = 10.0 * np.cross([0.0, 1.0, 0.0], arm) / 0.1  # of the edge, along the point's motion
+    turned = replace(demo, position=0.3 + arm, quaternion=quaternion_from_matrix(rotation))
+    whole = replace(turned, wrench=np.hstack([push, np.cross(-arm, push)]))
+    assert not any("wrench sign" in w for w in audit(whole).warnings)
+    bare = replace(turned, wrench=np.hstack([push, np.zeros((200, 3))]))
+    assert any("wrench sign" in w for w in audit(bare).warnings)
+
+
+def test_a_wrench_left_in_tool_axes_is_suspected(demo: Demonstration) -> None:
     rotation = rotation_matrix(np.linspace(0.0, 2.0, 200)[:, None] * np.array([1.0, 0.3, 0.1]))
     base = rotate_spatial(rotation, np.array([5.0, -3, 8, 0, 0, 0])) + weight_wrench(rotation, 0.9, np.zeros(3))
     turning = replace(demo, quaternion=quaternion_from_matrix(rotation))
