@@ -29,9 +29,9 @@ def same(found: Demonstration, demo: Demonstration) -> None:
 @pytest.fixture
 def bags() -> Any:
     pytest.importorskip("rosbags", reason="rosbags is not installed (pip install 'skillframe[ros]')")
-    from tests.unit.demonstration import test_bags
+    from tests.unit.demonstration import bags_written
 
-    return test_bags
+    return bags_written
 
 
 @pytest.mark.parametrize("ending", [".db3", ".mcap"])
