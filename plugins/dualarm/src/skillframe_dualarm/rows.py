@@ -263,8 +263,9 @@ def _picture(sweep: Sweep) -> Illustration:
     canvas.set_ylabel("largest tilt [degrees]")
     canvas.margins(y=0.12)
     canvas.legend(ncols=2, frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=9)
+    ours = " E* is ours: E as a relative task." if "E*" in sweep.names else ""
     caption = (
         "Largest tilt up to which every insertion succeeds; 0 fails at the smallest, and the sweep ends at "
-        f"{max(abs(r.tilt_deg) for r in sweep.rows['A', 'upright']):g} degrees. E* is ours: E as a relative task."
+        f"{max(abs(r.tilt_deg) for r in sweep.rows['A', 'upright']):g} degrees.{ours}"
     )
     return Illustration("Table I of the two-arm paper", caption, svg(figure))
