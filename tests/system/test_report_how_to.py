@@ -1,0 +1,46 @@
+"""What docs/how-to/report.md shows is typed and run, in a folder that holds what the page takes for granted."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from skillframe.cli.main import run
+from tests.unit.report.report_fakes import campaign, trace
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "how-to" / "report.md").read_text(encoding="utf-8")
+
+
+def block(language: str) -> str:
+    return next(iter(re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)))
+
+
+@pytest.fixture
+def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folders and traces that the page names."""
+    for name in ("peg", "valley"):
+        campaign(tmp_path / "results" / name)
+    trace().save(tmp_path / "run1.npz")
+    trace(success=False).save(tmp_path / "run2.npz")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.slow
+def test_the_commands_of_the_page_make_the_pages_that_they_name(results: Path) -> None:
+    lines = [line.partition("#")[0] for line in block("").splitlines()]
+    for line in lines:
+        assert run(shlex.split(line)[1:]) == 0
+    assert sorted(path.name for path in results.glob("*.html")) == ["both.html", "peg.html", "runs.html"]
+    assert len(lines) == 3
+
+
+def test_the_python_of_the_page_writes_the_same_page_as_the_command(results: Path) -> None:
+    exec(compile(block("python"), "report.md", "exec"), {})
+    by_python = (results / "peg.html").read_bytes()
+    (results / "peg.html").unlink()
+    assert run(shlex.split(block("").splitlines()[0].partition("#")[0])[1:]) == 0
+    assert (results / "peg.html").read_bytes() == by_python
