@@ -32,7 +32,7 @@ figure img { max-height: 560px; object-fit: contain; }
 }
 @media (max-width: 520px) {
   .rows th:nth-child(3), .rows td:nth-child(3), .rows th:nth-child(4), .rows td:nth-child(4) { display: none; }
-  .rows td { min-width: 0; } .rows td:first-child { min-width: 1.6rem; }
+  .rows td, .rows td:nth-child(2) { min-width: 0; } .rows td:first-child { min-width: 1.6rem; }
 }
 @media (prefers-color-scheme: dark) { :root:not([data-theme="light"]) img.paper { filter: brightness(0.86); } }
 """
