@@ -32,6 +32,8 @@ FORCE_CAPTION = (
 ESTIMATE_CAPTION = (
     "What the environment does to the tool, as estimated from the pressures; x, y, z are the robot's base axes."
 )
+SHORT_PEAK = 1.1
+"""A peak of the simulator that exceeds what the trace holds by this factor is told beside the plot."""
 POSITION_CAPTION = (
     "Of the centre of compliance, from the start. Dashed: asked for by the skill; where they part, the environment led."
 )
@@ -154,13 +156,24 @@ def run_plots(trace: Trace, force_limit: float | None = None) -> list[Markup]:
     plots = [
         time_plot("Contact force", "N", time, [true_size, *_components(trace.wrench[:, :3], "thin"), size],
                   limit=None if limit is None else float(limit), events=events,
-                  caption=ESTIMATE_CAPTION if trace.machine else FORCE_CAPTION),
+                  caption=(ESTIMATE_CAPTION if trace.machine else FORCE_CAPTION) + _short_peak(trace)),
         time_plot("Position", "mm", time, moved, events=events, caption=POSITION_CAPTION),
         time_plot("Attitude", "°", time, turns, events=events, caption=ATTITUDE_CAPTION),
         time_plot("Contact torque", "Nm", time, _components(trace.wrench[:, 3:], ""), events=events,
                   caption=TORQUE_CAPTION),
     ]  # fmt: skip
     return plots[:2] if trace.machine else plots
+
+
+def _short_peak(trace: Trace) -> str:
+    """What is to be said of a peak between two samples of the trace."""
+    peak, seen = trace.meta.get("peak_force_n"), float(np.nan_to_num(norm(trace.wrench_true[:, :3])).max())
+    if not isinstance(peak, int | float) or len(trace.time) < 2:
+        return ""
+    if not SHORT_PEAK * max(seen, CONTACT_N) < peak < np.inf:
+        return ""
+    between = 1e3 * float(np.median(np.diff(trace.time)))
+    return f" The simulator's peak of {peak:.0f} N lies between samples, which are {between:.0f} ms apart."
 
 
 def demonstration_plots(demonstration: Demonstration) -> Markup:
