@@ -68,7 +68,7 @@ def build(params: DualPegParams) -> Scene:
 
     return Scene(
         name="dual_peg",
-        fixture=hole(params.radius + params.clearance, params.depth, params.boxes, wall=0.025),
+        fixture=(*hole(params.radius + params.clearance, params.depth, params.boxes, wall=0.025), _mount(params)),
         tool=_peg_tool(params),
         holder=Holder(tool=_tool((), MASSES[1], "mouth"), position=(0.0, 0.0, REACH)),
         friction=params.friction,
@@ -94,6 +94,11 @@ def _peg_tool(params: DualPegParams) -> Tool:
         kind="capsule", size=(params.radius, half), position=(0.0, 0.0, REACH - params.radius - half), rgba=TOOL_COLOUR
     )
     return _tool((peg, shaft(0.012, 0.012, REACH - params.length)), MASSES[0], "tip")
+
+
+def _mount(params: DualPegParams) -> Geom:
+    """What joins the hole's bottom to the flange that holds it, to be seen only."""
+    return shaft(0.012, -REACH, max(-params.depth, 0.012 - REACH))
 
 
 def _tool(geoms: tuple[Geom, ...], mass: float, end: str) -> Tool:
