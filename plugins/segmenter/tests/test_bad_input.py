@@ -140,6 +140,9 @@ def test_a_policy_whose_phase_model_does_not_match_its_phases_says_how_many_it_k
         (lambda d: d["phase_model"].update(covariance="wide"), "covariance"),
         (lambda d: d["phase_model"].update(successors=[[1.0, 1.0]]), "phases"),
         (lambda d: d["phase_model"].update(version=99), "version"),
+        (lambda d: d["phase_model"].update(version=1), "segment again"),  # its gate was another
+        (lambda d: d["phase_model"]["gate"].pop("mean"), "mean"),
+        (lambda d: d["phase_model"]["gate"].update(covariance=[[[0.0] * 6] * 6] * 2), "positive definite"),
         (lambda d: d["phase_model"].update(type=3), "phase_model"),
         (lambda d: d.update(recoveries=-1), "recoveries"),
         (lambda d: d["phases"][1].pop("skill"), r"phases\[1\]"),

@@ -1,69 +1,107 @@
-r"""The gate of execution: which phase the contact wrench asks for, whatever the robot does.
+r"""How a phase feels, and the gate of execution: which phase the contact wrench asks for, whatever the robot does.
 
 While a policy runs, the robot's motion is chosen by the phase, so motion is no evidence of a phase: the filter of the
 demonstrations would confirm whatever runs. Only what the environment says counts. The published softmax per pair of
-phases sees one sample a transition and is too weak to decide alone (our finding: 32 of 48 switches within a second);
-tied to its destination it sees every window:
+phases sees one sample a transition and is too weak to decide alone (our finding: 32 of 48 switches within a second).
+Every window of a phase is a sample of how it feels:
 
-    p(j | phi) = softmax_j(w_j . phi),     alpha_t(j) ~ p(j | phi_t) / mean gamma_j  sum_i alpha_{t-1}(i) T(i, j)
+    a ~ N(m_j, C_j),    C_j = (S_j + S) / 2 + 0.05^2 I,    alpha_t(j) ~ N(a_t; m_j, C_j) sum_i alpha_{t-1}(i) T(i, j)
 
-phi is the causal mean of two windows, targets are the posteriors of EM, and T counts the transitions of the most
-likely paths, plus 1e-4. 25 damped diagonal-block Newton steps, ridge 0.05 (ours: a ridge of 1 makes the gate so timid
-that it is a tenth of a second late).
+with a the softly normalised wrench, m_j and S_j its mean and covariance under the posteriors of EM, S the mean of all
+S_j by their windows, and T the transitions of the most likely paths, counted, plus 1e-4 (constants ours). Where the
+covariances are equal this is a softmax of a. A softmax that is fitted instead needs the margin, and finds it in
+whatever differs between three demonstrations, such as the side that a tool leans on; the spread within a phase says
+that this differs anyway, and leaves the sign of friction, which turns with the motion within 0.1 s.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float
-from skillframe_segmenter.transitions import softmax
 
-STEPS, DAMPING, RIDGE = 25, 0.7, 0.05
-MEMORY = 2  # windows
+DIMENSIONS = 6
+FLOOR = 0.05**2
 UNSEEN = 1e-4
 
 
+class Chain(Protocol):
+    """A gate of whatever kind: evidence for each phase, and the chain it drives."""
+
+    @property
+    def memory(self) -> int:
+        """Of how many windows it looks at the mean."""
+
+    @property
+    def share(self) -> Float:
+        """(K,) what each phase has of all windows."""
+
+    @property
+    def transition(self) -> Float:
+        """(K, K) T."""
+
+    def log_evidence(self, regressors: Float) -> Float:
+        """(N, K) for regressors (N, R), up to a constant that all phases share."""
+
+
 class Gate(NamedTuple):
-    """The classifier and the chain it drives.
+    """How K phases feel and the chain that this drives.
 
     Attributes:
-        weights: (K, R) w.
+        mean: (K, 6) m.
+        covariance: (K, 6, 6) C.
         share: (K,) mean gamma, what each phase has of all windows.
         transition: (K, K) T.
     """
 
-    weights: Float
+    mean: Float
+    covariance: Float
     share: Float
     transition: Float
 
+    @property
+    def memory(self) -> int:
+        """Each window is looked at as it is."""
+        return 1
 
-def averaged(regressors: Float) -> Float:
-    """Causal means over `MEMORY` windows of (W, R)."""
+    def log_evidence(self, regressors: Float) -> Float:
+        """Log density (N, K) of the soft wrenches that regressors (N, R) begin with."""
+        lower = np.linalg.cholesky(self.covariance)
+        off = regressors[:, :DIMENSIONS] - self.mean[:, None]
+        white = np.linalg.inv(lower) @ np.swapaxes(off, -1, -2)
+        result: Float = -0.5 * (white * white).sum(axis=1) - np.log(np.einsum("kii->ki", lower)).sum(-1)[:, None]
+        return result.T
+
+
+def fit(drive: Sequence[Float], posterior: Float, paths: Sequence[NDArray[np.intp]]) -> Gate:
+    """A gate from regressors (W, R), which begin with the soft wrench, and most likely paths by demonstration.
+
+    Args:
+        drive: regressors (W, R) of each demonstration.
+        posterior: (W, K) of all windows.
+        paths: (W,) of each.
+    """
+    felt = np.concatenate(drive)[:, :DIMENSIONS]
+    size = np.maximum(posterior.sum(axis=0), 1e-9)
+    mean = posterior.T @ felt / size[:, None]
+    off = felt - mean[:, None]
+    own = np.swapaxes(off * posterior.T[..., None], -1, -2) @ off / size[:, None, None]
+    share = size / size.sum()
+    covariance = 0.5 * (own + np.einsum("k,kij->ij", share, own)) + FLOOR * np.eye(DIMENSIONS)
+    return Gate(mean, covariance, share, counted(paths, len(size)))
+
+
+def averaged(regressors: Float, memory: int) -> Float:
+    """Causal means over `memory` windows of (W, R)."""
     sums = np.concatenate([np.zeros((1, regressors.shape[1])), np.cumsum(regressors, axis=0)])
     last = np.arange(1, len(regressors) + 1)
-    first = np.maximum(last - MEMORY, 0)
+    first = np.maximum(last - memory, 0)
     result: Float = (sums[last] - sums[first]) / (last - first)[:, None]
     return result
-
-
-def fit(regressors: Sequence[Float], posterior: Float, paths: Sequence[NDArray[np.intp]]) -> Gate:
-    """A gate from regressors by demonstration, posteriors (W, K) and most likely paths."""
-    phi = np.concatenate([averaged(r) for r in regressors])
-    k = posterior.shape[1]
-    weights = np.zeros((k, phi.shape[1]))
-    ridge = np.diag(np.full(phi.shape[1], RIDGE))
-    for _ in range(STEPS if k > 1 else 0):
-        p = softmax(phi @ weights.T)
-        gradient = (posterior - p).T @ phi - RIDGE * weights
-        curvature = (p * (1.0 - p)).T[:, :, None] * phi
-        hessian = np.swapaxes(curvature, -1, -2) @ phi + ridge
-        weights = weights + DAMPING * np.linalg.solve(hessian, gradient[..., None])[..., 0]
-    return Gate(weights, np.maximum(posterior.mean(axis=0), 1e-6), counted(paths, k))
 
 
 def counted(paths: Sequence[NDArray[np.intp]], phases: int) -> Float:
@@ -75,9 +113,10 @@ def counted(paths: Sequence[NDArray[np.intp]], phases: int) -> Float:
     return result
 
 
-def advance(gate: Gate, belief: Float, phi: Float) -> Float:
-    """The belief (N, K) one window later, for averaged regressors (N, R)."""
-    evidence = softmax(phi @ gate.weights.T) / gate.share
-    ahead = (belief[:, :, None] * gate.transition).sum(axis=1) * evidence
+def advance(gate: Chain, belief: Float, regressors: Float) -> Float:
+    """The belief (N, K) one window later, for regressors (N, R)."""
+    log_evidence = gate.log_evidence(regressors)
+    evidence = np.exp(log_evidence - log_evidence.max(axis=1, keepdims=True))
+    ahead = (belief[:, :, None] * gate.transition).sum(axis=1) * evidence + 1e-300
     result: Float = ahead / ahead.sum(axis=1, keepdims=True)
     return result

@@ -15,9 +15,10 @@ from skillframe.records import Document
 from skillframe_segmenter.emission import DIMENSIONS, Phases
 from skillframe_segmenter.features import Scales
 from skillframe_segmenter.gate import Gate
+from skillframe_segmenter.pose_gate import PoseGate
 from skillframe_segmenter.settings import WINDOW_S
 
-VERSION = 1
+VERSION = 2
 WHERE = "phase_model"
 
 
@@ -42,7 +43,7 @@ class PhaseModel:
         phase_of: (K,) phase of each micro-phase.
         phases: how each micro-phase moves.
         initial: (K,); weights: (K, K, R) of the transitions.
-        gate: for execution.
+        gate: how each feels, or where it is; alone it decides in execution.
         successors: (P, P + 1) how often each phase was followed by each, the last column is the end.
         switch_posterior, switch_windows: online, a phase takes over when it is this probable for so many windows.
         origin: what poses are compared with; None where the wrench drives the transitions.
@@ -56,7 +57,7 @@ class PhaseModel:
     phases: Phases
     initial: Float
     weights: Float
-    gate: Gate
+    gate: Gate | PoseGate
     successors: Float
     switch_posterior: float
     switch_windows: int
@@ -98,7 +99,6 @@ def from_document(document: Document) -> PhaseModel:
     if document.get("version") != VERSION or document.get("window_s") != WINDOW_S:
         raise InputError(f"{WHERE}.version", "is not one that this plug-in can follow online", "segment again")
     phase_of = np.array(_get(document, "phase_of", list[int]), dtype=np.intp)
-    gate: dict[str, Any] = _get(document, "gate", dict[str, Any])
     k, r = len(phase_of), 7 if "origin" in document else 9
     successors = np.array(_get(document, "successors", list[list[float]]), dtype=float)
     p = len(successors)
@@ -109,14 +109,20 @@ def from_document(document: Document) -> PhaseModel:
     return PhaseModel(
         at=_array(document, "at", (3,)), axes=_get(document, "axes", str), scales=Scales(**scales),
         temper=_get(document, "temper", float), phase_of=phase_of,
-        phases=Phases(
-            _array(document, "direction", (k, DIMENSIONS)), _array(document, "covariance", (k, DIMENSIONS, DIMENSIONS))
-        ),
+        phases=Phases(_array(document, "direction", (k, DIMENSIONS)), _covariance(document, k)),
         initial=_array(document, "initial", (k,)), weights=_array(document, "transition_weights", (k, k, r)),
-        gate=Gate(_array(gate, "weights", (k, r)), _array(gate, "share", (k,)), _array(gate, "transition", (k, k))),
+        gate=_gate(document, k, r),
         successors=successors, switch_posterior=_get(document, "switch_posterior", float),
         switch_windows=_get(document, "switch_windows", int), origin=_origin(document),
     )  # fmt: skip
+
+
+def _gate(document: Document, k: int, r: int) -> Gate | PoseGate:
+    values: dict[str, Any] = _get(document, "gate", dict[str, Any])
+    chain = _array(values, "share", (k,)), _array(values, "transition", (k, k))
+    if "origin" in document:
+        return PoseGate(_array(values, "weights", (k, r)), *chain)
+    return Gate(_array(values, "mean", (k, DIMENSIONS)), _covariance(values, k), *chain)
 
 
 def _origin(document: Document) -> Pose0 | None:
@@ -141,6 +147,13 @@ def _array(document: Document, key: str, shape: tuple[int, ...]) -> Float:
     except (TypeError, ValueError):
         values = np.empty(0)
     _demand(values.shape == shape, key, f"should be numbers of shape {shape}")
+    return values
+
+
+def _covariance(document: Document, count: int) -> Float:
+    values = _array(document, "covariance", (count, DIMENSIONS, DIMENSIONS))
+    definite = bool(np.isfinite(values).all()) and bool((np.linalg.eigvalsh(values) > 0.0).all())
+    _demand(definite, "covariance", "should be positive definite")
     return values
 
 

@@ -23,7 +23,8 @@ from skillframe_segmenter.settings import WINDOW_S
 from skillframe_segmenter.windows import Windows, windows
 
 NOBODY = -1
-SHARPER, LONGER = 2.0, 1  # the filter's likelihood over the fit's, and windows that it waits beyond `switch_windows`
+SHARPER, FELT = 2.5, 1.0 / 3.0  # the filter's likelihood of a motion over the fit's, and a wrench's share of that
+LONGER = 1  # windows that the filter waits beyond `switch_windows`
 STILL = (4e-3, float(np.deg2rad(2.0)))  # m/s, rad/s
 
 
@@ -95,7 +96,7 @@ class Gate:
             return None
         phi = self._regressors(self._sum / self._ticks, observation)
         self._sum, self._ticks = np.zeros_like(self._sum), 0
-        self._memory = [*self._memory[1 - gate.MEMORY :], phi]
+        self._memory = [*self._memory, phi][-self._model.gate.memory :]
         self._belief = gate.advance(
             self._model.gate, self._belief, sum(self._memory[1:], self._memory[0]) / len(self._memory)
         )
@@ -128,14 +129,16 @@ class Gate:
         if self._home is not None:
             wrench = (wrench.reshape(-1, 2, 3) @ self._home).reshape(-1, 6)
         scales = self._model.scales
-        return regressors(soft_pair(wrench, scales.force, scales.torque))
+        return soft_pair(wrench, scales.force, scales.torque)
 
 
 class Filter:
-    """The forward algorithm on windows, for demonstrations: motion and wrench both count.
+    """The forward algorithm on windows, for demonstrations: how a phase moves, given the wrench, and how it feels.
 
-    It has no later windows to lean on, so each one counts twice what it counts in the fit (ours: half of that is late
-    where a phase begins slowly), and `follow` waits for one window more than the gate.
+    It has no later windows to lean on, so a motion counts 2.5 times what it counts in the fit, and a wrench, which
+    wanders with the person's aim for half a second, a third of that (ours: with less of it a tool that is wound up
+    between friction and a soft hand is late, with more of it one that bounces). `follow` waits for one window more than
+    the gate. Where poses drive the transitions, how a phase feels is no evidence.
     """
 
     def __init__(self, model: PhaseModel, count: int = 1) -> None:
@@ -153,7 +156,10 @@ class Filter:
         model = self._model
         contact = soft_pair(wrench, model.scales.force, model.scales.torque)
         seen = emission.observe(soft_pair(motion, model.scales.speed, model.scales.turning), contact)
-        log_density = SHARPER * model.temper * emission.log_likelihood(seen, model.phases)
+        log_density = emission.log_likelihood(seen, model.phases)
+        if model.origin is None:
+            log_density = log_density + FELT * model.gate.log_evidence(contact)
+        log_density = SHARPER * model.temper * log_density
         density = np.exp(log_density - log_density.max(axis=1, keepdims=True))
         if self._belief is None:
             ahead = np.tile(model.initial, (self._count, 1))
@@ -186,7 +192,7 @@ def follow(model: PhaseModel, demonstration: Demonstration, by: str = "filter") 
     """
     cut = windows(demonstration, model.at, model.axes)
     drive = drive_of(model, cut)
-    averaged = gate.averaged(drive)
+    averaged = gate.averaged(drive, model.gate.memory)
     watch, belief, debounce = (
         Filter(model),
         model.initial[None].copy(),

@@ -19,7 +19,7 @@ from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
 from skillframe.frames import Float, norm, rotation_vector
 from skillframe.records import Document
-from skillframe_segmenter import changepoints, em, gate, merge, model, runs
+from skillframe_segmenter import changepoints, em, gate, merge, model, pose_gate, runs
 from skillframe_segmenter.boundaries import OPTION
 from skillframe_segmenter.features import Features, Scales, features, scales, typical_scales
 from skillframe_segmenter.model import PhaseModel, Pose0
@@ -280,10 +280,11 @@ def rows_of(cut: Sequence[Windows], labels: Sequence[Labels], names: Sequence[st
 def online_model(prepared: Prepared, found: Segmented, settings: Settings) -> PhaseModel:
     """What is needed to follow the phases online."""
     chosen = found.fit.model
+    kind = gate if prepared.origin is None else pose_gate
     return PhaseModel(
         at=prepared.point, axes=settings.axes, scales=typical_scales(prepared.scale), temper=chosen.temper,
         phase_of=found.phase_of, phases=chosen.phases, initial=chosen.initial, weights=chosen.weights,
-        gate=gate.fit(prepared.drive, found.fit.posterior, found.paths),
+        gate=kind.fit(prepared.drive, found.fit.posterior, found.paths),
         successors=successors(found.labels, int(found.phase_of.max()) + 1),
         switch_posterior=settings.switch_posterior, switch_windows=settings.switch_windows, origin=prepared.origin,
     )  # fmt: skip

@@ -1,0 +1,62 @@
+r"""The gate of the pose-driven baseline: a softmax of the pose, as Kroemer et al. (ICRA 2015) drive their transitions.
+
+    alpha_t(j) ~ p(j | x_t) / mean gamma_j  sum_i alpha_{t-1}(i) T(i, j),      p(j | x) = softmax_j(w_j . x)
+
+with x the mean over two windows of the pose relative to the mean one, and the weights tied to the phase that is
+entered: per pair of phases, as published, they see one sample a transition. Targets are the posteriors of EM; 25 damped
+diagonal-block Newton steps, ridge 0.05 (ours).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.frames import Float
+from skillframe_segmenter.gate import averaged, counted
+from skillframe_segmenter.transitions import softmax
+
+STEPS, DAMPING, RIDGE = 25, 0.7, 0.05
+MEMORY = 2  # windows
+
+
+class PoseGate(NamedTuple):
+    """The classifier of K phases and the chain it drives.
+
+    Attributes:
+        weights: (K, R) w.
+        share: (K,) mean gamma, what each phase has of all windows.
+        transition: (K, K) T.
+    """
+
+    weights: Float
+    share: Float
+    transition: Float
+
+    @property
+    def memory(self) -> int:
+        """The mean of two windows is looked at."""
+        return MEMORY
+
+    def log_evidence(self, regressors: Float) -> Float:
+        """Log odds (N, K) of poses (N, R), up to a constant that all phases share."""
+        result: Float = np.log(np.maximum(softmax(regressors @ self.weights.T), 1e-300) / self.share)
+        return result
+
+
+def fit(drive: Sequence[Float], posterior: Float, paths: Sequence[NDArray[np.intp]]) -> PoseGate:
+    """A gate from regressors (W, R) and most likely paths by demonstration, and posteriors (W, K) of all windows."""
+    regressors = np.concatenate([averaged(phi, MEMORY) for phi in drive])
+    k = posterior.shape[1]
+    weights = np.zeros((k, regressors.shape[1]))
+    ridge = np.diag(np.full(regressors.shape[1], RIDGE))
+    for _ in range(STEPS if k > 1 else 0):
+        p = softmax(regressors @ weights.T)
+        gradient = (posterior - p).T @ regressors - RIDGE * weights
+        curvature = (p * (1.0 - p)).T[:, :, None] * regressors
+        hessian = np.swapaxes(curvature, -1, -2) @ regressors + ridge
+        weights = weights + DAMPING * np.linalg.solve(hessian, gradient[..., None])[..., 0]
+    return PoseGate(weights, np.maximum(posterior.mean(axis=0), 1e-6), counted(paths, k))
