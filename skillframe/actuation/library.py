@@ -58,7 +58,7 @@ def find_fmu(name_or_path: str | Path, base: Path | None = None, version: int = 
     """The file of an FMU: a name in `fmus/` (built now if needed), or a path, relative to `base`.
 
     Raises:
-        InputError: no such file.
+        InputError: no such file, or a folder.
         UnknownName: neither a name nor a file; and as `build_fmu`.
     """
     text = str(name_or_path)
@@ -68,6 +68,8 @@ def find_fmu(name_or_path: str | Path, base: Path | None = None, version: int = 
     path = (base or Path()) / text
     if path.is_file():
         return path.resolve()
+    if path.is_dir():
+        raise InputError(path, "is a folder", "give an .fmu file or a name from `skillframe fmu list`")
     if path.suffix == ".fmu" or len(path.parts) > 1:
         raise InputError(path, "no such file", "give an .fmu file or a name from `skillframe fmu list`")
     raise UnknownName("fmu", text, folders)

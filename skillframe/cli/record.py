@@ -113,6 +113,7 @@ def _recorded(
     places: tuple[str | None, str | None], operated: dict[str, Any], common: dict[str, Any],
 ) -> Recording:  # fmt: skip
     """By an operator, somebody blindfolded, or somebody who sees."""
+    _refuse_idle(teacher, person, places)
     if machine.spec.actuation or any(map(_given, operated.values())):
         given = {**operated, **dict(zip(("noise", "delay", "scale"), person, strict=True))}
         return _operated(machine, scene, teacher, given, common)
@@ -123,6 +124,24 @@ def _recorded(
     from skillframe.demonstrate import record
 
     return record(machine, scene, _seeing(teacher, *person), **common)
+
+
+def _refuse_idle(
+    teacher: str, person: tuple[float | None, float | None, float | None], places: tuple[str | None, str | None]
+) -> None:
+    """Refuse what the chosen teacher would not heed."""
+    from skillframe.errors import InputError
+
+    blind = teacher == "blind"
+    idle = (
+        dict(zip(("noise", "delay", "scale"), person, strict=True))
+        if blind
+        else dict(zip(("belief", "centre"), places, strict=True))
+    )
+    for name, value in idle.items():
+        if value is not None:
+            whose = "teachers who see" if blind else "--teacher blind"
+            raise InputError(f"--{name}", f"is for {whose}, not for --teacher {teacher}", "leave it out")
 
 
 def _operated(

@@ -87,6 +87,11 @@ def test_a_wrong_name_is_answered_with_the_nearest():
         find_fmu("absent.fmu")
 
 
+def test_a_folder_is_said_to_be_one(tmp_path):
+    with pytest.raises(InputError, match="is a folder; give"):
+        find_fmu(tmp_path)
+
+
 def test_without_a_compiler_building_says_what_to_type(tmp_path, monkeypatch):
     monkeypatch.setenv("CC", "no-such-compiler")
     with pytest.raises(MissingDependency, match="pip install ziglang"):

@@ -1,4 +1,4 @@
-"""`demonstration record --teacher blind`: what cannot be searched is refused in one sentence."""
+"""`demonstration record --teacher blind`: what cannot be searched or would not be heeded is refused in one sentence."""
 
 import pytest
 from click.testing import CliRunner
@@ -22,3 +22,17 @@ def test_a_world_without_a_surface_is_refused():
     result = run("--world", "free")
     assert isinstance(result.exception, InputError)
     assert "no surface" in str(result.exception)
+
+
+@pytest.mark.parametrize("option", ["--noise", "--delay", "--scale"])
+def test_what_a_blind_teacher_would_not_heed_is_refused(option):
+    result = run("--world", "peg_in_hole", option, "0.1")
+    assert isinstance(result.exception, InputError)
+    assert f"{option}: is for teachers who see" in str(result.exception)
+
+
+@pytest.mark.parametrize("option", ["--belief", "--centre"])
+def test_what_a_teacher_who_sees_would_not_heed_is_refused(option):
+    result = run("--world", "peg_in_hole", "--teacher", "kinesthetic", option, "1,1,0")
+    assert isinstance(result.exception, InputError)
+    assert f"{option}: is for --teacher blind" in str(result.exception)
