@@ -220,7 +220,7 @@ def test_show_of_what_is_not_there_names_the_nearest(capsys):
 
 @pytest.mark.needs_plugins
 def test_every_learner_that_lists_settings_says_what_they_are(capsys):
-    for name in ("lmc", "search", "replay", "dmp", "gmr", "seds", "dual_arm"):
+    for name in ("lmc", "search", "replay", "dmp", "gmr", "seds", "dual_arm", "policy"):
         assert run(["plugins", "show", name, "--json"]) == 0
         settings = json.loads(capsys.readouterr().out)["settings"]
         assert settings and all(each["about"] for each in settings)

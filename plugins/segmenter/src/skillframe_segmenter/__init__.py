@@ -68,6 +68,12 @@ def _learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Do
     return learn(demonstrations, options)
 
 
+def _settings() -> type:
+    from skillframe_segmenter.settings import PolicySettings
+
+    return PolicySettings
+
+
 def _describe(document: Document) -> list[str]:
     from skillframe_segmenter.describe import describe
 
@@ -89,6 +95,7 @@ def skillframe_skills() -> Iterable[SkillType]:
         build=_build,
         check=_check,
         learn=_learn,
+        settings=_settings,
         describe=_describe,
         explain=_explain,
     )

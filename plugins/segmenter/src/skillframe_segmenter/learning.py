@@ -28,7 +28,7 @@ from skillframe.registry import registry
 from skillframe_segmenter.agreement import check_agreement
 from skillframe_segmenter.boundaries import Move, moved, parse_move
 from skillframe_segmenter.segmentation import refitted
-from skillframe_segmenter.settings import Settings
+from skillframe_segmenter.settings import PolicySettings, Settings
 from skillframe_segmenter.zvc import ZvcSettings
 
 SHORTEST_S = 0.25
@@ -50,7 +50,7 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     own, cutting, learning = _sorted(options)
     segmenter = registry().segmenter(own["segmenter"])
     names = [d.source for d in demonstrations]
-    moves = [parse_move(text, names) for text in own["set_boundary"]]
+    moves = [parse_move(text, names) for text in own["set_boundary"] or ()]
     found = segmenter.fit(demonstrations, own["phases"], cutting)
     options = LearnOptions(at=options.at, hand=options.hand, axes=options.axes, settings=learning)
     if own["phases"] is None:
@@ -82,13 +82,7 @@ def _as_phase(body: Document, skill: str, shared: Sequence[str]) -> Document:
 
 def _sorted(options: LearnOptions) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
     """Settings of the policy, of the segmenter, and of the phases' learner."""
-    own: dict[str, Any] = {
-        "segmenter": "wrench_hmm",
-        "skill": "lmc",
-        "phases": None,
-        "recoveries": 1,
-        "set_boundary": [],
-    }
+    own: dict[str, Any] = {key: PolicySettings.__dataclass_fields__[key].default for key in OWN}
     own |= {key: value for key, value in options.settings.items() if key in OWN}
     names = {*Settings.__dataclass_fields__, *ZvcSettings.__dataclass_fields__}
     cutting = {key: value for key, value in options.settings.items() if key in names}

@@ -14,8 +14,8 @@ WINDOW_S = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
-    """What the segmenters go by.
+class Cutting:
+    """What the segmenters go by, wherever they look from.
 
     Attributes:
         temper: weight of a window's likelihood in a demonstration of `temper_windows` windows; windows are correlated,
@@ -27,8 +27,6 @@ class Settings:
             phases into one.
         merge_votes: least share of windows that one direction must explain for two phases to be one.
         switch_posterior, switch_windows: online, a phase takes over when it is this probable for so many windows.
-        axes: "base", or "phase_start": the tool's attitude at the start of the demonstration.
-        at: point of the tool frame whose motion and wrench are looked at; None for the recorded tool point.
     """
 
     temper: float = 0.3
@@ -39,8 +37,6 @@ class Settings:
     merge_votes: float = 0.6
     switch_posterior: float = 0.8
     switch_windows: int = 2
-    axes: str = "base"
-    at: str | None = None
 
     def __post_init__(self) -> None:
         for name in ("temper", "temper_windows", "stay_s", "phases_max", "merge_angle_rad", "merge_votes"):
@@ -50,5 +46,41 @@ class Settings:
             raise InputError("--set phases_max", f"{self.phases_max} is more than 20", "give a smaller number")
         if not 0.5 <= self.switch_posterior < 1.0 or self.switch_windows < 1:
             raise InputError("--set", "switch_posterior is within 0.5 and 1, switch_windows at least 1", "mend it")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings(Cutting):
+    """What the segmenters go by.
+
+    Attributes:
+        axes: "base", or "phase_start": the tool's attitude at the start of the demonstration.
+        at: point of the tool frame whose motion and wrench are looked at; None for the recorded tool point.
+    """
+
+    axes: str = "base"
+    at: str | None = None
+
+    def __post_init__(self) -> None:
+        Cutting.__post_init__(self)
         if self.axes not in ("base", "phase_start"):
             raise InputError("--axes", f"{self.axes!r} is neither base nor phase_start", "choose one of the two")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PolicySettings(Cutting):
+    """What `learn --skill policy --set` can change; the other keys go to the learner of the phases.
+
+    Attributes:
+        segmenter: what cuts demonstrations into phases: wrench_hmm, pose_hmm or zvc. The settings of `zvc` are `still`
+            and `force_n`; all others here are those of the first two.
+        skill: what each phase is learned as; its own settings can be given as well, see `plugins show lmc`.
+        phases: how many there are; found where it is not given.
+        recoveries: how often a run may go back to an earlier phase.
+        set_boundary: a list of "DEMONSTRATION:BOUNDARY=SECONDS" that a person has moved, counted as they stand without.
+    """
+
+    segmenter: str = "wrench_hmm"
+    skill: str = "lmc"
+    phases: int | None = None
+    recoveries: int = 1
+    set_boundary: tuple[str, ...] | None = None
