@@ -20,7 +20,8 @@ from skillframe.errors import InputError, SkillframeError
 from skillframe.report.results import Results, read_results
 from skillframe.trace import Trace
 
-PARTS = ("campaign.toml", "results.csv", "summary.json", "skills", "traces", "demonstrations")
+CAMPAIGN = ("campaign.toml", "results.csv", "summary.json")
+PARTS = (*CAMPAIGN, "skills", "traces", "demonstrations")
 MOST_RUNS, MOST_DEMONSTRATIONS = 4, 4
 
 
@@ -81,12 +82,18 @@ def read_chapters(inputs: Sequence[Path]) -> list[Chapter]:
 
 
 def _folders(path: Path) -> list[Path]:
-    if any((path / part).exists() for part in PARTS):
-        return [path]
-    inner = sorted(f for f in path.iterdir() if f.is_dir() and any((f / part).exists() for part in PARTS))
-    if not inner:
-        raise InputError(path, "holds no results", f"give a campaign's folder (with {', '.join(PARTS)}) or trace files")
-    return inner
+    """A campaign's folder itself; else the campaigns in it, which may share demonstrations; else what has any part."""
+    inner = sorted(f for f in path.iterdir() if f.is_dir())
+    for parts in (CAMPAIGN, PARTS):
+        if _holds(path, parts):
+            return [path]
+        if found := [folder for folder in inner if _holds(folder, parts)]:
+            return found
+    raise InputError(path, "holds no results", f"give a campaign's folder (with {', '.join(PARTS)}) or trace files")
+
+
+def _holds(folder: Path, parts: Sequence[str]) -> bool:
+    return any((folder / part).exists() for part in parts)
 
 
 def read_traces(paths: Sequence[Path]) -> Chapter:

@@ -103,6 +103,11 @@ def test_a_folder_of_campaigns_gives_a_chapter_each(copy, tmp_path):
     assert len(re.findall(r'id="c2-run"', text)) == 1
 
 
+def test_campaigns_in_a_folder_that_holds_their_demonstrations_are_shown_all_the_same(copy, tmp_path):
+    (tmp_path / "demonstrations").mkdir()
+    assert [chapter.folder for chapter in read_chapters([tmp_path])] == ["peg"]
+
+
 def test_a_broken_trace_in_a_folder_is_named_and_left_out(copy):
     (copy / "traces" / "torn.npz").write_bytes(b"PK not really")
     assert "torn.npz is left out" in page(copy)
