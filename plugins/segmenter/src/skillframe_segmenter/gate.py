@@ -17,7 +17,9 @@ that this differs anyway, and leaves the sign of friction, which turns with the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +50,8 @@ class Chain(Protocol):
         """(N, K) for regressors (N, R), up to a constant that all phases share."""
 
 
-class Gate(NamedTuple):
+@dataclass(frozen=True)
+class Gate:
     """How K phases feel and the chain that this drives.
 
     Attributes:
@@ -68,12 +71,18 @@ class Gate(NamedTuple):
         """Each window is looked at as it is."""
         return 1
 
+    @cached_property
+    def whitening(self) -> tuple[Float, Float]:
+        """Inverse Cholesky factors (K, 6, 6) of C and log det (K, 1) of the factors, the same in every window."""
+        lower = np.linalg.cholesky(self.covariance)
+        return np.linalg.inv(lower), np.log(np.einsum("kii->ki", lower)).sum(-1)[:, None]
+
     def log_evidence(self, regressors: Float) -> Float:
         """Log density (N, K) of the soft wrenches that regressors (N, R) begin with."""
-        lower = np.linalg.cholesky(self.covariance)
+        inverse, log_det = self.whitening
         off = regressors[:, :DIMENSIONS] - self.mean[:, None]
-        white = np.linalg.inv(lower) @ np.swapaxes(off, -1, -2)
-        result: Float = -0.5 * (white * white).sum(axis=1) - np.log(np.einsum("kii->ki", lower)).sum(-1)[:, None]
+        white = inverse @ np.swapaxes(off, -1, -2)
+        result: Float = -0.5 * (white * white).sum(axis=1) - log_det
         return result.T
 
 

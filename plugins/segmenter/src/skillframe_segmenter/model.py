@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -81,7 +81,7 @@ def to_document(model: PhaseModel, kind: str) -> Document:
         "scales": model.scales._asdict(), "temper": model.temper, "phase_of": model.phase_of.tolist(),
         "direction": model.phases.direction.tolist(), "covariance": model.phases.covariance.tolist(),
         "initial": model.initial.tolist(), "transition_weights": model.weights.tolist(),
-        "gate": {name: value.tolist() for name, value in model.gate._asdict().items()},
+        "gate": {each.name: getattr(model.gate, each.name).tolist() for each in fields(model.gate)},
         "successors": model.successors.tolist(), "switch_posterior": model.switch_posterior,
         "switch_windows": model.switch_windows,
     }  # fmt: skip

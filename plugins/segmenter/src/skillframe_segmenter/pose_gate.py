@@ -10,7 +10,7 @@ diagonal-block Newton steps, ridge 0.05 (ours).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,8 @@ STEPS, DAMPING, RIDGE = 25, 0.7, 0.05
 MEMORY = 2  # windows
 
 
-class PoseGate(NamedTuple):
+@dataclass(frozen=True)
+class PoseGate:
     """The classifier of K phases and the chain it drives.
 
     Attributes:
