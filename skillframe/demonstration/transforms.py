@@ -117,6 +117,8 @@ def _clock(edges: Mapping[str, Edge], way: Sequence[str], where: str) -> NDArray
     clocks = [stamps for name in way if (stamps := edges[name].stamps) is not None]
     if not clocks:
         raise InputError(where, "nothing between them moves", "choose the robot's base and its tool")
+    if not any(clock.any() for clock in clocks):
+        raise InputError(where, "every header stamp is zero", "record transforms with their stamps")
     first, last = max(c[0] for c in clocks), min(c[-1] for c in clocks)
     most = max(clocks, key=len)
     stamps = most[(most >= first) & (most <= last)]

@@ -36,7 +36,7 @@ Rows = Sequence[tuple[float, str, str, Pose]]
 """Time [s], parent, child, pose of the child in the parent."""
 
 
-def write_tree(path: Path, moving: Rows, lasting: Rows, demo: Demonstration) -> Path:
+def write_tree(path: Path, moving: Rows, lasting: Rows, demo: Demonstration, zero: bool = False) -> Path:
     """A bag with `/tf`, `/tf_static` and a wrench."""
     ros1 = path.suffix == ".bag"
     store = STORE1 if ros1 else STORE2
@@ -50,7 +50,7 @@ def write_tree(path: Path, moving: Rows, lasting: Rows, demo: Demonstration) -> 
         for topic, rows in (("/tf", moving), ("/tf_static", lasting)):
             connection = writer.add_connection(topic, MESSAGE, typestore=store)
             for row in rows:
-                message = store.types[MESSAGE](transforms=[stamped(store, ros1, *row)])
+                message = store.types[MESSAGE](transforms=[stamped(store, ros1, *row, zero)])
                 writer.write(connection, stamps([row[0]])[0] + 10**9, serialize(message, MESSAGE))
         kind, messages = wrenches(demo)
         connection = writer.add_connection("/ft", kind, typestore=store)
@@ -60,11 +60,11 @@ def write_tree(path: Path, moving: Rows, lasting: Rows, demo: Demonstration) -> 
     return path if ros1 else next(path.with_suffix("").glob("*.db3"))
 
 
-def stamped(store: Any, ros1: bool, time: float, parent: str, child: str, pose: Pose) -> Any:
+def stamped(store: Any, ros1: bool, time: float, parent: str, child: str, pose: Pose, zero: bool) -> Any:
     types, package = store.types, "geometry_msgs/msg"
     quaternion = vector(store, "Quaternion", quaternion_from_matrix(pose.rotation))
     turn = types[f"{package}/Transform"](translation=vector(store, "Vector3", pose.position), rotation=quaternion)
-    header = head(store, stamps([time])[0], parent, {"seq": 0} if ros1 else {})
+    header = head(store, 0 if zero else stamps([time])[0], parent, {"seq": 0} if ros1 else {})
     return types[f"{package}/TransformStamped"](header=header, child_frame_id=child, transform=turn)
 
 
@@ -168,6 +168,12 @@ def test_what_cannot_be_told_is_refused_in_words(tmp_path: Path, demo: Demonstra
 def test_a_broken_tree_is_refused_in_words(tmp_path: Path, demo: Demonstration, rows: Rows, said: str) -> None:
     path = write_tree(tmp_path / "demo.db3", rows, LASTING, demo)
     with pytest.raises(InputError, match=said):
+        read_demonstration(path, pose_frames="base,tool")
+
+
+def test_transforms_without_stamps_are_refused(tmp_path: Path, demo: Demonstration) -> None:
+    path = write_tree(tmp_path / "demo.db3", moving(), LASTING, demo, zero=True)
+    with pytest.raises(InputError, match="every header stamp is zero; record transforms with their stamps"):
         read_demonstration(path, pose_frames="base,tool")
 
 
