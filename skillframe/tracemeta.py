@@ -57,8 +57,9 @@ def _refuse(path: Path, key: str, value: object) -> None:
 
 
 def _is_number(value: object, finite: bool = True) -> bool:
-    known = isinstance(value, int | float) and not isinstance(value, bool)
-    return known and (not finite or abs(value) < LARGEST)  # type: ignore[arg-type]
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return not finite or abs(value) < LARGEST
 
 
 def _are_numbers(values: object, least: int, most: int | None = None) -> bool:

@@ -107,15 +107,13 @@ def theory_sentence(found: Sequence[Region], varied: Sequence[str]) -> Markup:
     """What the dashed lines are."""
     if not found:
         return Markup("")
-    text = f" Dashed: closed-form theory predicts that a compliant push succeeds from any start within {_all(found)}"
+    regions = "; ".join(map(_said, found))
+    text = f" Dashed: closed-form theory predicts that a compliant push succeeds from any start within {regions}"
     worlds = [n for n in varied if n.startswith("world.") and not any(n in region.over for region in found)]
     nominal = f" (at the nominal {', '.join(quantity(n).label for n in worlds)}, which varied)" if worlds else ""
-    beyond = "; beyond it, some starts may succeed."
-    return tag("p", tag("span", class_="key theory-key"), escape(f"{text}{nominal}{beyond}"))
-
-
-def _all(found: Sequence[Region]) -> str:
-    return "; ".join(map(_said, found))
+    return tag(
+        "p", tag("span", class_="key theory-key"), escape(f"{text}{nominal}; beyond it, some starts may succeed.")
+    )
 
 
 def _said(region: Region) -> str:

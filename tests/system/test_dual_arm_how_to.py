@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -58,7 +59,7 @@ def test_the_python_of_the_page_has_both_arms(
     taught: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(taught)
-    found: dict[str, object] = {}
+    found: dict[str, Any] = {}
     exec(compile(PAGE.partition("```python\n")[2].partition("```")[0], "dual-arm.md", "exec"), found)
     assert "[ True  True]" in capsys.readouterr().out
-    assert np.shape(found["right"].wrench)[1] == 6  # type: ignore[attr-defined]
+    assert np.shape(found["right"].wrench)[1] == 6
