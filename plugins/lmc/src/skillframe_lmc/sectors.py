@@ -5,7 +5,9 @@ between \(\hat v\) and \(-\hat F_m\) (Fig. 5 of the overview paper); for Coulomb
 wide. A person wavers, so the sector is widened to a pyramid (Fig. 8): by alpha out of its plane and by beta beyond its
 two edges. With n = v x m, m = unit(-F_m), w the angle from v to m, e = n x v, a direction D lies
 
-    out = |asin D.n| out of the plane,   ins = min(ang, w - ang) inside the edges,   ang = atan2(D.e, D.v).
+    out = |asin D.n| out of the plane,   ins = min(ang, w - ang) inside the edges,   ang = atan2(D.e, D.v),
+
+where behind the sector, from ang = w / 2 - pi down, the edge m is the nearer one: ins = w - 2 pi - ang.
 
 We take beta = max(5 degrees, alpha / 3), so the least alpha that accepts D has a closed form,
 
@@ -96,7 +98,7 @@ def _contact(D: Float32, v: Float, m: Float) -> tuple[Float32, Float32]:
     w = np.arctan2((m * e).sum(-1), (m * v).sum(-1)).astype(np.float32)
     out = np.abs(np.arcsin(np.clip(D @ n.T.astype(np.float32), -1.0, 1.0)))
     angle = np.arctan2(D @ e.T.astype(np.float32), D @ v.T.astype(np.float32))
-    inside = np.minimum(angle, w - angle)
+    inside = np.maximum(np.minimum(angle, w - angle), w - np.float32(2.0 * np.pi) - angle)
     beyond = -inside
     need = np.maximum(out, np.where(beyond <= BETA_MIN, np.float32(0.0), np.float32(3.0) * beyond))
     # past DEEP a little still counts, so that the middle of two wide sectors is not a plateau
