@@ -64,6 +64,7 @@ BACK = np.array([0.0, 0.0, -1.0])
 
 
 @given(D=vectors, v=vectors, m=vectors, contact=st.booleans())
+@example(D=np.array([0.5, 0.0, 0.866]), v=BACK, m=np.array([-1.0, 0.0, 0.0]), contact=True)  # ang: -150 degrees
 @example(D=-BACK, v=BACK + np.array([5.7e-97, 0.0, 0.0]), m=np.array([-1.0, 0.0, 0.0]), contact=True)  # ang: +-pi
 def test_the_closed_form_of_the_pyramid_equals_a_search_over_it(D: Float, v: Float, m: Float, contact: bool) -> None:
     D, v, m = unit(D), unit(v), unit(m)
