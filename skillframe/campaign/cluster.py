@@ -8,6 +8,7 @@ holds the interpreter's lock; a hang thus becomes a death like any other.
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import shutil
 import time
@@ -166,8 +167,12 @@ class ClusterPool:
         from distributed import KilledWorker
         from distributed.client import FutureCancelledError
 
+        # not future.result(): interrupted there, Dask cancels half a gather and logs what its other half then raises
+        gathered = asyncio.run_coroutine_threadsafe(
+            self._client.gather(future, asynchronous=True), self._client.loop.asyncio_loop
+        )
         try:
-            rows: list[Row] = future.result()
+            rows: list[Row] = gathered.result()
             return rows
         except KilledWorker as error:
             return Died(self._cause(error.last_worker.address, watch))

@@ -251,8 +251,22 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.parametrize("options", [[], ["--workers", "2"]])
-def test_ctrl_c_keeps_what_is_finished_says_how_to_go_on_and_exits_130(tmp_path, options):
+# Dask's side of fetching a result sends Ctrl-C to its own process and gives the main thread time to be interrupted
+AMID_A_GATHER = """
+import distributed, os, signal, time
+gather, gathers = distributed.Client._gather, []
+async def interrupted(*args, **options):
+    gathers.append(args)
+    if len(gathers) == 4:
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.1)
+    return await gather(*args, **options)
+distributed.Client._gather = interrupted
+"""
+
+
+def interruptible(tmp_path, options, prelude=""):
+    """A command line that runs a campaign in a process of its own, and that campaign's folder."""
     text = TEXT.replace('"fake"\nskills', '"peg_in_hole"\nskills')
     out = tmp_path / "out"
     from skillframe.campaign.folder import prepare
@@ -261,23 +275,39 @@ def test_ctrl_c_keeps_what_is_finished_says_how_to_go_on_and_exits_130(tmp_path,
 
     prepare(CampaignSpec.from_toml(write_campaign(tmp_path, trials=400, text=text)), out, lambda spec: {}, PegParams)
     script = tmp_path / "client.py"
-    script.write_text(INTERRUPT.format(tests=str(FAKES.parent)))
+    script.write_text(prelude + INTERRUPT.format(tests=str(FAKES.parent)))
     process = subprocess.Popen(
         [sys.executable, str(script), "campaign", "resume", str(out), "--chunk", "8", *options],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
-    while not (out / "rows.jsonl").exists() or (out / "rows.jsonl").read_bytes().count(b'"trial"') < 20:
-        assert process.poll() is None
-        time.sleep(0.02)
-    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: the workers get it too
+    return process, out
+
+
+def check_interrupted(process, out):
+    """Exit code 130, one sentence, and every finished row kept: how many those are."""
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
     assert f"skillframe campaign resume {out}" in errors
     assert "Traceback" not in errors
     stored = (out / "rows.jsonl").read_bytes().count(b'"trial"')
-    assert 20 <= stored < 800
     assert len(table(out).splitlines()) == stored + 1
     assert not read_summary(out)["complete"]
+    return stored
+
+
+@pytest.mark.parametrize("options", [[], ["--workers", "2"]])
+def test_ctrl_c_keeps_what_is_finished_says_how_to_go_on_and_exits_130(tmp_path, options):
+    process, out = interruptible(tmp_path, options)
+    while not (out / "rows.jsonl").exists() or (out / "rows.jsonl").read_bytes().count(b'"trial"') < 20:
+        assert process.poll() is None
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: the workers get it too
+    assert 20 <= check_interrupted(process, out) < 800
+
+
+def test_ctrl_c_while_a_result_is_fetched_from_dask_prints_no_traceback(tmp_path):
+    process, out = interruptible(tmp_path, ["--workers", "2"], prelude=AMID_A_GATHER)
+    assert check_interrupted(process, out) == 24  # three chunks of eight, the fourth was on its way
 
 
 def test_how_far_a_chunk_is_is_told_in_process(out):
