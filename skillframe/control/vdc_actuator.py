@@ -32,7 +32,7 @@ import numpy as np
 
 from skillframe.errors import InputError
 from skillframe.frames import Float
-from skillframe.robot.spec import Actuation
+from skillframe.robot.machine_spec import Actuation
 
 _SLIDING = 5e-3  # m/s at which friction without a state has risen to tanh(1)
 ACROSS = 2e-3  # w, share of the valve's travel

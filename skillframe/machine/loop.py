@@ -12,14 +12,16 @@ the tool follows from its joints and is not commanded.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.actuation.delay import CommandDelay
-from skillframe.conditioning.momentum import Estimate
-from skillframe.conditioning.valve import ValveIdentification
+from skillframe.conditioning.momentum import Estimate, ForceSettings
+from skillframe.conditioning.residual_noise import residual_noise
+from skillframe.conditioning.valve import ValveIdentification, ValveSettings
 from skillframe.control.force_compiled import CompiledEstimator
 from skillframe.control.hydraulic import Demand, HydraulicGains, Measured, Reference, plane_task
 from skillframe.control.hydraulic_compiled import CompiledLaw
@@ -38,7 +40,7 @@ from skillframe.robot.holding import require_held
 from skillframe.robot.loops import ClosedChain
 from skillframe.skill import Command, Observation, Skill
 from skillframe.world.coupled import CoupledPlant
-from skillframe.world.machine_sensors import MachineSensors, MachineSensorSettings
+from skillframe.world.machine_sensors import MachineSensors
 from skillframe.world.placement import check_quantities, start_poses
 from skillframe.world.plant import Draws, Kinematics
 
@@ -94,9 +96,12 @@ class MachineLoop(Loop):
         super().__init__(skill, setup, draws, rngs, trace_hz)
         spec = setup.robot.spec
         known = cylinders(spec.actuation, spec.folder / "robot.toml")
-        self.law = CompiledLaw(self.chain, known, HydraulicGains(), self.count, self.dt)
-        self.estimator = CompiledEstimator(self.chain, known, self.count, self.dt)
-        self.valves = ValveIdentification(known, self.count, self.dt)
+        corner, estimate = spec.sensors.corner_hz, ForceSettings()
+        noise = residual_noise(self.chain, known, spec.sensors, estimate.corner)
+        estimate = replace(estimate, sensor_corner=corner, row_noise=tuple(noise.tolist()))
+        self.law = CompiledLaw(self.chain, known, HydraulicGains.of(spec), self.count, self.dt)
+        self.estimator = CompiledEstimator(self.chain, known, self.count, self.dt, estimate)
+        self.valves = ValveIdentification(known, self.count, self.dt, ValveSettings(corner=corner))
         self.coupled = CoupledPlant(self.plant, self.chain.actuated)
         self.bank = banks(spec, self.count)
         self.master = Master(self.coupled, self.bank, CosimSettings(step=self.dt))
@@ -123,7 +128,7 @@ class MachineLoop(Loop):
 
     def _sensors(self, rngs: Sequence[np.random.Generator], draws: Draws) -> Any:
         n, k = len(self.chain.independent), len(self.chain.actuated)
-        self.gauges = MachineSensors(MachineSensorSettings(), rngs, n, k, self.dt)
+        self.gauges = MachineSensors(self.setup.robot.spec.sensors, rngs, n, k, self.dt)
         return self.gauges
 
     def _start(self, draws: Draws) -> None:

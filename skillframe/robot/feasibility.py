@@ -16,7 +16,7 @@ from skillframe.errors import InputError
 from skillframe.frames import Float
 from skillframe.robot.figures import CYLINDER
 from skillframe.robot.loops import ChainState, ClosedChain, OutOfReach
-from skillframe.robot.spec import Actuation
+from skillframe.robot.machine_spec import Actuation
 
 LEAST_ARM = 0.1  # m; ours: below it a force error of 1 kN at the piston is felt three times less than at mid stroke
 _NEEDED = ("bore", "rod", "stroke", "supply_pressure", "return_pressure")

@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 from skillframe.config import read_toml
 from skillframe.errors import InputError, UnknownName
 from skillframe.paths import data_dirs
+from skillframe.robot.machine_spec import Actuation
 from skillframe.robot.numbers import LARGEST
-from skillframe.robot.spec import Actuation, RobotSpec
+from skillframe.robot.spec import RobotSpec
 
 CYLINDER = "hydraulic_cylinder"
 NEEDED = (

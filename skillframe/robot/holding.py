@@ -8,7 +8,7 @@ from dataclasses import replace
 from skillframe.errors import InputError
 from skillframe.frames import Float
 from skillframe.robot.feasibility import capacity
-from skillframe.robot.spec import Actuation
+from skillframe.robot.machine_spec import Actuation
 
 
 def require_held(actuation: Sequence[Actuation], hold: Float, supply: Float, where: object) -> None:

@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from skillframe.config import build, read_toml
 from skillframe.errors import InputError, UnknownName
 from skillframe.paths import data_dirs
+from skillframe.robot.machine_spec import Actuation, Gains, Loop, Payload, Sensors, positive_figures
 from skillframe.robot.numbers import LARGEST
 
 Vector = tuple[float, float, float]
@@ -78,47 +79,6 @@ class LinkInertia:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Loop:
-    """A closed chain: the origins of two frames of the tree coincide."""
-
-    frame_a: str
-    frame_b: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Payload:
-    """What a machine carries: `mass` [kg] of load in the inertia of a link, and `rating`, the most it may be [kg]."""
-
-    link: str
-    mass: float
-    rating: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Actuation:
-    """An actuator (an FMU) on a joint.
-
-    Attributes:
-        parameters: of the FMU, by its names; inputs, outputs: our names to the FMU's.
-        nominal: what the controller takes the cylinder for, by our names, where the FMU is not told so in `parameters`.
-        initial_force: the FMU's parameter for the force [N] that it holds at the start; "" if it has none.
-    """
-
-    joint: str
-    fmu: str
-    parameters: dict[str, Any] = field(default_factory=dict)
-    inputs: dict[str, str] = field(default_factory=dict)
-    outputs: dict[str, str] = field(default_factory=dict)
-    nominal: dict[str, Any] = field(default_factory=dict)
-    initial_force: str = ""
-
-    @property
-    def known(self) -> dict[str, Any]:
-        """Parameters of the cylinder as the controller knows them, by our names."""
-        return {**self.parameters, **self.nominal}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class RobotFile:
     """The keys of robot.toml, word for word (contract: robot.toml)."""
 
@@ -136,6 +96,8 @@ class RobotFile:
     payload: Payload | None = None
     loop: tuple[Loop, ...] = ()
     actuation: tuple[Actuation, ...] = ()
+    sensors: Sensors = field(default_factory=Sensors)
+    gains: Gains = field(default_factory=Gains)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,6 +114,7 @@ class RobotSpec:
         friction_share: part of the drawn `robot.joint_friction` that a joint gets, by name; 1 for joints not named.
         payload: what is carried, where it can be changed.
         inertia: overlay by link name; loop: closed chains; actuation: what drives joints.
+        sensors, gains: of a machine with actuators.
     """
 
     name: str
@@ -171,6 +134,8 @@ class RobotSpec:
     payload: Payload | None = None
     loop: tuple[Loop, ...] = ()
     actuation: tuple[Actuation, ...] = ()
+    sensors: Sensors = field(default_factory=Sensors)
+    gains: Gains = field(default_factory=Gains)
 
     def require_simulated(self) -> None:
         """Refuse to be simulated where that would be wrong.
@@ -245,12 +210,14 @@ def _from_toml(path: Path) -> RobotSpec:
 def _check_values(declared: RobotFile, where: str) -> None:
     """Values that have the right type and are still impossible."""
     positive = {"control.rate_hz": declared.control.rate_hz}
+    positive |= dict(positive_figures(declared.actuation, declared.sensors, declared.gains))
     positive |= {
         f"limits.{k}": getattr(declared.limits, k) for k in ("force_n", "torque_n_m", "torque_rate_nm_s", "energy_j")
     }
     for key, value in positive.items():
         if value is not None and not (0.0 < value < math.inf):
             raise InputError(f"{where}: {key}", f"is {value:g}", "give a positive, finite number")
+    _check_machine(declared, where)
     for joint, value in declared.home.items():
         if not math.isfinite(value):
             raise InputError(f"{where}: home.{joint}", f"is {value:g}", "give a finite number")
@@ -273,6 +240,19 @@ def _check_values(declared: RobotFile, where: str) -> None:
     for link, inertia in declared.inertia.items():
         if not all(abs(x) <= LARGEST for x in (inertia.mass, *inertia.com, *inertia.inertia)):
             raise InputError(f"{where}: inertia.{link}", "holds a number beyond any physical size", "correct it")
+
+
+def _check_machine(declared: RobotFile, where: str) -> None:
+    """Sensors and gains of a machine, and of nothing else."""
+    for key in ("encoder", "pressure"):
+        value = getattr(declared.sensors, key)
+        if not 0.0 <= value < math.inf:
+            raise InputError(f"{where}: sensors.{key}", f"is {value:g}", "give 0 or more")
+    if not 0.0 <= declared.gains.body < math.inf:
+        raise InputError(f"{where}: gains.body", f"is {declared.gains.body:g}", "give 0 or more")
+    if not declared.actuation and (declared.sensors, declared.gains) != (Sensors(), Gains()):
+        text = "[sensors] and [gains] are those of a machine with actuators, and there is no [[actuation]]"
+        raise InputError(where, text, "leave them out; a wrist sensor's noise is varied as `sensor.*` in a campaign")
 
 
 def _check_names(declared: RobotFile, where: str) -> None:

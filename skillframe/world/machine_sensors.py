@@ -1,34 +1,21 @@
 """What a hydraulic machine measures: its joints by encoders and its chambers by pressure transducers, behind filters.
 
 White noise at every sample, then a critically damped filter of second order whose state is the rate; noise and corner
-are those published with the data set of Petrovic and Mattila, Mech. Mach. Theory 170 (2022) 104680. What comes out is
-2/w old; with the rate where it is now is known too (ours: at 0.2 m/s the lag alone is 2.7 mm of the tool).
+are those of robot.toml's `[sensors]`. What comes out is 2/w old; with the rate where it is now is known too (ours: at
+0.2 m/s the lag of 24 Hz alone is 2.7 mm of the tool).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from skillframe.conditioning.rates import RateFilter
 from skillframe.frames import Float
+from skillframe.robot.machine_spec import Sensors
 
 BLOCK = 100
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MachineSensorSettings:
-    """Noise and filter, standard deviations per 1 kHz sample.
-
-    Attributes:
-        encoder: of each minimal coordinate [rad or m]; pressure: of each chamber [Pa]; corner: of the filters [Hz].
-    """
-
-    encoder: float = 1e-4
-    pressure: float = 0.22e5
-    corner: float = 24.0
 
 
 class MachineSensors:
@@ -38,13 +25,11 @@ class MachineSensors:
         z, rate: (N, n) filtered; pressure_a, pressure_b: (N, k) filtered [Pa]. lag: of all of them [s].
     """
 
-    def __init__(
-        self, settings: MachineSensorSettings, rngs: Sequence[np.random.Generator], n: int, k: int, dt: float
-    ) -> None:
+    def __init__(self, settings: Sensors, rngs: Sequence[np.random.Generator], n: int, k: int, dt: float) -> None:
         self._rngs, self._n, self._k = list(rngs), n, k
         self._scale: Float = np.repeat([settings.encoder, settings.pressure], [n, 2 * k])
-        self._filter = RateFilter(settings.corner, dt)
-        self.lag = 1.0 / (np.pi * settings.corner)
+        self._filter = RateFilter(settings.corner_hz, dt)
+        self.lag = 1.0 / (np.pi * settings.corner_hz)
         self._noise: Float = np.zeros((BLOCK, len(self._rngs), n + 2 * k))
         self._next = BLOCK
 

@@ -13,8 +13,9 @@ import pytest
 from skillframe.control.vdc_actuator import cylinders
 from skillframe.errors import InputError
 from skillframe.robot.audit import audit
+from skillframe.robot.machine_spec import Actuation
 from skillframe.robot.model import load_model
-from skillframe.robot.spec import Actuation, load_robot, robot_names
+from skillframe.robot.spec import load_robot, robot_names
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "how-to"
 CRANE, ROBOT = ((DOCS / f"own-{name}.md").read_text(encoding="utf-8") for name in ("crane", "robot"))

@@ -17,8 +17,9 @@ from skillframe.robot.audit import audit
 from skillframe.robot.describe import as_json, describe
 from skillframe.robot.figures import BELOW, NEEDED, NOT_NEGATIVE, POSITIVE, unfit_figures
 from skillframe.robot.loops import ClosedChain
+from skillframe.robot.machine_spec import Actuation
 from skillframe.robot.model import load_model
-from skillframe.robot.spec import Actuation, load_robot, robot_names
+from skillframe.robot.spec import load_robot, robot_names
 
 
 @pytest.fixture
