@@ -7,7 +7,7 @@ A_b p_b of pressures, both behind the sensors' filter,
 
 g_m: standard deviation of white noise of one a sample, m times differentiated, behind filter and L. The last term is
 what friction adds, 4 % of the Coulomb friction of a piston that slides (ours, measured in air: for the crane that ships
-(1) gives 200 and 156 Nm and 164 N, where 220, 160 and 170 were found).
+(1) gives 203 and 158 Nm and 164 N, where 220, 160 and 170 were found).
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from skillframe.conditioning.damped import share_of
 from skillframe.frames import Float
 
 if TYPE_CHECKING:
@@ -47,8 +48,9 @@ def residual_noise(chain: ClosedChain, cylinders: Cylinders, sensors: Sensors, c
 
 
 def _passed(order: int, first: float, second: float, dt: float = 1e-3) -> float:
-    """g_m: of white noise of one a sample of dt [s], differentiated, behind two pairs of equal poles [Hz]."""
-    frequency = (np.arange(_POINTS) + 0.5) / _POINTS * 0.5 / dt
-    s = 2j * np.pi * frequency
-    through = s**order / (1.0 + s / (2.0 * np.pi * first)) ** 2 / (1.0 + s / (2.0 * np.pi * second)) ** 2
+    """g_m, m 0 or 2: through a `RateFilter` and a `CriticallyDamped` of these corners [Hz] at samples of dt [s]."""
+    back = np.exp(-2j * np.pi * (np.arange(_POINTS) + 0.5) / _POINTS / 2.0)  # 1/z at frequencies up to Nyquist's
+    step, w, share = 1.0 - back, 2.0 * np.pi * first * dt, share_of(second, dt)
+    value = w**2 / (step**2 + (2.0 * w * step + w**2) * back)
+    through = value * (step / dt) ** order * (share / (1.0 - (1.0 - share) * back)) ** 2
     return float(np.sqrt(np.mean(np.abs(through) ** 2)))

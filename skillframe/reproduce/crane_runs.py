@@ -16,6 +16,7 @@ import numpy as np
 from skillframe.executor import Result, Setup, simulate
 from skillframe.frames import Float, Pose
 from skillframe.prepare import load_robot_model
+from skillframe.robot.model import RobotModel
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 from skillframe.world.scene import Geom, Scene, Task, Tool
 from skillframe.world.worlds.common import anywhere, no_error
@@ -110,9 +111,13 @@ def scene(start: Float, *, plate: bool) -> Scene:
     )  # fmt: skip
 
 
-def run(path: Path, gains: Stiffness, where: Scene, draws: Mapping[str, Float], *, seconds: float, seed: int) -> Result:
-    """The crane on a path, a trial per draw, with traces at 100 Hz."""
+def run(
+    path: Path, gains: Stiffness, where: Scene, draws: Mapping[str, Float], *, seconds: float, seed: int,
+    trace_hz: float = 100.0, robot: RobotModel | None = None,
+) -> Result:  # fmt: skip
+    """The crane, or another one, on a path, a trial per draw."""
     count = len(next(iter(draws.values())))
-    setup = Setup(robot=load_robot_model("hiab_xs031"), scene=where, center_of_compliance=np.zeros(3))
+    robot = robot or load_robot_model("hiab_xs031")
+    setup = Setup(robot=robot, scene=where, center_of_compliance=np.zeros(3))
     rngs = [np.random.default_rng([seed, i]) for i in range(count)]
-    return simulate(Follow(path, gains), setup, draws, rngs, duration_s=seconds, trace_hz=100.0)
+    return simulate(Follow(path, gains), setup, draws, rngs, duration_s=seconds, trace_hz=trace_hz)

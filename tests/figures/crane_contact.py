@@ -13,12 +13,16 @@ import numpy as np
 import pinocchio as pin
 
 from skillframe.reproduce import crane_runs
+from skillframe.robot.machine_spec import Gains, Sensors
+from skillframe.robot.model import load_model
+from skillframe.robot.spec import load_robot
 from skillframe.world.scene import Geom, Sprung
 from tests.laws.crane_plants import crane
 
 STIFFNESS, LOAD = 1e5, 8500.0  # K [N/m]; the force that K and the surface's spring make together [N]
 DOWN_S, CLEARANCE, LANDING, EASE_S, STILL_S = 3.0, 0.1, 0.05, 0.5, 1.0  # s, m above the plate, m/s, s, s
 SLIDE, SLIDING_S, SETTLED_S = 0.1, 5.0, 2.5  # m/s, s, s of sliding after which it is steady
+ENCODER = 6e-6  # rad, one step of 20 bits
 
 
 class Contact(NamedTuple):
@@ -95,12 +99,25 @@ def path_over(surface):
     return path, slide
 
 
-def pressed(surface, damping=5e4, mass=1.0, friction=1.0, seed=1, ratio=0.5):
-    """One run on a surface [N/m] with a damping ratio; mass and friction of the plant over what is believed."""
+def precise():
+    """The crane with encoders of 20 bits, 6e-6 rad, and filters and gains that their noise allows."""
+    spec = load_robot("hiab_xs031")
+    sensors, gains = Sensors(encoder=ENCODER, corner_hz=60.0), Gains(body=1e4, force_corner_hz=50.0)
+    return load_model(dataclasses.replace(spec, sensors=sensors, gains=gains))
+
+
+def pressed(surface, damping=5e4, mass=1.0, friction=1.0, seed=1, ratio=0.5, delay=0.0, robot=None):
+    """One run on a surface [N/m] with a damping ratio; mass and friction of the plant over what is believed.
+
+    delay: of the valves [s], beyond their own; robot: the crane that ships if not given.
+    """
     path, slide = path_over(surface)
-    truth = {"robot.mass_scale": np.array([mass]), "actuator.friction_scale": np.array([friction])}
+    truth = {"robot.mass_scale": mass, "actuator.friction_scale": friction, "actuator.delay": delay}
+    truth = {name: np.array([value]) for name, value in truth.items()}
     gains = crane_runs.Stiffness(STIFFNESS, damping)
-    result = crane_runs.run(path, gains, plate(surface, ratio), truth, seconds=slide + SLIDING_S, seed=seed)
+    result = crane_runs.run(
+        path, gains, plate(surface, ratio), truth, seconds=slide + SLIDING_S, seed=seed, trace_hz=1000.0, robot=robot
+    )  # fmt: skip
     return seen_in(result.traces[0], damping, slide)
 
 

@@ -56,9 +56,9 @@ def latest(surface, opening):
     return max(onsets, default=None)
 
 
-def shown_after(surface):
+def shown_after(surface, encoder=ENCODER):
     """Time after the touch [s] at which the sensors can tell it from noise, if all else is known exactly."""
-    noise = np.array([REACH * ENCODER, LEVER * PRESSURE * np.hypot(*AREAS) / OIL])
+    noise = np.array([REACH * encoder, LEVER * PRESSURE * np.hypot(*AREAS) / OIL])
     natural = np.sqrt(surface / LOAD)
     time = np.arange(0.0, WATCHED_S, SAMPLE_S)
     behind = LANDING * (time - np.sin(natural * time) / natural)

@@ -13,7 +13,7 @@ import pytest
 from skillframe.control.vdc_actuator import cylinders
 from skillframe.errors import InputError
 from skillframe.robot.audit import audit
-from skillframe.robot.machine_spec import Actuation
+from skillframe.robot.machine_spec import Actuation, Gains, Sensors
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot, robot_names
 
@@ -61,6 +61,11 @@ def test_each_figure_that_the_page_gives_is_one_that_the_controller_needs():
         rest = {key: value for key, value in shown.items() if key != name}
         with pytest.raises(InputError, match=f"has no {name}"):
             cylinders([Actuation(joint="lift_piston", fmu="hydraulic_cylinder", parameters=rest)])
+
+
+def test_the_tables_of_sensors_and_gains_show_the_defaults():
+    shown = tomllib.loads(block(CRANE, "toml", "[sensors]") + block(CRANE, "toml", "[gains]"))
+    assert (Sensors(**shown["sensors"]), Gains(**shown["gains"])) == (Sensors(), Gains())
 
 
 def test_the_python_of_the_crane_page_runs(capsys):

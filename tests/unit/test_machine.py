@@ -1,5 +1,8 @@
 """A hydraulic machine in the one loop: trials that do not know each other, its delay, payload, starts and energy."""
 
+import re
+import shutil
+
 import numpy as np
 import pytest
 
@@ -12,6 +15,7 @@ from skillframe.reproduce.crane_runs import ABOVE, FIXTURE, MOVING, PRESSING, Fo
 from skillframe.robot.loops import ClosedChain
 from skillframe.robot.model import load_model
 from skillframe.robot.payload import with_payload
+from skillframe.robot.spec import load_robot, robot_names
 from skillframe.world.loops import SOLIMP
 from tests.fmu_cache import own_cache  # noqa: F401
 
@@ -112,6 +116,35 @@ def test_the_swing_in_air_finds_the_payload():
     loop = MachineLoop(Follow(diamond, MOVING), setup(), {"robot.payload": np.array([427.5])}, rngs([0]), None)
     loop.tare()
     assert loop.estimator.identification.theta[0, -1] == pytest.approx(-47.5, abs=3.0)
+
+
+def test_a_crane_whose_boom_does_not_slide_out_runs_with_its_two_cylinders(tmp_path):
+    """It stands where it is told to within what 4 kN of unknown stiction are over K, some centimetres."""
+    robot = load_model(load_robot(without_extension(tmp_path)))
+    result = simulate(
+        Follow(standing, MOVING), setup(robot), {}, rngs([0]), duration_s=0.5, trace_hz=100.0,
+    )  # fmt: skip
+    trace = result.traces[0]
+    assert trace.meta["actuators"] == ["lift_piston", "tilt_piston"]
+    assert trace.machine["valve"].shape[1] == 2
+    assert np.abs(trace.position - trace.desired_position)[:, [0, 2]].max() < 0.02
+
+
+def standing(time):
+    return np.zeros(3), np.zeros(3)
+
+
+def without_extension(folder):
+    """The crane with its extension fixed where home has it."""
+    shutil.copytree(robot_names()["hiab_xs031"], folder / "short_crane")
+    urdf, toml = (folder / "short_crane" / name for name in ("hiab_xs031.urdf", "robot.toml"))
+    text = urdf.read_text(encoding="utf-8")
+    joint = re.search(r'<joint name="extension".*?</joint>', text, re.DOTALL)[0]
+    fixed = re.sub(r"<(axis|limit|dynamics)[^>]*/>", "", joint.replace("prismatic", "fixed")).replace("0.041", "0.541")
+    urdf.write_text(text.replace(joint, fixed), encoding="utf-8")
+    text = toml.read_text(encoding="utf-8").replace("extension = 0.5\n", "")
+    toml.write_text(text[: text.rindex("[[actuation]]")], encoding="utf-8")
+    return folder / "short_crane"
 
 
 def test_a_delayed_command_arrives_whole_ticks_later():

@@ -42,6 +42,9 @@ def test_a_bare_urdf_that_cannot_run_names_the_robot_toml_beside_it(save, urdf):
         load_robot(toml.with_name("made.urdf")).require_simulated()
 
 
+DRIVEN = '[[actuation]]\njoint = "j"\nfmu = "x"\n'
+
+
 @pytest.mark.parametrize(
     ("toml", "sentence"),
     [
@@ -54,6 +57,13 @@ def test_a_bare_urdf_that_cannot_run_names_the_robot_toml_beside_it(save, urdf):
         ("[inertia]\nl0 = { mass = 1.0 }", "missing inertia"),
         ("mimic = 1", "expected true or false"),
         ("[control]\nrate_hz = 0", "positive"),
+        (f"{DRIVEN}[sensors]\nencoder = -1e-4", r"sensors\.encoder: is -0\.0001; give 0 or more"),
+        (f"{DRIVEN}[sensors]\ncorner_hz = 0.0", r"sensors\.corner_hz: is 0; give a positive"),
+        (f"{DRIVEN}[sensors]\nnoise = 1.0", "noise"),
+        (f"{DRIVEN}[gains]\nbody = -5.0", r"gains\.body: is -5; give 0 or more"),
+        (f"{DRIVEN}[gains]\nbody = nan", r"gains\.body: is not a number"),
+        (f"{DRIVEN}velocity_gain = -1.0", r"actuation of j: velocity_gain: is -1; give a positive"),
+        ("[sensors]\nencoder = 1e-5", r"there is no \[\[actuation\]\]; leave them out"),
     ],
 )
 def test_a_robot_toml_that_says_something_impossible_is_refused_with_its_key(save, urdf, toml, sentence):
