@@ -15,6 +15,7 @@ from skillframe.robot.kinematics import tool_pose
 from skillframe.robot.link_checks import given_inertias
 from skillframe.robot.loops import ClosedChain
 from skillframe.robot.model import RobotModel
+from skillframe.robot.spec import RobotSpec
 
 
 def describe(robot: RobotModel) -> str:
@@ -52,10 +53,15 @@ def _closed(robot: RobotModel) -> RobotModel:
 
 
 def _machine(robot: RobotModel) -> list[str]:
-    """Lines on loops, actuators and payload; none for a robot without them."""
+    """Lines on loops, actuators, what it measures with, and payload; none for a robot without them."""
     spec = robot.spec
     lines = [f"  loop: {loop.frame_a} meets {loop.frame_b}" for loop in spec.loop]
     lines += [f"  {drive.joint} is driven by {drive.fmu}" for drive in spec.actuation]
+    if spec.actuation:
+        seen, gains = spec.sensors, spec.gains
+        noise = f"encoders {seen.encoder:g} rad (m), pressures {seen.pressure:g} Pa"
+        lines.append(f"  sensors: noise of {noise}, behind filters of {seen.corner_hz:g} Hz")
+        lines.append(f"  gains: bodies {gains.body:g} N s/m, rate of the required force {gains.force_corner_hz:g} Hz")
     if spec.payload is not None:
         load = spec.payload
         lines.append(f"  payload {load.mass:g} kg in {load.link!r}, rated for {load.rating:g} kg")
@@ -72,7 +78,17 @@ def as_json(robot: RobotModel) -> dict[str, Any]:
         "fixture_m": [float(x) for x in spec.workspace.fixture], "limits": asdict(spec.limits),
         "joints": [_joint_values(robot, index) for index in range(1, model.njoints)],
         "arms": [_arm_values(robot, i) for i in range(len(spec.arm))],
+        **(_machine_values(spec) if spec.loop or spec.actuation or spec.payload else {}),
     }  # fmt: skip
+
+
+def _machine_values(spec: RobotSpec) -> dict[str, Any]:
+    values = {"loops": [asdict(loop) for loop in spec.loop], "payload": spec.payload and asdict(spec.payload)}
+    if spec.actuation:
+        kept = ("joint", "fmu", "velocity_gain", "force_gain")
+        drives = [{name: getattr(drive, name) for name in kept} for drive in spec.actuation]
+        values |= {"actuation": drives, "sensors": asdict(spec.sensors), "gains": asdict(spec.gains)}
+    return values
 
 
 def _joint_values(robot: RobotModel, index: int) -> dict[str, Any]:
