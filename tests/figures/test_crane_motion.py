@@ -198,11 +198,11 @@ def test_the_hardest_surface_leaves_a_law_a_millisecond_with_published_encoders_
 def test_with_too_little_damping_contact_ends_in_a_limit_cycle_with_the_valve_at_its_stop():
     """D = 2.5e3 N s/m, a twentieth of ours: K/D = 40 1/s asks for more than oil of 1.4 Hz can follow."""
     calm, wild = pressed(1e6), pressed(1e6, damping=2.5e3)
+    last = wild.force[wild.time > wild.time[-1] - 1.0, 1]
     row(
-        "limit cycle with D = 2.5e3 N s/m", f"ripple {wild.ripple:.0f} N, peak {wild.force[:, 1].max():.0f} N",
-        f"ours {calm.ripple:.0f} N, {calm.force[:, 1].max():.0f} N",
+        "limit cycle with D = 2.5e3 N s/m", f"ripple {wild.ripple:.0f} N, {last.min():.0f} to {last.max():.0f} N",
+        f"ours {calm.ripple:.0f} N, at most {calm.force[:, 1].max():.0f} N",
     )  # fmt: skip
-    last = wild.force[-100:, 1]
     assert wild.ripple > 20.0 * calm.ripple
-    assert last.min() <= 0.0 < 5000.0 < last.max()
+    assert np.ptp(last) > 0.5 * calm.force[calm.steady :, 1].mean()  # it goes on, by more than half the load
     assert np.abs(wild.valve[wild.touched :]).max() > 0.99
