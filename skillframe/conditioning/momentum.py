@@ -65,7 +65,8 @@ class ForceSettings:
         corner: of L, two equal poles as published for this crane's derivatives [Hz].
         rate_corner: of the piston rates that friction is computed from [Hz].
         row_noise: standard deviation of the residual r of each joint while its piston slides (n,) [Nm or N], as
-            measured in air with encoders of 1e-4 rad (m) and pressure sensors of 0.22 bar at 1 kHz.
+            measured in air with encoders of 1e-4 rad (m) and pressure sensors of 0.22 bar at 1 kHz; a machine's loop
+            takes what follows from its own sensors (`residual_noise`).
         stiction_speed: a piston below it hides friction exp(-(v / stiction_speed)^2) of its Coulomb friction [m/s].
         least_speed, settle: a piston slides once it has gone one way faster than this [m/s] for this long [s].
         memory: and the force is valid so much later [s], when its filter, of a period of 0.33 s, holds nothing else.

@@ -8,7 +8,7 @@ from skillframe.frames import Float
 
 
 class RateFilter:
-    """The filter w^2 / (s + w)^2, element by element; semi-implicit Euler, which is stable up to w dt = 2.
+    """The filter w^2 / (s + w)^2, element by element; semi-implicit Euler, stable below w dt = 2 (sqrt(2) - 1).
 
     Args:
         corner: w / 2 pi [Hz]; dt: [s].

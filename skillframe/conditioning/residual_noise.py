@@ -26,28 +26,31 @@ if TYPE_CHECKING:
 
 RUBBING = 0.04
 """Of Coulomb friction that a sliding piston leaves open."""
+LEAST = 1.0
+"""Nm or N, of a machine without noise and friction (ours: to weigh by, it must not be 0)."""
 _POINTS = 4000
 
 
-def residual_noise(chain: ClosedChain, cylinders: Cylinders, sensors: Sensors, corner: float) -> Float:
+def residual_noise(chain: ClosedChain, cylinders: Cylinders, sensors: Sensors, corner: float, dt: float) -> Float:
     """Equation (1) at home: (n,) standard deviations [Nm or N].
 
     Args:
         chain: the controller's model.
         cylinders: as the controller knows them.
-        sensors: of the machine, 1 kHz.
+        sensors: of the machine.
         corner: of L, two equal poles [Hz].
+        dt: sample time [s].
     """
     state = chain.at(chain.minimal(chain.robot.home), np.zeros(len(chain.independent)))
-    accelerations = sensors.encoder * _passed(2, sensors.corner_hz, corner)
-    pressures = sensors.pressure * _passed(0, sensors.corner_hz, corner)
+    accelerations = sensors.encoder * _passed(2, sensors.corner_hz, corner, dt)
+    pressures = sensors.pressure * _passed(0, sensors.corner_hz, corner, dt)
     areas = np.square(cylinders.area_a) + np.square(cylinders.area_b)
     pistons = areas * pressures**2 + np.square(RUBBING * cylinders.coulomb_friction)
     variance = accelerations**2 * np.square(state.mass).sum(axis=1) + np.square(state.arms).T @ pistons
-    return np.asarray(np.sqrt(variance))
+    return np.asarray(np.sqrt(np.maximum(variance, LEAST**2)))
 
 
-def _passed(order: int, first: float, second: float, dt: float = 1e-3) -> float:
+def _passed(order: int, first: float, second: float, dt: float) -> float:
     """g_m, m 0 or 2: through a `RateFilter` and a `CriticallyDamped` of these corners [Hz] at samples of dt [s]."""
     back = np.exp(-2j * np.pi * (np.arange(_POINTS) + 0.5) / _POINTS / 2.0)  # 1/z at frequencies up to Nyquist's
     step, w, share = 1.0 - back, 2.0 * np.pi * first * dt, share_of(second, dt)

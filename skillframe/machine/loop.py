@@ -49,6 +49,9 @@ __all__ = ["MachineLoop", "simulate_machine"]
 IMPEDANCE_RATE, LEAST_DAMPING = 2.0, 5e4  # 1/s and N s/m; D where a skill leaves it open, from teleoperation trials
 VALVES_S = 0.5
 """So often the swing's rows are fitted anew for overlap and supply pressure of the valves (ours)."""
+AT_STOP, WILD = 0.99, 0.5
+"""Opening of a valve at its stop, and the share of the swing for which one may be (ours; at 150 bar and with friction
+by a third too large it is 0.18, of a sound crane 0, and of one whose gains are ten times too large 0.97)."""
 RESIDUAL_LIMIT, RESIDUAL_ENERGY, RESIDUAL_TICKS = 1e-2, 200.0, 100
 """Relative bond residual that ends a trial, once so many joules were exchanged; looked at every 100 ticks."""
 
@@ -97,7 +100,7 @@ class MachineLoop(Loop):
         spec = setup.robot.spec
         known = cylinders(spec.actuation, spec.folder / "robot.toml")
         corner, estimate = spec.sensors.corner_hz, ForceSettings()
-        noise = residual_noise(self.chain, known, spec.sensors, estimate.corner)
+        noise = residual_noise(self.chain, known, spec.sensors, estimate.corner, self.dt)
         estimate = replace(estimate, sensor_corner=corner, row_noise=tuple(noise.tolist()))
         self.law = CompiledLaw(self.chain, known, HydraulicGains.of(spec), self.count, self.dt)
         self.estimator = CompiledEstimator(self.chain, known, self.count, self.dt, estimate)
@@ -188,6 +191,7 @@ class MachineLoop(Loop):
     def tare(self) -> None:
         """Swing in the air and identify friction and payload, then hold what was found."""
         self.estimator.calibrate(True)
+        stopped = np.zeros(self.count)
         for tick in range(round((CALIBRATION_S + SETTLE_S) / self.dt)):
             position, velocity, joint, joint_rate = swing(tick * self.dt)
             stiff = LEAST_DAMPING * np.broadcast_to(np.eye(2), (self.count, 2, 2))
@@ -201,11 +205,19 @@ class MachineLoop(Loop):
                 )
             )  # fmt: skip
             self._drive(self.demand.valve)
+            stopped += np.abs(self.demand.valve).max(axis=1) > AT_STOP
             if not len(self.active):
                 break
+        self._end_wild(stopped / (tick + 1))
         self.estimator.calibrate(False)
         hold_what_was_found(self.law, self.estimator.identification)
         self.bill.start()
+
+    def _end_wild(self, share: Float) -> None:
+        """End the trials whose valves were at their stops for such shares (N,) of the swing: nothing was identified."""
+        for i in self.active[share[self.active] > WILD]:
+            text = f"it swings by itself in the air, its valves at their stops for {share[i]:.0%} of the time"
+            self._end(np.array([i]), 0.0, f"{text}; lower gains.body, velocity_gain or force_gain in robot.toml", True)
 
     def _look_at_valves(self, tick: int) -> None:
         """Identify them, and let the law go by what is known so far: what it learns of inertias hangs on it."""

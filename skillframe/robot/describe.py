@@ -56,12 +56,17 @@ def _machine(robot: RobotModel) -> list[str]:
     """Lines on loops, actuators, what it measures with, and payload; none for a robot without them."""
     spec = robot.spec
     lines = [f"  loop: {loop.frame_a} meets {loop.frame_b}" for loop in spec.loop]
-    lines += [f"  {drive.joint} is driven by {drive.fmu}" for drive in spec.actuation]
+    lines += [
+        f"  {a.joint} is driven by {a.fmu}, with gains of {a.velocity_gain:g} m and {a.force_gain:g} m2/(N s)"
+        for a in spec.actuation
+    ]
     if spec.actuation:
         seen, gains = spec.sensors, spec.gains
         noise = f"encoders {seen.encoder:g} rad (m), pressures {seen.pressure:g} Pa"
         lines.append(f"  sensors: noise of {noise}, behind filters of {seen.corner_hz:g} Hz")
-        lines.append(f"  gains: bodies {gains.body:g} N s/m, rate of the required force {gains.force_corner_hz:g} Hz")
+        lines.append(
+            f"  gains: bodies {gains.body:g} N s/m (N m s/rad), rate of the required force {gains.force_corner_hz:g} Hz"
+        )
     if spec.payload is not None:
         load = spec.payload
         lines.append(f"  payload {load.mass:g} kg in {load.link!r}, rated for {load.rating:g} kg")

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
+
+LEAST_CORNER, LARGEST_CORNER = 5.0, 0.08
+"""Of filters: [Hz]; share of the control rate (from 0.13 on a `RateFilter` is unstable). Ours: 5 Hz lag by 64 ms."""
+OF_RATE = f"Hz, {LARGEST_CORNER:g} of control.rate_hz at most"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +37,7 @@ class Actuation:
         parameters: of the FMU, by its names; inputs, outputs: our names to the FMU's.
         nominal: what the controller takes the cylinder for, by our names, where the FMU is not told so in `parameters`.
         initial_force: the FMU's parameter for the force [N] that it holds at the start; "" if it has none.
-        velocity_gain, force_gain: k_x and k_f of its piston (`skillframe.control.vdc_actuator`).
+        velocity_gain, force_gain: k_x [m] and k_f [m^2/(N s)] of its piston (`skillframe.control.vdc_actuator`).
     """
 
     joint: str
@@ -59,7 +64,8 @@ class Sensors:
     whose noise powers are per sample of a millisecond.
 
     Attributes:
-        encoder: of each minimal coordinate [rad or m]; pressure: of each chamber [Pa]; corner_hz: of the filters [Hz].
+        encoder: of each minimal coordinate [rad or m], a step over the square root of 12 if steps are all its noise.
+        pressure: of each chamber [Pa]; corner_hz: of the filters [Hz].
     """
 
     encoder: float = 1e-4
@@ -81,10 +87,23 @@ class Gains:
     force_corner_hz: float = 16.0
 
 
-def positive_figures(actuation: tuple[Actuation, ...], sensors: Sensors, gains: Gains) -> Iterator[tuple[str, float]]:
-    """Names and values of what must be a positive number."""
+def impossible(
+    actuation: tuple[Actuation, ...], sensors: Sensors, gains: Gains, rate_hz: float
+) -> Iterator[tuple[str, str, str]]:
+    """What the types allow and no machine has: key, what is wrong with it, and the cure."""
     for drive in actuation:
-        yield f"actuation of {drive.joint}: velocity_gain", drive.velocity_gain
-        yield f"actuation of {drive.joint}: force_gain", drive.force_gain
-    yield "sensors.corner_hz", sensors.corner_hz
-    yield "gains.force_corner_hz", gains.force_corner_hz
+        for key in ("velocity_gain", "force_gain"):
+            value = getattr(drive, key)
+            if not 0.0 < value < math.inf:
+                yield f"actuation of {drive.joint}: {key}", f"is {value:g}", "give a positive, finite number"
+    figures = (
+        ("sensors.encoder", sensors.encoder, 0.0, 0.1, "rad (m), a standard deviation"),
+        ("sensors.pressure", sensors.pressure, 0.0, 1e7, "Pa, a standard deviation"),
+        ("sensors.corner_hz", sensors.corner_hz, LEAST_CORNER, LARGEST_CORNER * rate_hz, OF_RATE),
+        ("gains.body", gains.body, 0.0, math.inf, "N s/m"),
+        ("gains.force_corner_hz", gains.force_corner_hz, LEAST_CORNER, LARGEST_CORNER * rate_hz, OF_RATE),
+    )
+    for key, value, low, high, unit in figures:
+        if not low <= value <= high or not math.isfinite(value):
+            allowed = f"{low:g} to {high:g}" if math.isfinite(high) else f"{low:g} or more,"
+            yield key, f"is {value:g}", f"give {allowed} {unit}"

@@ -14,7 +14,7 @@ from typing import Literal
 from skillframe.config import build, read_toml
 from skillframe.errors import InputError, UnknownName
 from skillframe.paths import data_dirs
-from skillframe.robot.machine_spec import Actuation, Gains, Loop, Payload, Sensors, positive_figures
+from skillframe.robot.machine_spec import Actuation, Gains, Loop, Payload, Sensors, impossible
 from skillframe.robot.numbers import LARGEST
 
 Vector = tuple[float, float, float]
@@ -210,7 +210,6 @@ def _from_toml(path: Path) -> RobotSpec:
 def _check_values(declared: RobotFile, where: str) -> None:
     """Values that have the right type and are still impossible."""
     positive = {"control.rate_hz": declared.control.rate_hz}
-    positive |= dict(positive_figures(declared.actuation, declared.sensors, declared.gains))
     positive |= {
         f"limits.{k}": getattr(declared.limits, k) for k in ("force_n", "torque_n_m", "torque_rate_nm_s", "energy_j")
     }
@@ -244,13 +243,11 @@ def _check_values(declared: RobotFile, where: str) -> None:
 
 def _check_machine(declared: RobotFile, where: str) -> None:
     """Sensors and gains of a machine, and of nothing else."""
-    for key in ("encoder", "pressure"):
-        value = getattr(declared.sensors, key)
-        if not 0.0 <= value < math.inf:
-            raise InputError(f"{where}: sensors.{key}", f"is {value:g}", "give 0 or more")
-    if not 0.0 <= declared.gains.body < math.inf:
-        raise InputError(f"{where}: gains.body", f"is {declared.gains.body:g}", "give 0 or more")
-    if not declared.actuation and (declared.sensors, declared.gains) != (Sensors(), Gains()):
+    if declared.actuation:
+        told = declared.actuation, declared.sensors, declared.gains, declared.control.rate_hz
+        for key, problem, fix in impossible(*told):
+            raise InputError(f"{where}: {key}", problem, fix)
+    elif (declared.sensors, declared.gains) != (Sensors(), Gains()):
         text = "[sensors] and [gains] are those of a machine with actuators, and there is no [[actuation]]"
         raise InputError(where, text, "leave them out; a wrist sensor's noise is varied as `sensor.*` in a campaign")
 

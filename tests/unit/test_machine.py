@@ -1,5 +1,6 @@
 """A hydraulic machine in the one loop: trials that do not know each other, its delay, payload, starts and energy."""
 
+import dataclasses
 import re
 import shutil
 
@@ -13,6 +14,7 @@ from skillframe.machine import MachineLoop
 from skillframe.prepare import load_robot_model
 from skillframe.reproduce.crane_runs import ABOVE, FIXTURE, MOVING, PRESSING, Follow, diamond, press_and_slide, scene
 from skillframe.robot.loops import ClosedChain
+from skillframe.robot.machine_spec import Gains
 from skillframe.robot.model import load_model
 from skillframe.robot.payload import with_payload
 from skillframe.robot.spec import load_robot, robot_names
@@ -116,6 +118,12 @@ def test_the_swing_in_air_finds_the_payload():
     loop = MachineLoop(Follow(diamond, MOVING), setup(), {"robot.payload": np.array([427.5])}, rngs([0]), None)
     loop.tare()
     assert loop.estimator.identification.theta[0, -1] == pytest.approx(-47.5, abs=3.0)
+
+
+def test_gains_that_a_crane_cannot_have_end_its_trial_with_what_to_lower():
+    spec = dataclasses.replace(load_robot("hiab_xs031"), gains=Gains(body=1e5))
+    result = simulate(Follow(standing, MOVING), setup(load_model(spec)), {}, rngs([0]), duration_s=0.5)
+    assert re.match(r"it swings by itself in the air, .* for \d+% of the time; lower gains\.body", result.reason[0])
 
 
 def test_a_crane_whose_boom_does_not_slide_out_runs_with_its_two_cylinders(tmp_path):
