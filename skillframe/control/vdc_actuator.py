@@ -138,7 +138,7 @@ def bristle_after(c: Cylinders, bristle: Float, velocity: Float, dt: float) -> F
 class ContactFriction:
     """From which force on it is that of contact, f_0 [N], and how flat it then is, v_s [m/s]."""
 
-    force: float = 100.0
+    force: float = 500.0
     sliding: float = 1e-2
 
 

@@ -11,7 +11,8 @@ import pytest
 
 from skillframe.actuation.toolchain import find_compiler
 from skillframe.control.hydraulic import HydraulicGains
-from tests.figures.crane_contact import ENCODER, precise, pressed
+from skillframe.reproduce import crane_runs
+from tests.figures.crane_contact import ENCODER, precise, pressed, true_path
 from tests.figures.crane_motion import DT, Truth, figures, run
 from tests.figures.crane_rivals import FORCE, TUNED, Rivals, Vdc
 from tests.figures.landing_limit import ENCODER as PUBLISHED_ENCODER
@@ -25,6 +26,7 @@ SHARE = 0.9
 TRUTH = [Truth(friction, SHARE) for friction in (1.2, 0.8, 1.2, 0.8)]
 SEEDS = range(11, 15)
 PUBLISHED = HydraulicGains(force=tuple(FORCE))
+PLANTS = [(1.0, 1.0), (0.98, 1.2), (1.02, 0.8)]  # mass and friction of the plant over what is believed
 
 
 def path(t):
@@ -103,7 +105,27 @@ def laws_of_first_truth():
     return laps(2, HydraulicGains())[1][0]
 
 
-PLANTS = [(1.0, 1.0), (0.98, 1.2), (1.02, 0.8)]  # mass and friction of the plant over what is believed
+@pytest.mark.figures
+@pytest.mark.parametrize("way", [(0.0, 0.0, -1.0), (1.0, 0.0, 0.0)])
+def test_a_tool_in_the_air_stands_still_and_moves_evenly_however_slowly(way):
+    """A millimetre a second is what the sensors' noise is worth; cranes that answer stiction swing by 20 and more."""
+    for speed in (0.0, 0.01, 0.025, 0.05, 0.1):
+        found = unevenness(speed * np.array(way))
+        said = f"rms about the mean at most {1e3 * found.max():.1f} mm/s"
+        row(f"in the air, {100 * speed:g} cm/s along {way}, 9 cranes", said)
+        assert found.max() < 2e-3
+
+
+def unevenness(rate):
+    """Rms of the tool's speed about its mean [m/s] over the second half of 0.4 m, or 8 s, for three cranes a plant."""
+    seconds = min(8.0, 0.4 / max(np.linalg.norm(rate), 1e-9))
+    where = crane_runs.scene(np.array([crane_runs.FIXTURE[0], 0.0, crane_runs.ABOVE]), plate=False)
+    mass, friction = np.tile(PLANTS, (3, 1)).T
+    draws = {"robot.mass_scale": mass, "actuator.friction_scale": friction}
+    gains = crane_runs.Stiffness(1e5, 5e4)
+    result = crane_runs.run(lambda t: (rate * t, rate), gains, where, draws, seconds=seconds, seed=3)
+    speeds = [np.gradient(true_path(t.q), t.time, axis=0)[len(t.time) // 2 :] for t in result.traces]
+    return np.array([np.linalg.norm(speed.std(axis=0)) for speed in speeds])
 
 
 def landed(found):
