@@ -9,7 +9,7 @@ from typing import Any
 
 LEAST_CORNER, LARGEST_CORNER = 5.0, 0.08
 """Of filters: [Hz]; share of the control rate (from 0.13 on a `RateFilter` is unstable). Ours: 5 Hz lag by 64 ms."""
-OF_RATE = f"Hz, {LARGEST_CORNER:g} of control.rate_hz at most"
+_OF_RATE = f"Hz, {LARGEST_CORNER:g} of control.rate_hz at most"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,9 +99,9 @@ def impossible(
     figures = (
         ("sensors.encoder", sensors.encoder, 0.0, 0.1, "rad (m), a standard deviation"),
         ("sensors.pressure", sensors.pressure, 0.0, 1e7, "Pa, a standard deviation"),
-        ("sensors.corner_hz", sensors.corner_hz, LEAST_CORNER, LARGEST_CORNER * rate_hz, OF_RATE),
+        ("sensors.corner_hz", sensors.corner_hz, LEAST_CORNER, LARGEST_CORNER * rate_hz, _OF_RATE),
         ("gains.body", gains.body, 0.0, math.inf, "N s/m"),
-        ("gains.force_corner_hz", gains.force_corner_hz, LEAST_CORNER, LARGEST_CORNER * rate_hz, OF_RATE),
+        ("gains.force_corner_hz", gains.force_corner_hz, LEAST_CORNER, LARGEST_CORNER * rate_hz, _OF_RATE),
     )
     for key, value, low, high, unit in figures:
         if not low <= value <= high or not math.isfinite(value):

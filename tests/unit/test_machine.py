@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from skillframe.actuation.delay import CommandDelay
+from skillframe.control.hydraulic import HydraulicGains
 from skillframe.errors import InputError, SkillframeError
 from skillframe.executor import Setup, simulate
 from skillframe.machine import MachineLoop
@@ -118,6 +119,10 @@ def test_the_swing_in_air_finds_the_payload():
     loop = MachineLoop(Follow(diamond, MOVING), setup(), {"robot.payload": np.array([427.5])}, rngs([0]), None)
     loop.tare()
     assert loop.estimator.identification.theta[0, -1] == pytest.approx(-47.5, abs=3.0)
+
+
+def test_the_laws_own_defaults_are_those_of_the_crane_that_ships():
+    assert HydraulicGains.of(load_robot("hiab_xs031")) == HydraulicGains()
 
 
 def test_gains_that_a_crane_cannot_have_end_its_trial_with_what_to_lower():
