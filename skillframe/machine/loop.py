@@ -38,6 +38,7 @@ from skillframe.recorder import Recorder
 from skillframe.robot.feasibility import require_feasible
 from skillframe.robot.holding import require_held
 from skillframe.robot.loops import ClosedChain
+from skillframe.robot.machine_spec import fast_filters
 from skillframe.skill import Command, Observation, Skill
 from skillframe.world.coupled import CoupledPlant
 from skillframe.world.machine_sensors import MachineSensors
@@ -147,6 +148,9 @@ class MachineLoop(Loop):
         if all(self.bank.capabilities(i).rollback for i in range(len(self.chain.actuated))):
             numbers = coupling_numbers(self.bank, self.coupled.effective_mass(), self.dt)
             require_stable(numbers, self.dt, self.chain.actuated)
+        spec = self.setup.robot.spec
+        for problem, fix in fast_filters(spec.sensors, spec.gains, spec.control.rate_hz):
+            raise InputError(f"robot {spec.name}", problem, fix)
         self.gauges.start(z, *self._true_pressures())
         self.law.start()
         self.home = self.plant.tool_pose().position[:, self.task.axes].copy()

@@ -11,6 +11,7 @@ from skillframe.errors import InputError, SkillframeError
 from skillframe.robot.feasibility import problems
 from skillframe.robot.figures import unfit_figures
 from skillframe.robot.loops import ClosedChain
+from skillframe.robot.machine_spec import fast_filters
 from skillframe.robot.model import RobotModel
 from skillframe.robot.problems import Problem
 from skillframe.robot.spec import Limits
@@ -20,6 +21,9 @@ def machine_warnings(robot: RobotModel) -> Iterator[Problem]:
     """Figures that no cylinder has, loops that do not close, a home where it cannot stand, limits made for arms."""
     slips = [_warning("cannot_run", *slip) for one in robot.spec.actuation for slip in unfit_figures(one)]
     yield from slips
+    spec = robot.spec
+    for problem, fix in fast_filters(spec.sensors, spec.gains, spec.control.rate_hz) if spec.actuation else ():
+        yield _warning("cannot_run", problem, fix)
     if not (robot.spec.loop and robot.spec.actuation):
         return
     try:

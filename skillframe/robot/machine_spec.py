@@ -9,7 +9,6 @@ from typing import Any
 
 LEAST_CORNER, LARGEST_CORNER = 5.0, 0.08
 """Of filters: [Hz]; share of the control rate (from 0.13 on a `RateFilter` is unstable). Ours: 5 Hz lag by 64 ms."""
-_OF_RATE = f"Hz, {LARGEST_CORNER:g} of control.rate_hz at most"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,9 +86,7 @@ class Gains:
     force_corner_hz: float = 16.0
 
 
-def impossible(
-    actuation: tuple[Actuation, ...], sensors: Sensors, gains: Gains, rate_hz: float
-) -> Iterator[tuple[str, str, str]]:
+def impossible(actuation: tuple[Actuation, ...], sensors: Sensors, gains: Gains) -> Iterator[tuple[str, str, str]]:
     """What the types allow and no machine has: key, what is wrong with it, and the cure."""
     for drive in actuation:
         for key in ("velocity_gain", "force_gain"):
@@ -99,11 +96,20 @@ def impossible(
     figures = (
         ("sensors.encoder", sensors.encoder, 0.0, 0.1, "rad (m), a standard deviation"),
         ("sensors.pressure", sensors.pressure, 0.0, 1e7, "Pa, a standard deviation"),
-        ("sensors.corner_hz", sensors.corner_hz, LEAST_CORNER, LARGEST_CORNER * rate_hz, _OF_RATE),
+        ("sensors.corner_hz", sensors.corner_hz, LEAST_CORNER, math.inf, "Hz"),
         ("gains.body", gains.body, 0.0, math.inf, "N s/m"),
-        ("gains.force_corner_hz", gains.force_corner_hz, LEAST_CORNER, LARGEST_CORNER * rate_hz, _OF_RATE),
+        ("gains.force_corner_hz", gains.force_corner_hz, LEAST_CORNER, math.inf, "Hz"),
     )
     for key, value, low, high, unit in figures:
         if not low <= value <= high or not math.isfinite(value):
-            allowed = f"{low:g} to {high:g}" if math.isfinite(high) else f"{low:g} or more,"
-            yield key, f"is {value:g}", f"give {allowed} {unit}"
+            allowed = f"{low:g} to {high:g} {unit}" if math.isfinite(high) else f"{low:g} {unit} or more"
+            yield key, f"is {value:g}", f"give {allowed}"
+
+
+def fast_filters(sensors: Sensors, gains: Gains, rate_hz: float) -> Iterator[tuple[str, str]]:
+    """Filters that a control rate [Hz] is too low for: what is wrong, and the cure."""
+    corners = {"sensors.corner_hz": sensors.corner_hz, "gains.force_corner_hz": gains.force_corner_hz}
+    for key, corner in corners.items():
+        if corner > LARGEST_CORNER * rate_hz:
+            problem = f"{key} is {corner:g}, too fast a filter for control.rate_hz of {rate_hz:g}"
+            yield problem, f"give {LARGEST_CORNER * rate_hz:g} Hz at most, or raise control.rate_hz"

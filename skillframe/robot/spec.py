@@ -244,8 +244,7 @@ def _check_values(declared: RobotFile, where: str) -> None:
 def _check_machine(declared: RobotFile, where: str) -> None:
     """Sensors and gains of a machine, and of nothing else."""
     if declared.actuation:
-        told = declared.actuation, declared.sensors, declared.gains, declared.control.rate_hz
-        for key, problem, fix in impossible(*told):
+        for key, problem, fix in impossible(declared.actuation, declared.sensors, declared.gains):
             raise InputError(f"{where}: {key}", problem, fix)
     elif (declared.sensors, declared.gains) != (Sensors(), Gains()):
         text = "[sensors] and [gains] are those of a machine with actuators, and there is no [[actuation]]"

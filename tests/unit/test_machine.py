@@ -14,6 +14,7 @@ from skillframe.executor import Setup, simulate
 from skillframe.machine import MachineLoop
 from skillframe.prepare import load_robot_model
 from skillframe.reproduce.crane_runs import ABOVE, FIXTURE, MOVING, PRESSING, Follow, diamond, press_and_slide, scene
+from skillframe.robot.audit import audit
 from skillframe.robot.loops import ClosedChain
 from skillframe.robot.machine_spec import Gains
 from skillframe.robot.model import load_model
@@ -123,6 +124,17 @@ def test_the_swing_in_air_finds_the_payload():
 
 def test_the_laws_own_defaults_are_those_of_the_crane_that_ships():
     assert HydraulicGains.of(load_robot("hiab_xs031")) == HydraulicGains()
+
+
+@pytest.mark.parametrize(("table", "key"), [("sensors", "corner_hz"), ("gains", "force_corner_hz")])
+def test_filters_that_the_control_rate_is_too_low_for_are_warned_of_and_refused(table, key):
+    """Discrete filters ring, and are unstable from 0.13 of the rate on."""
+    spec = load_robot("hiab_xs031")
+    spec = dataclasses.replace(spec, **{table: dataclasses.replace(getattr(spec, table), **{key: 81.0})})
+    sentence = f"{table}.{key} is 81, too fast a filter for control.rate_hz of 1000"
+    assert [p.message for p in audit(spec).problems] == [sentence]
+    with pytest.raises(InputError, match=re.escape(f"{sentence}; give 80 Hz at most")):
+        MachineLoop(Follow(standing, MOVING), setup(load_model(spec)), {}, rngs([0]), None)
 
 
 def test_gains_that_a_crane_cannot_have_end_its_trial_with_what_to_lower():
