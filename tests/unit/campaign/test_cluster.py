@@ -29,7 +29,15 @@ def out(campaign, tmp_path):
 
 
 def workers_of_this_process():
-    return [c for c in psutil.Process().children(recursive=True) if "spawn_main" in " ".join(c.cmdline())]
+    return [c for c in psutil.Process().children(recursive=True) if "spawn_main" in " ".join(command_of(c))]
+
+
+def command_of(process):
+    """Its command line; none of one that has just been killed, which may be gone or a zombie by now."""
+    try:
+        return process.cmdline()
+    except psutil.NoSuchProcess:  # a zombie is one of these, too
+        return []
 
 
 def changed(out, reference):
