@@ -13,7 +13,7 @@ from skillframe.control.vdc_actuator import cylinders
 from skillframe.robot.machine_spec import Sensors
 from tests.laws.crane_plants import crane
 
-DT, SAMPLES = 1e-3, 40_000
+DT, SAMPLES = 1e-3, 20_000
 
 
 def known():
@@ -22,7 +22,7 @@ def known():
 
 @pytest.mark.parametrize(("corner", "dt"), [(24.0, 1e-3), (60.0, 1e-3), (24.0, 2e-3)])
 def test_noise_through_the_filters_themselves_has_the_stated_deviation(corner, dt):
-    """Fifty signals of 40 s and more: a deviation is known within half a percent."""
+    """Fifty signals of 20 s and more: a deviation is known within half a percent."""
     rng, sensors = np.random.default_rng(2), Sensors(encoder=1.0, pressure=0.0, corner_hz=corner)
     gauge, smooth, found, before = RateFilter(corner, dt), CriticallyDamped(8.0, dt), [], np.zeros(50)
     gauge.start(before)
