@@ -1,7 +1,8 @@
 """What is shown of a trace: its bodies as meshes, which of them stand still, where to look from, where to cut.
 
 The close view looks at the tool's tip from the front right; fixtures near it are cut along the vertical plane through
-the tip that faces the viewer (normal -y of base), so that what happens inside a hole is seen.
+the tip at the end that faces the viewer (normal -y of base), so that what happens inside a hole is seen. A fixture in
+another arm's hand is cut as it lies at the end, and its cut moves with it.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ from skillframe.report.shapes import Mesh, merge, mesh_of, section
 from skillframe.trace import Trace
 
 CUT_NORMAL = np.array([0.0, -1.0, 0.0])
+FIXTURE = "fixture"
+"""The name of the fixture's body in a trace."""
 STILL_MM, STILL_QUATERNION = 1e-6, 1e-6
 AZIMUTH, ELEVATION, FIELD_OF_VIEW = np.radians(-62.0), np.radians(24.0), np.radians(32.0)
 ASPECT, MARGIN = 4.0 / 3.0, 1.12
@@ -124,15 +127,19 @@ class Stage:
         return tuple(self._cut_body(b) for b in range(len(self.names)))
 
     def _cut_body(self, body: int) -> Mesh | None:
-        if not self.still[body] or self.flat[body] or self.tool is None or not len(self.meshes[body].vertices):
+        if not self._cuttable(body) or self.tool is None or not len(self.meshes[body].vertices):
             return None
-        world = self.placed(body, 0).vertices
+        world = self.placed(body, -1).vertices
         outside = np.maximum(world.min(axis=0) - self.tip[-1], self.tip[-1] - world.max(axis=0))
         if outside.max() > CLOSE:
             return None
-        back = np.swapaxes(matrix_from_quaternion(self.quaternion[0, body]), -1, -2)
-        point = rotate(back, self.tip[-1] - self.position[0, body])
+        back = np.swapaxes(matrix_from_quaternion(self.quaternion[-1, body]), -1, -2)
+        point = rotate(back, self.tip[-1] - self.position[-1, body])
         return merge([section(mesh, point, rotate(back, CUT_NORMAL)) for mesh in self.whole[body]])
+
+    def _cuttable(self, body: int) -> bool:
+        """Still bodies, and a fixture that a second arm holds, whose cut is that of the last pose and moves along."""
+        return (self.still[body] or self.names[body] == FIXTURE) and not self.flat[body]
 
 
 def fitted(points: Float, view: Camera) -> Camera:

@@ -1,4 +1,5 @@
 import base64
+from dataclasses import replace
 
 import numpy as np
 from report_fakes import PLACE, trace
@@ -46,6 +47,17 @@ def test_the_stage_knows_the_tool_and_cuts_only_what_stands_still_nearby():
     assert stage.names[stage.tool] == "tool"
     assert [cut is not None for cut in stage.cut] == [True, False, False, False, False]
     assert stage.cut[0].placed(stage.position[0, 0], stage.quaternion[0, 0]).vertices[:, 1].min() > PLACE[1] - 1e-9
+
+
+def test_a_fixture_in_another_arms_hand_is_cut_open_as_it_lies_at_the_end():
+    run = trace()
+    drift = np.linspace(0.0, 0.02, len(run.time))  # the holder gives way by 20 mm towards the viewer
+    run.body_position[:, 0, 1] += drift
+    names = [{**body, "name": "fixture" if i == 0 else body["name"]} for i, body in enumerate(run.meta["bodies"])]
+    stage = stage_of(replace(run, meta={**run.meta, "bodies": names}))
+    assert not stage.still[0] and stage.cut[0] is not None
+    last = stage.cut[0].placed(stage.position[-1, 0], stage.quaternion[-1, 0])
+    assert abs(last.vertices[:, 1].min() - stage.tip[-1, 1]) < 1e-9, "the plane through the tip at the end"
 
 
 def test_the_close_view_looks_at_the_tip_from_near():
