@@ -71,7 +71,7 @@ def opened(path: Path) -> Iterator[Any]:
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
-        raise MissingDependency("rosbags", f"reading {path}", "pip install 'skillframe[ros]'") from None
+        raise MissingDependency("rosbags", f"reading {path}", "pip install rosbags") from None
     with _foreign(path):
         bag = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))  # older .db3 carry no types
         bag.open()

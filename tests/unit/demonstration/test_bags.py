@@ -19,7 +19,7 @@ from skillframe.paths import recordings_dir
 from skillframe.testing import ReaderConformance
 from tests.unit.demonstration.conftest import make
 
-rosbags = pytest.importorskip("rosbags", reason="rosbags is not installed (pip install 'skillframe[ros]')")
+rosbags = pytest.importorskip("rosbags", reason="rosbags is not installed (pip install rosbags)")
 
 from tests.unit.demonstration.bags_written import (  # noqa: E402
     ENDINGS,

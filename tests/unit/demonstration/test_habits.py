@@ -28,7 +28,7 @@ def same(found: Demonstration, demo: Demonstration) -> None:
 
 @pytest.fixture
 def bags() -> Any:
-    pytest.importorskip("rosbags", reason="rosbags is not installed (pip install 'skillframe[ros]')")
+    pytest.importorskip("rosbags", reason="rosbags is not installed (pip install rosbags)")
     from tests.unit.demonstration import bags_written
 
     return bags_written

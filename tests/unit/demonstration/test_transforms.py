@@ -16,7 +16,7 @@ from skillframe.errors import InputError, UnknownName
 from skillframe.frames import Pose, quaternion_from_matrix, rotation_matrix, rotation_vector
 from tests.unit.demonstration.conftest import make
 
-pytest.importorskip("rosbags", reason="rosbags is not installed (pip install 'skillframe[ros]')")
+pytest.importorskip("rosbags", reason="rosbags is not installed (pip install rosbags)")
 
 from tests.unit.demonstration.bags_written import (
     ENDINGS,
