@@ -10,7 +10,8 @@ import pytest
 from skillframe.cli.main import run
 from skillframe.cli.quickstart import PEG
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "tutorial" / "index.md").read_text(encoding="utf-8")
+FOLDER = Path(__file__).resolve().parents[2] / "docs" / "tutorial"
+PAGE = (FOLDER / "index.md").read_text(encoding="utf-8")
 TYPED, PROVED = PAGE.split("## Prove")
 BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```$", TYPED, re.MULTILINE | re.DOTALL)
 COMMANDS = [
@@ -55,3 +56,4 @@ def test_the_campaign_of_the_tutorial_is_that_of_the_demo():
     shown = tomllib.loads(re.search(r"^```toml\n(.*?)^```", PROVED, re.MULTILINE | re.DOTALL)[1])
     demo = tomllib.loads(PEG.format(trials=96, robot="panda"))
     assert {**shown, "skills": None} == {**demo, "skills": None}
+    assert shown == tomllib.loads((FOLDER / "peg.toml").read_text(encoding="utf-8"))
