@@ -62,7 +62,7 @@ def _tell(text: str) -> None:
 def _list(rows: Sequence[Any], as_json: bool) -> int:
     from skillframe.cli.output import PAGE_WIDTH, emit_json, table
 
-    keys = ("summary", "published", "source", "bar", "calibrated")
+    keys = ("summary", "published", "source", "bar", "frozen", "calibrated", "weak")
     found = [{"row": r.name, **{k: getattr(r, k) for k in keys}, "settings": dict(r.settings)} for r in rows]
     if as_json:
         emit_json(found)

@@ -6,6 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 HEAD = ("row", "what", "published", "ours", "verdict", "values")
+ORIGINS = {
+    "predicted": "predicted: every constant was fixed before this figure was looked at",
+    "chosen together": "chosen together: method and worlds were developed side by side; the seeds are fresh",
+    "not computed": "not computed",
+}
 
 
 def render(entries: Sequence[Mapping[str, Any]]) -> str:
@@ -16,8 +21,8 @@ def render(entries: Sequence[Mapping[str, Any]]) -> str:
         "Written by `skillframe reproduce`; do not edit. [How to read it](reproduce.md).", "",
         "```text", _command(entries), "```", "",
         f"{len(entries)} rows, {_count(entries, 'pass')} pass, {_count(entries, 'fail')} fail, "
-        f"{_count(entries, 'reported')} are reported only. One after another they took {wall:.1f} minutes, and "
-        f"{cpu:.1f} minutes of processor time, which several cores share.", "",
+        f"{_count(entries, 'reported')} are reported without a verdict. One after another they took {wall:.1f} "
+        f"minutes, and {cpu:.1f} minutes of processor time, which several cores share.", "",
         _row(HEAD), _row(["---"] * len(HEAD)),
     ]  # fmt: skip
     keys = ("row", "summary", "published", "ours", "verdict", "values_are")
@@ -34,10 +39,18 @@ def _command(entries: Sequence[Mapping[str, Any]]) -> str:
 
 
 def origin(each: Mapping[str, Any]) -> str:
-    """Whether our figure was predicted, or what was chosen with the published one in sight."""
+    """Whether our figure was predicted, or what was chosen with the published one or with the worlds in sight."""
     if each["values_are"] == "calibrated":
         return f"calibrated: {each['calibrated']}"
-    return "predicted: nothing was tuned to it" if each["values_are"] == "predicted" else "not computed"
+    return ORIGINS[each["values_are"]]
+
+
+def threshold(each: Mapping[str, Any]) -> str:
+    """What ours must be to pass, and why reaching it would show nothing if that is so."""
+    if not each["bar"]:
+        return "none: reported only"
+    weak = each.get("weak")
+    return each["bar"] + (f". Reaching it is no pass: {weak}" if weak else "")
 
 
 def _count(entries: Sequence[Mapping[str, Any]], verdict: str) -> int:
@@ -59,7 +72,7 @@ def _details(each: Mapping[str, Any]) -> list[str]:
     facts = [
         f"- published: {_cell(each['published'])} ({_cell(each['source'])})",
         f"- ours: {_cell(each['ours'])}",
-        f"- bar: {_cell(each['bar'])}; **{each['verdict']}**" if each["bar"] else "- no bar: reported only",
+        f"- threshold: {_cell(threshold(each))}; **{each['verdict']}**",
         f"- {origin(each)}",
     ]
     facts += [f"- difference: {_cell(each['difference'])}"] if each["difference"] else []

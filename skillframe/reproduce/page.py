@@ -11,7 +11,7 @@ from typing import Any
 
 from skillframe.report.markup import Markup, data_uri, figure, join, note, table, tag
 from skillframe.report.page import POLICY
-from skillframe.reproduce.document import origin
+from skillframe.reproduce.document import origin, threshold
 
 BADGES = {"pass": "badge won", "fail": "badge lost", "reported": "badge"}
 HEAD = ("row", "what is claimed", "published", "ours", "verdict", "values")
@@ -68,8 +68,8 @@ def _style() -> Markup:
 def _hero(entries: Sequence[Mapping[str, Any]]) -> Markup:
     count = {verdict: sum(each["verdict"] == verdict for each in entries) for verdict in BADGES}
     lead = (
-        f"Published results, computed anew: {count['pass']} pass their bar, {count['fail']} do not, "
-        f"{count['reported']} are reported without one. A row that does not reproduce is a result, too."
+        f"Published results, computed again: {count['pass']} pass, {count['fail']} fail, {count['reported']} are "
+        "reported without a verdict. A row that does not reproduce is a result, too."
     )
     quick = any(each["quick"] for each in entries)
     lines = [
@@ -93,7 +93,7 @@ def _section(each: Mapping[str, Any]) -> Markup:
     facts = [
         ("published", f"{each['published']} ({each['source']})"),
         ("ours", each["ours"]),
-        ("bar", each["bar"] or "none: reported only"),
+        ("threshold", threshold(each)),
         ("values", origin(each)),
         ("difference", each["difference"]),
         ("command", tag("code", each["command"])),

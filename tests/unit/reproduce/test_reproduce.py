@@ -8,6 +8,7 @@ import subprocess
 import sys
 import textwrap
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -221,7 +222,7 @@ def test_the_page_lists_its_rows_by_topic_and_an_older_row_without_one():
 def test_the_docs_page_keeps_its_tables_whole():
     text = document.render(entries())
     assert "a \\<claim> \\| of" in text and "| y \\| z |" in text
-    assert "predicted: nothing was tuned to it" in text and "- difference: why" in text
+    assert "- chosen together: method and worlds were developed side by side" in text and "- difference: why" in text
 
 
 def test_only_a_verdict_that_differs_from_the_docs_is_a_change():
@@ -232,7 +233,49 @@ def test_only_a_verdict_that_differs_from_the_docs_is_a_change():
 def test_a_row_without_a_figure_is_neither_predicted_nor_calibrated():
     row = toy()
     assert store.values_are(row, RowResult(ours="not run here", computed=False)) == "not computed"
-    assert store.values_are(row, RowResult(ours="1")) == "predicted"
+    assert store.values_are(row, RowResult(ours="1")) == "chosen together"
+    assert store.values_are(replace(row, frozen=True), RowResult(ours="1")) == "predicted"
+    assert store.values_are(replace(row, frozen=True, calibrated="x"), RowResult(ours="1")) == "calibrated"
+
+
+def test_a_threshold_that_anything_reaches_can_be_missed_and_reaching_it_is_no_pass():
+    weak = replace(toy(), weak="an average does so too")
+    kept = {v: store.verdict(weak, RowResult(ours="1", verdict=v)) for v in ("pass", "fail", "reported")}
+    assert kept == {"pass": "reported", "fail": "fail", "reported": "reported"}
+    assert store.verdict(toy(), RowResult(ours="1", verdict="pass")) == "pass"
+    shown = document.render([{**entries()[0], "weak": weak.weak}])
+    assert "threshold: b. Reaching it is no pass: an average does so too; **" in shown
+
+
+def test_a_share_that_is_missed_and_not_excluded_is_undecided_with_its_interval():
+    from skillframe.reproduce.bars import judged, undecided
+
+    assert judged(11, 12, 0.9, quick=False) == "pass" and not undecided(11, 12, 0.9, quick=False)
+    assert judged(10, 12, 0.9, quick=False) == "reported"
+    # Clopper and Pearson of 10 in 12: 0.5159 to 0.9791
+    assert "52 to 98 %" in undecided(10, 12, 0.9, quick=False)
+    # of 6 in 12: 0.2109 to 0.7891, below 0.9
+    assert judged(6, 12, 0.9, quick=False) == "fail" and not undecided(6, 12, 0.9, quick=False)
+
+
+COMMITTED = Path(__file__).parents[3] / "docs" / "reproduced" / "reproduce.json"
+
+
+def test_the_committed_table_counts_as_passes_only_rows_that_can_fail():
+    rows = {each["row"]: each for each in json.loads(COMMITTED.read_text(encoding="utf-8"))}
+    assert {n for n, each in rows.items() if each["values_are"] == "predicted"} == {"1", "2", "21"}
+    assert {n for n in ("3", "11", "12", "14") if rows[n]["verdict"] == "pass"} == set(), "anything reaches these"
+    assert {n for n in ("7", "9", "10") if rows[n]["verdict"] != "fail"} == set(), "the two-arm paper's own claim"
+
+
+@pytest.mark.needs_plugins
+def test_each_committed_row_says_of_its_values_and_threshold_what_the_code_says(capsys):
+    assert run(["reproduce", "--list", "--json"]) == 0
+    now = {each["row"]: each for each in json.loads(capsys.readouterr().out)}
+    for each in json.loads(COMMITTED.read_text(encoding="utf-8")):
+        assert {k: each[k] for k in ("bar", "calibrated", "weak")} == {
+            k: now[each["row"]][k] for k in ("bar", "calibrated", "weak")
+        }, f"row {each['row']} was computed with another threshold: type skillframe reproduce {each['row']}"
 
 
 def test_a_quick_run_misses_a_share_only_where_its_counts_exclude_it():

@@ -40,23 +40,30 @@ DIFFERENCE = {
 def row_types() -> Iterable[RowType]:
     """The rows of this plug-in."""
 
-    def row(name: str, summary: str, published: str, bar: str, run: Any, calibrated: str = CALIBRATED) -> RowType:
+    def row(name: str, summary: str, published: str, bar: str, run: Any, weak: str = "") -> RowType:
         return RowType(
-            name=name, summary=summary, published=published, source=SOURCE, bar=bar, calibrated=calibrated,
+            name=name, summary=summary, published=published, source=SOURCE, bar=bar, calibrated=CALIBRATED, weak=weak,
             settings=SETTINGS, group="two arms", run=run,
         )  # fmt: skip
 
     yield row("7", "two arms insert up to a tilt that depends on who gives way where (Table I)",
               "A 4, B 12, C fails at 4, D 8, E 12 degrees",
-              "with joint friction, + sign: C < D < B, C at most 6, D 6 to 10, B at least 12", _table)  # fmt: skip
+              "with joint friction, + sign: each of A to E within 4 degrees (two steps) of the published",
+              _table)  # fmt: skip
     yield row("8", "C fails because of static friction in the slave's joints", "C fails at 4 degrees",
-              "C at 8 degrees succeeds without joint friction and fails with it", _slave, "")  # fmt: skip
-    yield row("9", "time of an insertion from 8 degrees", "B 26.5 s, D 13.0 s, E 5.0 s", "", _times)
-    yield row("10", "way of all joints from 8 degrees", "B 1.45, D 0.99, E 0.59 rad", "", _paths)
+              "C at 8 degrees succeeds without joint friction and fails with it", _slave)  # fmt: skip
+    yield row("9", "both arms compliant insert in shorter time (from 8 degrees)", "B 26.5 s, D 13.0 s, E 5.0 s",
+              "with joint friction, + sign: E inserts in less time than D, and D in less than B", _times)  # fmt: skip
+    yield row("10", "both arms compliant insert with less joint motion (from 8 degrees)", "B 1.45, D 0.99, E 0.59 rad",
+              "with joint friction, + sign: the joints of E move less than those of D, and D's less than B's",
+              _paths)  # fmt: skip
     yield row("11", "the opposite sign of the tilt works as well", "works",
-              "without joint friction the signs differ by at most 2 degrees for A to D", _signs, "")  # fmt: skip
+              "without joint friction the signs differ by at most 2 degrees for A to D", _signs,
+              "every configuration reaches the end of the sweep there, so the difference is 0 by its ceiling",
+              )  # fmt: skip
     yield row("12", "the pair turns the wrong way only at large angles or low friction", "only there",
-              "without joint friction A to D never turn as a pair", _failures, "")  # fmt: skip
+              "without joint friction A to D never turn as a pair", _failures,
+              "all of these trials succeed, E is left out, and the friction of the parts is never varied")  # fmt: skip
 
 
 class Sweep(NamedTuple):
@@ -116,7 +123,7 @@ def _table(job: RowRun) -> RowResult:
     sweep = _sweep(job)
     names = sweep.names
     reach = {n: sweep.reach(n, 1, stuck=True) for n in names}
-    good = reach["C"] <= 6.0 <= reach["D"] <= 10.0 and reach["B"] >= 12.0 and reach["C"] < reach["D"] < reach["B"]
+    unlike = _unlike(reach)
     columns = [(stuck, posture) for stuck in (False, True) for posture in sweep.postures]
     head = ["largest tilt [degrees]", "published"]
     head += [f"{sweep.stiff if stuck else 0:g} Nm, {posture}, + / -" for stuck, posture in columns]
@@ -127,14 +134,14 @@ def _table(job: RowRun) -> RowResult:
     ]  # fmt: skip
     return RowResult(
         ours=", ".join(f"{n} {reach[n]:g}" for n in names[:5])
-        + f" degrees at {sweep.stiff:g} Nm, + sign{_unlike(reach)}",
-        verdict="pass" if good else "fail", difference=DIFFERENCE["7"], head=head, rows=rows,
+        + f" degrees at {sweep.stiff:g} Nm, + sign{unlike}",
+        verdict="fail" if unlike else "pass", difference=DIFFERENCE["7"], head=head, rows=rows,
         values={f"largest_{n}_deg": reach[n] for n in names}, pictures=[_picture(sweep)],
     )  # fmt: skip
 
 
 def _unlike(reach: dict[str, float]) -> str:
-    """Which configurations are far from the paper's, though the bar may not ask."""
+    """Which configurations are far from the paper's; "" if none is."""
     published = {n: PUBLISHED[n]["largest_deg"] for n in PUBLISHED if n in reach}
     names = [n for n, value in published.items() if abs(reach[n] - value) > FAR_DEG]
     return f"; {' and '.join(names)} not as published" if names else ""
@@ -177,8 +184,10 @@ def _compared(job: RowRun, row: str, key: str, unit: str, text: Any, ours: Any) 
     ]  # fmt: skip
     found = ", ".join(f"{n}: {text(_at_8(sweep, n, True))}" for n in "BDE")
     stiff = f"{sweep.stiff:g} Nm"
+    best = [ours(r) if (r := _at_8(sweep, n, True)).outcome == "success" else np.inf for n in "EDB"]
     return RowResult(
         ours=f"{found} with joint friction", difference=DIFFERENCE[row], rows=rows,
+        verdict="pass" if best[0] < best[1] < best[2] else "fail",
         head=("", "published", "0 Nm, +", "0 Nm, -", f"{stiff}, +", f"{stiff}, -"),
         values={f"{n}_{'stuck' if stuck else 'free'}": ours(_at_8(sweep, n, stuck)) for n in sweep.names
                 for stuck in (False, True)},

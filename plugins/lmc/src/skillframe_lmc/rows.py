@@ -33,10 +33,16 @@ SHARE = 0.95
 TOPIC = "learning from force"
 REDRAWN = "demonstrations that failed and were redrawn"
 START_DEG = 8.0
+IGNORED = (
+    "the mean direction of the motions, and minus the mean force, which know nothing of sectors, reach it in 20 of 20 "
+    "pairs too, because starts and aim are symmetric about the valley"
+)
+FACE_M, LEVER_M = 0.030, 0.150
 LEVER = (
     "The verdict takes the flange, where the paper has its tool point and centre of compliance. Ours lies 150 mm "
     "behind a face of 30 mm radius: from 8 degrees the edge touches only 9 mm beside the line of the push, so that a "
-    "learned push 3.4 degrees off to that side tips the coupler over instead of flush; two demonstrations with this "
+    f"learned push {degrees(atan(FACE_M / LEVER_M)) - START_DEG:.1f} degrees off to that side tips the coupler over "
+    "instead of flush; two demonstrations with this "
     "noise of the aim leave more than that in some pairs. Steered at the tip, the push has its full lever."
 )
 
@@ -47,20 +53,20 @@ def row_types() -> Iterable[RowType]:
         name="1", topic=TOPIC,
         summary="the sector of feasible pushes narrows with friction", published="narrower with friction",
         source=SEED, bar="median width within 1 degree of 90 - atan(friction), at three frictions",
-        settings={"world.friction": 0.2, "teacher.aim_noise_deg": 3.0}, run=_sector_width,
+        frozen=True, settings={"world.friction": 0.2, "teacher.aim_noise_deg": 3.0}, run=_sector_width,
     )  # fmt: skip
     yield RowType(
         name="2", topic=TOPIC,
         summary="from either side, one push and one free axis slide to the valley's bottom",
         published="slides from any start of the convergence region", source=SEED,
         bar="largest tilt of the push within 2 degrees of slope - atan(friction), both sides",
-        settings={"world.friction": 0.2, "world.slope_deg": 45.0}, run=_valley_boundary,
+        frozen=True, settings={"world.friction": 0.2, "world.slope_deg": 45.0}, run=_valley_boundary,
     )  # fmt: skip
     yield RowType(
         name="3", topic=TOPIC,
         summary="the intersection of pyramids is robust to a wavering hand", published="robust to noise",
-        source=SEED, bar="a feasible direction from two demonstrations in 95 % of the pairs", settings=VALLEY,
-        run=_noise,
+        source=SEED, bar="a feasible direction from two demonstrations in 95 % of the pairs", weak=IGNORED,
+        settings=VALLEY, run=_noise,
     )  # fmt: skip
     yield RowType(
         name="4", topic=TOPIC,

@@ -1,7 +1,7 @@
 """Rows 13, 14 and 23 of the papers' results: learned searches beside a random walk and a spiral, on the same goals.
 
 The fillet of the part, not its play, sets how hard the search is; the budget of time is ours, as the paper's is not
-known. So the published shares are met by calibration, and the lead over a random walk is what is predicted.
+known. So the published shares are met by calibration; the lead over a random walk was not calibrated.
 """
 
 from __future__ import annotations
@@ -39,14 +39,16 @@ def row_types() -> Iterable[RowType]:
     )  # fmt: skip
     yield RowType(
         name="14", summary="few blind demonstrations suffice", published="only few demonstrations", source=SOURCE,
-        bar="at most five demonstrations find 75 % of the holes", calibrated=CALIBRATED, settings=SETTINGS,
-        group="search", run=_few,
+        bar="at most five demonstrations find 75 % of the holes", calibrated=CALIBRATED,
+        weak="five demonstrations are row 13's own run, so that this row passes whenever row 13 does",
+        settings=SETTINGS, group="search", run=_few,
     )  # fmt: skip
     yield RowType(
         name="23", summary="a spiral is sure with the right pitch and centre, in the plane only",
         published="guaranteed with the right pitch and start", source="the overview paper",
         bar="centred spiral 100 % of the peg's holes; centre 6 mm off: at 7 s, 15 points behind the learned search",
-        settings=SETTINGS, group="spiral", topic="search", run=_spiral,
+        calibrated="the fillet of the part, and the budgets of 20 s and 7 s", settings=SETTINGS,
+        group="spiral", topic="search", run=_spiral,
     )  # fmt: skip
 
 
