@@ -53,6 +53,11 @@ class Axis:
         return {self.kind: list(self.numbers)}
 
 
+def cells_of(vary: Mapping[str, Axis]) -> int:
+    """Number of cells of the product of all grid axes; 1 without any."""
+    return math.prod(len(axis.numbers) for axis in vary.values() if axis.kind == "grid")
+
+
 def parse_axis(value: Any, where: str) -> Axis:
     """An axis from its TOML value.
 

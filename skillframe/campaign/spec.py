@@ -1,8 +1,9 @@
 """`campaign.toml` as a checked record: what runs, how often, and what varies.
 
-`trials` is the total number per skill. Trial i of a campaign with grid axes takes cell i modulo the number of cells, so
-that every prefix of the trials covers the grid as evenly as it can; fewer trials than cells are refused. `[set]` fixes
-quantities (those of `--set`: `"world.clearance" = 0.0002`) that `[vary]` does not name.
+`trials` is the total number per skill. Trial i of a campaign with grid axes takes cell i modulo the number of cells;
+fewer trials than cells are refused. The first trials are then one end of the grid and no sample of it, so a campaign
+with grid or values axes cannot stop early (`validity`). `[set]` fixes quantities (those of `--set`:
+`"world.clearance" = 0.0002`) that `[vary]` does not name.
 """
 
 from __future__ import annotations
@@ -13,9 +14,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from skillframe.campaign.axes import Axis, Value, parse_axis
+from skillframe.campaign.axes import Axis, Value, cells_of, parse_axis
 from skillframe.campaign.entries import parse_entry
 from skillframe.campaign.quantities import GROUPS, check_axis, check_name, check_value
+from skillframe.campaign.validity import Plan, plan_of
 from skillframe.config import build, read_toml
 from skillframe.errors import InputError
 
@@ -106,7 +108,13 @@ class CampaignSpec:
     @property
     def cells(self) -> int:
         """Number of cells of the grid; 1 without grid axes."""
-        return math.prod(len(axis.numbers) for axis in self.vary.values() if axis.kind == "grid")
+        return cells_of(self.vary)
+
+    @property
+    def plan(self) -> Plan:
+        """What is fixed before the first trial."""
+        may_stop = self.stop.interval_width is not None
+        return plan_of(self.vary, trials=self.trials, skills=len(self.skills), may_stop=may_stop)
 
     def plain(self) -> dict[str, Any]:
         """The campaign as plain JSON values, as `from_plain` reads them; without its folder."""
@@ -225,5 +233,13 @@ def _check_designs(spec: CampaignSpec, path: Path) -> None:
     if spec.trials < spec.cells:
         raise InputError(
             f"{path}: trials", f"{spec.trials} trials leave some of the grid's {spec.cells} cells empty",
-            f"give at least {spec.cells}, best a multiple of it",
+            f"give a multiple of {spec.cells}",
         )  # fmt: skip
+    if spec.plan.in_order and spec.plan.may_stop:
+        names = [name for name, axis in spec.vary.items() if axis.kind in ("grid", "values")]
+        raise InputError(
+            f"{path}: stop.interval_width",
+            f"cannot stop early over {', '.join(names)}: grid and values axes run in order, so the first trials are "
+            "one end of them and no interval from these trials holds for all",
+            "make these axes uniform or sobol, or leave out [stop]",
+        )

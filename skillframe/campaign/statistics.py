@@ -9,12 +9,14 @@ beta-mixture confidence sequence instead (Robbins 1970): with the prior Beta(a, 
 is a martingale of mean 1 at the true p, so by Ville's inequality {p : M_n(p) < 1/alpha} holds the truth at all n at
 once with probability 1 - alpha. Two skills on the same draws are compared on the trials where they differ (McNemar
 1947): w that only the first wins, l that only the second wins, exactly binomial with 1/2 if they are equal; peeked at,
-by the same martingale at p = 1/2.
+by the same martingale at p = 1/2. Several pairs are corrected together by Holm's step-down method (1979), which needs
+nothing of how the p-values depend on each other.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 CLOPPER_PEARSON = "Clopper-Pearson (exact, two-sided, fixed number of trials)"
@@ -88,3 +90,20 @@ def mcnemar(only_first: int, only_second: int) -> float:
 def mcnemar_sequential(only_first: int, only_second: int) -> float:
     """p-value of "both skills are equally good" that may be looked at after every trial: min(1, 1/M_n(1/2))."""
     return min(1.0, math.exp(-log_mixture(only_first, only_second, 0.5)))
+
+
+def holm(p_values: Sequence[float]) -> list[float]:
+    """p-values (k,) corrected so that any of k true hypotheses is below alpha with probability alpha at most.
+
+    The i-th smallest (i = 0 ...) is multiplied by k - i, and no corrected value is below one that comes before it.
+    """
+    corrected, largest = [0.0] * len(p_values), 0.0
+    for i, place in enumerate(sorted(range(len(p_values)), key=p_values.__getitem__)):
+        largest = max(largest, min(1.0, (len(p_values) - i) * p_values[place]))
+        corrected[place] = largest
+    return corrected
+
+
+def correction(pairs: int) -> str:
+    """What was done for several pairs, in words."""
+    return f"Holm over {pairs} pairs" if pairs > 1 else "none, there is one pair"

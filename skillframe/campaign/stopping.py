@@ -2,7 +2,8 @@
 
 The rule looks at the trials in their order: it stops at the first trial t such that, over trials 0 ... t, every skill's
 confidence sequence (`statistics.confidence_sequence`, valid at every look) is as narrow as asked. Trials beyond t that
-happened to run are left out of the results, so any number of workers and any resume end in the same table.
+happened to run are left out of the results, so any number of workers and any resume end in the same table. Draws must
+not depend on their order for that: grid and values axes are refused by `spec`.
 """
 
 from __future__ import annotations

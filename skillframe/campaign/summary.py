@@ -8,55 +8,63 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
-from skillframe.campaign import statistics
 from skillframe.campaign.rows import Row
 from skillframe.campaign.spec import CampaignSpec
+from skillframe.campaign.statistics import correction, holm
 from skillframe.campaign.store import FORMAT, VERSION, write_text
+from skillframe.campaign.validity import Basis, Validity, unbroken, validity_of
 from skillframe.errors import InputError
 
 SUMMARY = "summary.json"
 
 
 def rates(spec: CampaignSpec, rows: Sequence[Row], complete: bool) -> dict[str, dict[str, Any]]:
-    """Per skill: trials, successes, rate, `interval_95`, method, and how often which failure.
+    """Per skill: trials, successes, rate, `interval_95` (null if there is none), method, and how often which failure.
 
-    The interval is Clopper-Pearson's where the number of trials was fixed and all of them ran; a campaign that can stop
-    early, or is looked at before its end, gets the confidence sequence.
+    Which interval it is, and why there may be none, `validity` says. An unfinished campaign counts each skill's trials
+    up to the first one that is missing; `uncounted` is the number of its rows beyond.
     """
-    return {
-        label: _rate([r for r in rows if r["skill"] == label], label, _fixed(spec, complete)) for label in spec.labels
-    }
+    validity = validity_of(spec.plan, complete=complete)
+    return {label: _rate(_of(rows, label, complete), rows, label, validity) for label in spec.labels}
 
 
-def _fixed(spec: CampaignSpec, complete: bool) -> bool:
-    return complete and spec.stop.interval_width is None
+def _of(rows: Sequence[Row], label: str, complete: bool) -> list[Row]:
+    """The rows of a skill that count."""
+    mine = [row for row in rows if row["skill"] == label]
+    reach = unbroken(row["trial"] for row in mine)
+    return [row for row in mine if complete or row["trial"] < reach]
 
 
-def _rate(rows: Sequence[Row], label: str, fixed: bool) -> dict[str, Any]:
-    n, s = len(rows), sum(row["success"] for row in rows)
-    interval = statistics.clopper_pearson if fixed else statistics.confidence_sequence
-    failures = [row["failure"] for row in rows if not row["success"]]
+def _rate(counted: Sequence[Row], rows: Sequence[Row], label: str, validity: Validity) -> dict[str, Any]:
+    n, s = len(counted), sum(row["success"] for row in counted)
+    interval = validity.interval(s, n)
+    failures = [row["failure"] for row in counted if not row["success"]]
     return {
         "skill": label,
         "trials": n,
         "successes": s,
         "rate": s / n if n else None,
-        "interval_95": list(interval(s, n)) if n else [0.0, 1.0],
-        "method": statistics.CLOPPER_PEARSON if fixed else statistics.SEQUENCE,
+        "interval_95": None if interval is None else list(interval),
+        "method": validity.interval_method,
         "failures": {text: failures.count(text) for text in sorted(set(failures))},
+        "uncounted": sum(row["skill"] == label for row in rows) - n,
     }
 
 
 def comparisons(spec: CampaignSpec, rows: Sequence[Row], complete: bool) -> list[dict[str, Any]]:
-    """Every pair of skills on the trials that both ran."""
-    outcome = {label: {r["trial"]: r["success"] for r in rows if r["skill"] == label} for label in spec.labels}
-    return [_comparison(a, b, outcome, _fixed(spec, complete)) for a, b in combinations(spec.labels, 2)]
+    """Every pair of skills on the trials that both ran; `p_value` is corrected for the number of pairs."""
+    validity = validity_of(spec.plan, complete=complete)
+    outcome = {label: {r["trial"]: r["success"] for r in _of(rows, label, complete)} for label in spec.labels}
+    pairs = [_comparison(a, b, outcome, validity) for a, b in combinations(spec.labels, 2)]
+    if validity.basis is not Basis.NONE:
+        for pair, corrected in zip(pairs, holm([p["p_value_uncorrected"] for p in pairs]), strict=True):
+            pair |= {"p_value": corrected, "correction": correction(len(pairs))}
+    return pairs
 
 
-def _comparison(a: str, b: str, outcome: Mapping[str, Mapping[int, bool]], fixed: bool) -> dict[str, Any]:
+def _comparison(a: str, b: str, outcome: Mapping[str, Mapping[int, bool]], validity: Validity) -> dict[str, Any]:
     pairs = [(outcome[a][t], outcome[b][t]) for t in outcome[a] if t in outcome[b]]
     first, second = pairs.count((True, False)), pairs.count((False, True))
-    test = statistics.mcnemar if fixed else statistics.mcnemar_sequential
     return {
         "first": a,
         "second": b,
@@ -65,8 +73,10 @@ def _comparison(a: str, b: str, outcome: Mapping[str, Mapping[int, bool]], fixed
         "only_first": first,
         "only_second": second,
         "neither": pairs.count((False, False)),
-        "p_value": test(first, second),
-        "method": statistics.MCNEMAR if fixed else statistics.MCNEMAR_SEQUENTIAL,
+        "p_value": None,
+        "p_value_uncorrected": validity.p_value(first, second),
+        "correction": None,
+        "method": validity.test_method,
     }
 
 

@@ -166,6 +166,10 @@ def _go_on(folder: Path, options: Options) -> int:
     from skillframe.campaign.runner import run_campaign
 
     spec = load(folder)
+    if spec.trials % spec.cells:
+        from skillframe.campaign.validity import validity_of
+
+        click.echo(f"there will be {validity_of(spec.plan, complete=True).interval_method}", err=True)
     try:
         with _progress() as notify:
             summary = run_campaign(folder, evaluate.evaluate, options, notify)
@@ -182,7 +186,7 @@ def _conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any]) -> int:
     for pair in summary["comparisons"]:
         click.echo(f"{pair['first']} against {pair['second']} on the same {pair['trials']} draws:")
         click.echo(f"  only the first succeeds in {pair['only_first']}, only the second in {pair['only_second']}")
-        click.echo(f"  p = {pair['p_value']:.2g}, {pair['method']}")
+        click.echo(f"  {_p_value(pair)}{pair['method']}")
     if summary["stopped_after_trial"] is not None:
         click.echo(f"stopped early after trial {summary['stopped_after_trial']}: the intervals are narrow enough")
     click.echo(f"results: {folder / 'results.csv'}")
@@ -192,6 +196,13 @@ def _conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any]) -> int:
     return 1 if short else 0
 
 
+def _p_value(pair: dict[str, Any]) -> str:
+    if pair["p_value"] is None:
+        return ""
+    corrected = f" ({pair['correction']})" if pair["correction"].startswith("Holm") else ""
+    return f"p = {pair['p_value']:.2g}{corrected}, "
+
+
 def _show_rates(skills: dict[str, dict[str, Any]]) -> None:
     from skillframe.cli.output import table
     from skillframe.report.results import cause_of
@@ -199,14 +210,17 @@ def _show_rates(skills: dict[str, dict[str, Any]]) -> None:
     rows = [
         [
             label, s["trials"], s["successes"], "-" if s["rate"] is None else f"{s['rate']:.3f}",
-            f"{s['interval_95'][0]:.3f} .. {s['interval_95'][1]:.3f}",
+            "none" if s["interval_95"] is None else f"{s['interval_95'][0]:.3f} .. {s['interval_95'][1]:.3f}",
         ]
         for label, s in skills.items()
     ]  # fmt: skip
     table(["skill", "trials", "successes", "rate", "95 % interval"], rows)
     for method in dict.fromkeys(s["method"] for s in skills.values()):
-        click.echo(f"  intervals: {method}")
+        click.echo(f"  {method}" if method.startswith("no interval") else f"  intervals: {method}")
     for label, s in skills.items():
+        if s["uncounted"]:
+            more = f"{s['uncounted']} finished runs after trial {s['trials']} are not counted until that trial has run"
+            click.echo(f"  {label}: {more}")
         causes: Counter[str] = Counter()
         for text, count in s["failures"].items():
             causes[cause_of(text)] += count

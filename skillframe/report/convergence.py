@@ -1,8 +1,9 @@
 """Where a skill works: success over what varied, as a map of two quantities and as curves of one.
 
-Cells and points hold counts and exact 95 % Clopper-Pearson intervals. Quantities are ranked by the mutual information
-between their quintile and success, the largest over skills (our choice: it sees "too far to either side" as well as
-"too much"). Theory's region (`theory`) is drawn over both.
+Cells and points hold counts and the kind of 95 % interval that the whole campaign has, each by itself, or none where
+the campaign has none (`campaign.validity`). Quantities are ranked by the mutual information between their quintile and
+success, the largest over skills (our choice: it sees "too far to either side" as well as "too much"). Theory's region
+(`theory`) is drawn over both.
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ from itertools import pairwise
 import numpy as np
 
 from skillframe.frames import Float
-from skillframe.report.markup import Markup, figure, join, percent, tag
+from skillframe.report.markup import Markup, figure, join, tag
 from skillframe.report.quantities import Quantity, quantity
-from skillframe.report.results import Rate, Results, Row, rate_of
+from skillframe.report.results import Rate, Results, Row
 from skillframe.report.svg import Axes, padded, picture, text
 from skillframe.report.theory import Region, boundary, mark
 
@@ -72,7 +73,7 @@ def cell_map(results: Results, skill: str, names: Sequence[str], limits: Sequenc
     xs, ys = edges_of(values_of(everything, across), len(rows)), edges_of(values_of(everything, up), len(rows))
     axes = Axes(width=460, height=400, x=(xs[0], xs[-1]), y=(ys[0], ys[-1]), x_label=across.axis, y_label=up.axis)
     rate = results.rate(skill)
-    cells = [_cell(axes, rows, (across, up), x, y) for x in pairwise(xs) for y in pairwise(ys)]
+    cells = [_cell(axes, results, rows, (across, up), x, y) for x in pairwise(xs) for y in pairwise(ys)]
     dots = [_dot(axes, x, y, r) for x, y, r in zip(values_of(rows, across), values_of(rows, up), rows, strict=True)]
     lines = [axes.frame(), *(boundary(axes, (across, up), limit) for limit in limits)]
     parts = [*(cell for cell, _ in cells), *lines, *dots, *(words for _, words in cells)]
@@ -81,22 +82,22 @@ def cell_map(results: Results, skill: str, names: Sequence[str], limits: Sequenc
 
 
 def _cell(
-    axes: Axes, rows: Sequence[Row], names: tuple[Quantity, Quantity], x: tuple[float, float], y: tuple[float, float]
-) -> tuple[Markup, Markup]:
+    axes: Axes, results: Results, rows: Sequence[Row], names: tuple[Quantity, Quantity], x: tuple[float, float],
+    y: tuple[float, float],
+) -> tuple[Markup, Markup]:  # fmt: skip
     """A cell and, to be drawn above everything else, its figures."""
     inside = [r for r in rows if _within(r, names[0], x, axes.x) and _within(r, names[1], y, axes.y)]
     left, right, low, high = axes.across(x[0]), axes.across(x[1]), axes.up(y[0]), axes.up(y[1])
     box = {"x": f"{left:.1f}", "y": f"{high:.1f}", "width": f"{right - left:.1f}", "height": f"{low - high:.1f}"}
     if not inside:
         return tag("rect", tag("title", "no trials"), **box, class_="cell empty"), Markup("")
-    rate, middle = rate_of(inside), (0.5 * (left + right), 0.5 * (low + high))
-    tip = f"{rate.successes} of {rate.trials}, exact 95 % interval {percent(rate.low)} to {percent(rate.high)}"
+    rate, middle = results.rate_of(inside), (0.5 * (left + right), 0.5 * (low + high))
     color = shade(rate.share)
-    span = f"{100 * rate.low:.0f}–{100 * rate.high:.0f} %"
-    words = [
-        text(middle[0], middle[1], f"{rate.successes}/{rate.trials}", "count", "middle"),
-        text(middle[0], middle[1] + 11, span, "span", "middle"),
-    ]
+    words = [text(middle[0], middle[1], f"{rate.successes}/{rate.trials}", "count", "middle")]
+    if rate.interval is not None:
+        span = f"{100 * rate.interval.low:.0f}–{100 * rate.interval.high:.0f} %"
+        words.append(text(middle[0], middle[1] + 11, span, "span", "middle"))
+    tip = f"{rate.successes} of {rate.trials}, {results.said(rate)}"
     return tag("rect", tag("title", tip), **box, class_="cell", fill=color), tag(
         "g", *words, stroke=color, class_="halo"
     )
@@ -132,18 +133,19 @@ def rate_curves(results: Results, name: str, limits: Sequence[Region]) -> Markup
     axes = Axes(x=padded(borders[0], borders[-1], 0.02), y=(-4.0, 104.0), x_label=across.axis, y_label="success [%]")
     parts = [axes.frame(y_ticks=[0, 25, 50, 75, 100])]
     parts += [mark(axes, across, limit) for limit in limits if limit.name == name]
-    parts += [_curve(axes, results.of(skill), across, borders, i) for i, skill in enumerate(results.skills)]
+    parts += [_curve(axes, results, skill, across, borders, i) for i, skill in enumerate(results.skills)]
     svg = picture(axes, f"Success over {across.label}", *parts)
     return figure(f"Over {across.label}", "", svg, class_="plot")
 
 
-def _curve(axes: Axes, rows: Sequence[Row], name: Quantity, borders: Float, index: int) -> Markup:
+def _curve(axes: Axes, results: Results, skill: str, name: Quantity, borders: Float, index: int) -> Markup:
     stroke, points, bars = f"s{index % 4 + 1}", [], []
     shift = (index - 0.5) * 0.06 * (borders[1] - borders[0])
+    rows = results.of(skill)
     for x in pairwise(borders):
         inside = [r for r in rows if _within(r, name, x, (borders[0], borders[-1]))]
         if inside:
-            rate, middle = rate_of(inside), 0.5 * (x[0] + x[1]) + shift
+            rate, middle = results.rate_of(inside), 0.5 * (x[0] + x[1]) + shift
             points.append((middle, 100 * rate.share))
             bars.append(_bar(axes, middle, rate, stroke))
     xs, ys = np.array([p[0] for p in points]), np.array([p[1] for p in points])
@@ -151,8 +153,10 @@ def _curve(axes: Axes, rows: Sequence[Row], name: Quantity, borders: Float, inde
 
 
 def _bar(axes: Axes, x: float, rate: Rate, stroke: str) -> Markup:
-    px = round(float(axes.across(x)), 1)
-    low, middle, high = (round(float(axes.up(100 * v)), 1) for v in (rate.low, rate.share, rate.high))
-    tip = tag("title", f"{rate.successes} of {rate.trials}, {percent(rate.low)} to {percent(rate.high)}")
-    line = tag("line", x1=px, x2=px, y1=low, y2=high, class_=f"bar {stroke}")
+    px, middle = round(float(axes.across(x)), 1), round(float(axes.up(100 * rate.share)), 1)
+    tip = tag("title", f"{rate.successes} of {rate.trials}, {rate.span or 'no interval'}")
+    line = Markup("")
+    if rate.interval is not None:
+        low, high = (round(float(axes.up(100 * v)), 1) for v in rate.interval)
+        line = tag("line", x1=px, x2=px, y1=low, y2=high, class_=f"bar {stroke}")
     return join([line, tag("circle", tip, cx=px, cy=middle, r=3.4, class_=f"point {stroke}")])

@@ -21,10 +21,15 @@ def lead(chapter: Chapter) -> Markup:
         return join([
             tag("p", *_claims(chapter, chapter.results), class_="lead"),
             tag("p", _setting(chapter, chapter.results), class_="lead small"),
+            *([tag("p", _sentence(why), class_="lead small")] if (why := chapter.results.validity.why_none) else []),
         ])  # fmt: skip
     if chapter.runs:
         return tag("p", *_run_sentences(chapter), class_="lead")
     return tag("p", "There are neither trials nor runs in this folder yet.", class_="lead")
+
+
+def _sentence(why: str) -> str:
+    return f"There are no intervals and no p-values: {why}."
 
 
 def tiles(chapter: Chapter) -> Markup:
@@ -46,10 +51,9 @@ def _claims(chapter: Chapter, results: Results) -> list[object]:
 
 def _claim(results: Results, skill: str) -> list[object]:
     rate = results.rate(skill)
-    interval = f"{results.interval_name} {percent(rate.low)} to {percent(rate.high)}"
     return [
         tag("strong", f"{rate.successes} of {rate.trials}"),
-        f" trials succeeded ({percent(rate.share)}; {interval})",
+        f" trials succeeded ({percent(rate.share)}; {results.said(rate)})",
     ]
 
 
@@ -83,21 +87,22 @@ def _tile(results: Results, skill: str, index: int) -> Markup:
         tag("p", percent(rate.share), class_=f"tile-figure s{index % 4 + 1}"),
         tag("p", f"{rate.successes} of {rate.trials} trials succeeded", class_="tile-text"),
         interval_bar(rate, index),
-        tag("p", f"{results.interval_name} {percent(rate.low)} to {percent(rate.high)}", class_="tile-text"),
+        tag("p", results.said(rate), class_="tile-text"),
         tag("p", _typical(results, skill), class_="tile-text faint"), class_="tile",
     )  # fmt: skip
 
 
 def interval_bar(rate: Rate, index: int) -> Markup:
-    """A rate on a scale from 0 to 1 with its interval as a whisker."""
+    """A rate on a scale from 0 to 1 with its interval, if there is one, as a whisker."""
     axes = Axes(width=240, height=22, x=(0.0, 1.0), y=(0.0, 1.0))
-    low, middle, high = (round(4 + 232 * v, 1) for v in (rate.low, rate.share, rate.high))
-    stroke = f"s{index % 4 + 1}"
+    stroke, whisker = f"s{index % 4 + 1}", Markup("")
+    if rate.interval is not None:
+        low, high = (round(4 + 232 * v, 1) for v in rate.interval)
+        whisker = tag("line", x1=low, x2=high, y1=11, y2=11, class_=f"whisker {stroke}")
     return picture(
-        axes, f"{percent(rate.share)}, from {percent(rate.low)} to {percent(rate.high)}",
-        tag("line", x1=4, x2=236, y1=11, y2=11, class_="track"),
-        tag("line", x1=low, x2=high, y1=11, y2=11, class_=f"whisker {stroke}"),
-        tag("circle", cx=middle, cy=11, r=5, class_=f"point {stroke}"), class_="interval",
+        axes, f"{percent(rate.share)}, {rate.span or 'without an interval'}",
+        tag("line", x1=4, x2=236, y1=11, y2=11, class_="track"), whisker,
+        tag("circle", cx=round(4 + 232 * rate.share, 1), cy=11, r=5, class_=f"point {stroke}"), class_="interval",
     )  # fmt: skip
 
 

@@ -1,9 +1,8 @@
 """A campaign's table `results.csv`: one row a trial and skill, checked; what varied is what the contract leaves open.
 
-Figures are counted from the rows, never taken over from a summary. Where the number of trials was fixed and all of
-them ran, a rate's 95 % interval is Clopper and Pearson's exact one and pairs are compared by McNemar's exact test; a
-campaign that could stop early, or is read before its end, gets the forms that hold at every look
-(`campaign.statistics`).
+Figures are counted from the rows, never taken over from a summary. Which interval and which test they get, and when
+they get none, is decided as for summary.json (`campaign.validity`). Of an unfinished campaign a skill's rows count up
+to the first trial that is missing. Without a campaign.toml the plan is taken for fixed, and the intervals say so.
 """
 
 from __future__ import annotations
@@ -18,8 +17,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from skillframe.campaign import statistics
+from skillframe.campaign.statistics import Interval, correction, holm
+from skillframe.campaign.validity import Basis, Plan, Validity, unbroken, validity_of
 from skillframe.errors import InputError
+from skillframe.report.markup import percent
 
 REQUIRED = ("trial", "skill", "success")
 FIXED = (*REQUIRED, "seed", "failure", "reason", "duration_s", "peak_force_n", "final_error_m", "final_error_rad")
@@ -38,17 +39,21 @@ class Row:
 
 
 class Rate(NamedTuple):
-    """How often it worked, with its exact 95 % interval."""
+    """How often it worked, with its 95 % interval; None where there is none."""
 
     successes: int
     trials: int
-    low: float
-    high: float
+    interval: Interval | None
 
     @property
     def share(self) -> float:
         """Successes by trials."""
         return self.successes / self.trials if self.trials else math.nan
+
+    @property
+    def span(self) -> str:
+        """The interval in words; "" where there is none."""
+        return "" if self.interval is None else f"{percent(self.interval.low)} to {percent(self.interval.high)}"
 
 
 def cause_of(failure: str) -> str:
@@ -63,35 +68,24 @@ def cause_of(failure: str) -> str:
     return kept or "no cause given"
 
 
-def rate_of(rows: Sequence[Row], fixed: bool = True) -> Rate:
-    """Success rate of rows; without rows the interval is all of 0 to 1.
-
-    Args:
-        rows: of one skill.
-        fixed: whether their number was fixed beforehand.
-    """
-    wins, interval = sum(row.success for row in rows), (0.0, 1.0)
-    if rows:
-        interval = (statistics.clopper_pearson if fixed else statistics.confidence_sequence)(wins, len(rows))
-    return Rate(wins, len(rows), *interval)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Results:
     """The whole table.
 
     Attributes:
-        rows: in the file's order.
+        rows: those that count, in the file's order.
         skills: labels in order of appearance.
         varied: names of the quantities that differ between trials.
-        fixed: the number of trials was fixed beforehand and all of them ran.
+        validity: what intervals and p-values rest on.
+        assumed: nothing is known of the plan; the trials are taken for independent, their number for fixed.
         notes: what was odd about the file.
     """
 
     rows: tuple[Row, ...]
     skills: tuple[str, ...]
     varied: tuple[str, ...]
-    fixed: bool = True
+    validity: Validity
+    assumed: bool = False
     notes: tuple[str, ...] = ()
 
     def of(self, skill: str) -> list[Row]:
@@ -100,17 +94,49 @@ class Results:
 
     def rate(self, skill: str) -> Rate:
         """A skill's success rate."""
-        return rate_of(self.of(skill), self.fixed)
+        return self.rate_of(self.of(skill))
+
+    def rate_of(self, rows: Sequence[Row]) -> Rate:
+        """Success rate of some rows of one skill, picked by what was drawn for them."""
+        wins = sum(row.success for row in rows)
+        return Rate(wins, len(rows), self.validity.interval(wins, len(rows)))
 
     @property
     def interval_name(self) -> str:
-        """What the intervals are, in words."""
-        return "exact 95 % interval" if self.fixed else "95 % interval, valid at every look"
+        """What the intervals are, in words; "no interval" where there are none."""
+        if self.validity.basis is Basis.NONE:
+            return "no interval"
+        fixed = self.validity.basis is Basis.FIXED
+        return ("exact 95 % interval" if fixed else "95 % interval, valid at every look") + self.condition
 
-    def compare(self, only_first: int, only_second: int) -> float:
-        """p-value of "both skills are equally good" from the trials where they differ."""
-        test = statistics.mcnemar if self.fixed else statistics.mcnemar_sequential
-        return float(test(only_first, only_second))
+    @property
+    def condition(self) -> str:
+        """What the intervals assume and nobody has shown; "" if there is nothing."""
+        assumed = " if the trials are independent and their number was fixed beforehand" if self.assumed else ""
+        return assumed + (" as of independent draws" if self.validity.note else "")
+
+    def said(self, rate: Rate) -> str:
+        """A rate's interval with its name, or that there is none."""
+        return f"{self.interval_name}: {rate.span}" if rate.span else self.interval_name
+
+    def compare(self, counts: Sequence[tuple[int, int]]) -> list[float | None]:
+        """p-values of "both skills are equally good", one a pair, corrected for their number (Holm).
+
+        Args:
+            counts: of each pair of skills, trials that only the first and only the second succeeded in.
+        """
+        single = [self.validity.p_value(first, second) for first, second in counts]
+        known = [p for p in single if p is not None]
+        return list(holm(known)) if len(known) == len(single) else list(single)
+
+    def compared_by(self, pairs: int) -> str:
+        """The test and the correction for the number of pairs, in words; or why there are no p-values."""
+        if self.validity.basis is Basis.NONE:
+            return self.validity.test_method
+        fixed = self.validity.basis is Basis.FIXED
+        test = "McNemar's exact test" if fixed else "McNemar's test in the form that holds at every look"
+        corrected = f", {correction(pairs)}" if pairs > 1 else ""
+        return f"p{corrected}: chance of such a difference between equally good skills ({test}, two-sided)"
 
     def causes(self, skill: str) -> list[tuple[str, list[int]]]:
         """Failures by cause, most frequent first, each with its trials."""
@@ -127,13 +153,13 @@ class Results:
         return counts[True, True], counts[True, False], counts[False, True], counts[False, False]
 
 
-def read_results(path: Path, declared: Sequence[str] = (), planned: int | None = None) -> Results:
+def read_results(path: Path, declared: Sequence[str] = (), plan: Plan | None = None) -> Results:
     """The table of a campaign.
 
     Args:
         path: results.csv.
         declared: quantities that the campaign file names under [vary]; without them, numeric columns that differ.
-        planned: trials per skill that were fixed beforehand; 0 if the campaign could stop early, None if unknown.
+        plan: what was fixed before the first trial; None if unknown.
 
     Raises:
         InputError: not a results table, or a cell that cannot be read.
@@ -152,8 +178,24 @@ def read_results(path: Path, declared: Sequence[str] = (), planned: int | None =
     body, notes = _whole_rows(path, table[1:], len(head), text)
     rows = tuple(_row(path, number, dict(zip(head, cells, strict=True))) for number, cells in body)
     skills = tuple(dict.fromkeys(row.skill for row in rows))
-    fixed = planned is None or all(sum(row.skill == skill for row in rows) == planned for skill in skills)
-    return Results(rows=rows, skills=skills, varied=_varied(head, rows, declared), fixed=fixed, notes=tuple(notes))
+    varied, validity = _varied(head, rows, declared), Validity(basis=Basis.FIXED)
+    if plan is not None:
+        complete = len(rows) == plan.trials * plan.skills
+        validity = validity_of(plan, complete=complete)
+        counted = rows if complete else _counted(rows)
+        rows, notes = counted, notes + _left_out(len(rows) - len(counted))
+    return Results(rows=rows, skills=skills, varied=varied, validity=validity, assumed=plan is None, notes=tuple(notes))
+
+
+def _counted(rows: tuple[Row, ...]) -> tuple[Row, ...]:
+    """The rows of each skill up to the first trial that is missing."""
+    reach = {skill: unbroken(r.trial for r in rows if r.skill == skill) for skill in {r.skill for r in rows}}
+    return tuple(row for row in rows if row.trial < reach[row.skill])
+
+
+def _left_out(count: int) -> list[str]:
+    said = f"{count} finished runs are not counted: trials before them are missing, and which end first is no chance."
+    return [said] if count else []
 
 
 def _whole_rows(

@@ -14,6 +14,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from skillframe.campaign.axes import parse_axis
+from skillframe.campaign.spec import flatten
+from skillframe.campaign.validity import Plan, plan_of
 from skillframe.config import read_toml
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError, SkillframeError
@@ -137,12 +140,19 @@ def _force_limit(folder: Path) -> float | None:
     return None
 
 
-def _declared(spec: dict[str, Any]) -> tuple[list[str], int | None]:
-    """Varied quantities, and the number of trials that was fixed beforehand: 0 with early stopping, None if unknown."""
-    vary, stop, trials = spec.get("vary"), spec.get("stop"), spec.get("trials")
-    early = isinstance(stop, dict) and stop.get("interval_width") is not None
-    planned = 0 if early else (trials if isinstance(trials, int) else None)
-    return list(vary) if isinstance(vary, dict) else [], planned
+def _declared(spec: dict[str, Any]) -> tuple[list[str], Plan | None]:
+    """Varied quantities, and what was fixed before the first trial; None if the file does not tell."""
+    vary, stop, trials, skills = (spec.get(key) for key in ("vary", "stop", "trials", "skills"))
+    vary = vary if isinstance(vary, dict) else {}
+    may_stop = isinstance(stop, dict) and stop.get("interval_width") is not None
+    try:
+        given = flatten(vary, "vary")
+        axes = {name: parse_axis(value, name) for name, value in given.items()}
+    except InputError:
+        return list(vary), None
+    if not isinstance(trials, int) or not isinstance(skills, list):
+        return list(given), None
+    return list(given), plan_of(axes, trials=trials, skills=len(skills), may_stop=may_stop)
 
 
 def load_trace(path: Path) -> Trace:

@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
+from skillframe.campaign.validity import Basis
 from skillframe.frames import Float
 from skillframe.report.convergence import MOST_CURVES, cell_map, influence, rate_curves
 from skillframe.report.markup import Markup, figure, join, note, number, percent, table, tag
@@ -60,9 +61,17 @@ def _how_to_read(results: Results, pair: Sequence[str], ranked: Sequence[str]) -
     )
     varied = ", ".join(quantity(name).label for name in results.varied)
     chosen = f" The map shows the two that matter most of {len(ranked)}." if len(ranked) > 2 else ""
-    cells = " A cell counts its successes and gives the exact 95 % interval of its rate." if len(pair) == 2 else ""
-    points = " Points in the curves carry the same kind of interval."
-    return f"Varied from trial to trial: {varied}; {same}.{chosen}{cells}{points}"
+    return f"Varied from trial to trial: {varied}; {same}.{chosen}{_intervals_said(results, len(pair) == 2)}"
+
+
+def _intervals_said(results: Results, mapped: bool) -> str:
+    """What cells and points give, and that their intervals are not corrected for their number."""
+    if results.validity.basis is Basis.NONE:
+        return f" Cells and points are counts without an interval: {results.validity.why_none}."
+    cells = f" A cell counts its successes and gives the {results.interval_name}." if mapped else ""
+    points = f" Points in the curves carry {'the same kind of interval' if mapped else f'the {results.interval_name}'}."
+    each = " Each of these intervals is 95 % by itself, without correction for their number: one in twenty may miss."
+    return f"{cells}{points}{each}"
 
 
 def _skill_key(results: Results) -> Markup:
@@ -82,24 +91,18 @@ def _colour_key() -> Markup:
 def _comparison(results: Results) -> Markup:
     if len(results.skills) < 2:
         return Markup("")
-    rows = []
-    for first, second in combinations(results.skills, 2):
-        both, only_first, only_second, neither = results.pairs(first, second)
-        rows.append(
-            (
-                f"{first} – {second}",
-                both,
-                only_first,
-                only_second,
-                neither,
-                p_value(results.compare(only_first, only_second)),
-            )
-        )
-    test = "McNemar's exact test" if results.fixed else "McNemar's test in the form that holds at every look"
+    pairs = list(combinations(results.skills, 2))
+    counts = [results.pairs(first, second) for first, second in pairs]
+    chances = results.compare([(only_first, only_second) for _, only_first, only_second, _ in counts])
+    rows = [
+        (f"{first} – {second}", *four, "none" if p is None else p_value(p))
+        for (first, second), four, p in zip(pairs, counts, chances, strict=True)
+    ]
+    head = ("first – second", "both", "only first", "only second", "neither", "p")
+    said = results.compared_by(len(pairs))
     return join([
-        tag("h3", "Side by side, on the same draws"),
-        table(("first – second", "both", "only first", "only second", "neither", "p"), rows),
-        tag("p", f"p: chance of such a difference between equally good skills ({test}, two-sided).", class_="caption"),
+        tag("h3", "Side by side, on the same draws"), table(head, rows),
+        tag("p", f"{said[0].upper() if said.startswith('no') else said[0]}{said[1:]}.", class_="caption"),
     ])  # fmt: skip
 
 

@@ -22,8 +22,6 @@ def test_a_campaign_file_is_read_with_every_kind_of_axis(campaign):
 "start.offset_z" = { values = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11] }
 [set]
 "world.segments" = 24
-[stop]
-interval_width = 0.05
 [expect]
 rate = 0.9
 """))  # fmt: skip
@@ -31,7 +29,7 @@ rate = 0.9
     assert spec.vary["start.tilt_x"] == Axis(kind="grid", numbers=(-0.1, 0.0, 0.1))
     assert spec.vary["start.offset_z"].numbers == tuple(float(i) for i in range(12))
     assert spec.fixed == {"world.segments": 24}
-    assert (spec.stop.interval_width, spec.expect.rate) == (0.05, 0.9)
+    assert (spec.stop.interval_width, spec.expect.rate) == (None, 0.9)
     assert spec.labels == ("a.skill.json", "replay:demo.npz")
 
 
@@ -70,6 +68,11 @@ BAD = {
     '"start.tilt_x" = { uniform = [0, 1], normal = [0, 1] }': "expected one distribution",
     '[set]\n"world.friction" = 0.1': "is both fixed and varied",
     '[set]\n"world.segments" = "many"': "expected a whole number",
+    '"start.tilt_x" = { grid = [0, 1] }\n[stop]\ninterval_width = 0.1': "cannot stop early over start.tilt_x: grid and",
+    '"start.tilt_x" = { grid = [0, 1] }\n"start.tilt_z" = { sobol = [0, 1] }\n[stop]\ninterval_width = 0.1': "make these axes uniform or sobol, or leave out [stop]",
+    '"start.tilt_x" = { values = '
+    + str(list(range(128)))
+    + " }\n[stop]\ninterval_width = 0.1": "cannot stop early over start.tilt_x: grid and values axes run in order",
     "[stop]\ninterval_width = 2.0": "give a number between 0 and 1",
     "[stop]\ninterval = 0.1": "did you mean 'interval_width'?",
     "[expect]\nrate = 1.5": "give a number from 0 to 1",

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from report_fakes import rows, write_csv
 
+from skillframe.campaign.validity import Plan
 from skillframe.report.convergence import cell_map, edges_of, influence, rate_curves, shade
 from skillframe.report.quantities import quantity
 from skillframe.report.results import read_results
@@ -10,12 +11,13 @@ from skillframe.report.theory import boundary, regions
 
 COLUMNS = ["trial", "skill", "seed", "fixture.tilt_y", "fixture.offset_x", "world.friction", "success", "failure",
            "duration_s", "peak_force_n", "final_error_m", "final_error_rad"]  # fmt: skip
+PLAN = Plan(trials=200, skills=2)
 
 
 @pytest.fixture
 def results(tmp_path):
     write_csv(tmp_path / "results.csv", rows(200, axes=3), COLUMNS)
-    return read_results(tmp_path / "results.csv", ["world.friction", "fixture.tilt_y", "fixture.offset_x"], 200)
+    return read_results(tmp_path / "results.csv", ["world.friction", "fixture.tilt_y", "fixture.offset_x"], PLAN)
 
 
 def test_the_quantity_without_influence_ranks_last(results):

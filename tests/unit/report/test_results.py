@@ -3,6 +3,7 @@ import csv
 import pytest
 from report_fakes import COLUMNS, rows, write_csv
 
+from skillframe.campaign.validity import Basis, Plan
 from skillframe.errors import InputError
 from skillframe.report.results import cause_of, read_results
 
@@ -16,7 +17,7 @@ def table(tmp_path):
 
 
 def test_rates_pairs_and_causes_are_counted_from_the_rows(table):
-    results = read_results(table, VARIED, 40)
+    results = read_results(table, VARIED, Plan(trials=40, skills=2))
     with table.open(encoding="utf-8") as file:
         raw = list(csv.DictReader(file))
     for skill in results.skills:
@@ -32,12 +33,13 @@ def test_what_varied_is_found_without_the_campaign_file(table):
 
 def test_a_complete_fixed_plan_gets_the_exact_interval_and_any_other_the_wider_one(table):
     skill = "peg.skill.json"
-    exact, early = read_results(table, VARIED, 40), read_results(table, VARIED, 0)
-    cut = read_results(table, VARIED, 100)
-    assert exact.fixed
-    assert not early.fixed
-    assert not cut.fixed
-    assert early.rate(skill).low < exact.rate(skill).low < exact.rate(skill).high < early.rate(skill).high
+    exact = read_results(table, VARIED, Plan(trials=40, skills=2))
+    early = read_results(table, VARIED, Plan(trials=40, skills=2, may_stop=True))
+    cut = read_results(table, VARIED, Plan(trials=100, skills=2))
+    assert [r.validity.basis for r in (exact, early, cut)] == [Basis.FIXED, Basis.EVERY_LOOK, Basis.EVERY_LOOK]
+    narrow, wide = exact.rate(skill).interval, early.rate(skill).interval
+    assert wide.low < narrow.low < narrow.high < wide.high
+    assert cut.rate(skill).interval == wide
 
 
 def test_a_last_row_cut_short_by_a_kill_is_left_out_and_said(table):
