@@ -69,7 +69,7 @@ BAD = {
     '[set]\n"world.friction" = 0.1': "is both fixed and varied",
     '[set]\n"world.segments" = "many"': "expected a whole number",
     '"start.tilt_x" = { grid = [0, 1] }\n[stop]\ninterval_width = 0.1': "cannot stop early over start.tilt_x: grid and",
-    '"start.tilt_x" = { grid = [0, 1] }\n"start.tilt_z" = { sobol = [0, 1] }\n[stop]\ninterval_width = 0.1': "make these axes uniform or sobol, or leave out [stop]",
+    '"start.tilt_x" = { grid = [0, 1] }\n[stop]\ninterval_width = 0.2': "make these axes uniform or sobol, or leave",
     '"start.tilt_x" = { values = '
     + str(list(range(128)))
     + " }\n[stop]\ninterval_width = 0.1": "cannot stop early over start.tilt_x: grid and values axes run in order",

@@ -1,0 +1,128 @@
+"""What is said of a campaign that has not ended, of several skills, and of rows that ended out of order."""
+
+import json
+
+import numpy as np
+import pytest
+from campaign_fakes import TEXT, FakeParams, good, run, start, write_campaign
+
+from skillframe.campaign.folder import prepare
+from skillframe.campaign.runner import Options, run_campaign
+from skillframe.campaign.spec import CampaignSpec
+from skillframe.campaign.status import status_of
+from skillframe.campaign.summary import comparisons, read_summary
+from skillframe.cli.main import run as command
+from skillframe.world.worlds.peg_in_hole import PegParams
+
+GRID = '"world.clearance" = {{ grid = {{ from = 0.0001, to = 0.001, count = 12 }} }}'
+PEG = TEXT.replace('"fake"\nskills', '"peg_in_hole"\nskills').replace("{extra}", GRID)
+
+
+def interrupt(folder, params=FakeParams, after=24):
+    def look(progress):
+        if progress.done >= after:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_campaign(folder, good, Options(chunk=6), look, params)
+
+
+@pytest.fixture
+def part_of_a_grid(tmp_path):
+    """An interrupted campaign over a grid, 24 of 96 runs."""
+    spec = CampaignSpec.from_toml(write_campaign(tmp_path, trials=48, text=PEG), PegParams)
+    prepare(spec, tmp_path / "out", lambda spec: {}, PegParams)
+    interrupt(tmp_path / "out", PegParams)
+    return tmp_path / "out"
+
+
+def test_status_and_summary_of_an_unfinished_grid_give_counts_and_no_interval(part_of_a_grid):
+    for shown in (status_of(part_of_a_grid, PegParams), read_summary(part_of_a_grid)):
+        assert not shown["complete"]
+        for figures in shown["skills"].values():
+            assert (figures["trials"], figures["interval_95"]) == (12, None)
+            assert "grid and values axes run in order" in figures["method"]
+        (pair,) = shown["comparisons"]
+        assert (pair["trials"], pair["p_value"]) == (12, None)
+
+
+def test_the_status_command_says_in_words_why_there_is_no_interval(part_of_a_grid, capsys):
+    assert command(["campaign", "status", str(part_of_a_grid)]) == 0
+    said = capsys.readouterr().out
+    assert "no interval: grid and values axes run in order" in said
+    assert " .. " not in said
+    assert command(["campaign", "status", str(part_of_a_grid), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["skills"]["a.skill.json"]["interval_95"] is None
+
+
+def test_a_grid_that_has_run_to_its_end_has_its_interval_again(part_of_a_grid):
+    summary = run_campaign(part_of_a_grid, good, None, None, PegParams)
+    figures = summary["skills"]["a.skill.json"]
+    assert (figures["trials"], figures["method"][:15]) == (48, "Clopper-Pearson")
+    assert figures["interval_95"][0] < figures["rate"] < figures["interval_95"][1]
+
+
+def out_of_order(folder, keep):
+    """An interrupted campaign that has the rows of some trials only: (label, trial) decides."""
+    run(folder, traces=0)
+    lines = (folder / "rows.jsonl").read_text().splitlines(keepends=True)
+    rows = [line for line in lines[1:] if '"trial"' not in line or keep(json.loads(line))]
+    (folder / "rows.jsonl").write_text("".join([lines[0], *rows]))
+    return status_of(folder, FakeParams)
+
+
+def test_rows_after_the_first_missing_trial_are_not_counted(campaign, tmp_path):
+    """Failures that take longer are not there yet: what is there is all success, and says nothing of the rate."""
+    folder = start(campaign(trials=128), tmp_path / "out")
+    status = out_of_order(folder, lambda row: row["success"])
+    whole = {label: [] for label in status["skills"]}
+    for row in load_rows(campaign_table(folder)):
+        whole[row[1]].append(row)
+    for label, figures in status["skills"].items():
+        first = next(i for i, row in enumerate(whole[label]) if row[6] == "0")
+        assert figures["trials"] == figures["successes"] == first
+        assert figures["uncounted"] == sum(row[6] == "1" for row in whole[label]) - first
+        truth = np.mean([row[6] == "1" for row in whole[label]])
+        assert figures["interval_95"][0] <= truth <= figures["interval_95"][1]
+
+
+def campaign_table(folder):
+    return (folder / "results.csv").read_text()
+
+
+def load_rows(text):
+    return [line.split(",") for line in text.splitlines()[1:]]
+
+
+def test_skills_are_compared_on_the_trials_that_both_have_without_a_gap(campaign, tmp_path):
+    folder = start(campaign(trials=60), tmp_path / "out")
+    status = out_of_order(folder, lambda row: row["trial"] < (20 if row["skill"] == "a.skill.json" else 45))
+    assert [figures["trials"] for figures in status["skills"].values()] == [20, 45]
+    assert status["comparisons"][0]["trials"] == 20
+
+
+def test_no_more_than_one_in_twenty_campaigns_of_four_equal_skills_finds_a_difference():
+    """Six single tests at 0.05 find one in about one in five."""
+    spec = CampaignSpec(
+        name="n", seed=1, trials=200, robot="r", world="w", skills=("a.json", "b.json", "c.json", "d.json")
+    )
+    found = single = 0
+    for seed in range(200):
+        wins = np.random.default_rng(seed).random((4, 200)) < 0.8
+        rows = [
+            {"trial": t, "skill": spec.labels[k], "success": bool(wins[k, t]), "failure": ""}
+            for t in range(200) for k in range(4)
+        ]  # fmt: skip
+        pairs = comparisons(spec, rows, complete=True)
+        found += any(pair["p_value"] < 0.05 for pair in pairs)
+        single += any(pair.get("p_value_uncorrected", pair["p_value"]) < 0.05 for pair in pairs)
+    assert found <= 19  # the 99.9 % quantile of 200 campaigns at 0.05
+    assert single > 19
+    assert {pair["correction"] for pair in pairs} == {"Holm over 6 pairs"}
+
+
+def test_two_skills_are_one_pair_and_need_no_correction(campaign, tmp_path):
+    folder = start(campaign(trials=48), tmp_path / "out")
+    (pair,) = run(folder)["comparisons"]
+    assert pair["p_value"] == pair["p_value_uncorrected"]
+    assert pair["correction"] == "none, there is one pair"
