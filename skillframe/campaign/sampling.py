@@ -6,9 +6,12 @@ Every independent quantity of every trial has a generator of its own,
 
 so that adding a quantity or a skill changes no other draw, and the order of calls does not matter. Grid axes are placed
 by the trial's number (see `spec`), sobol axes by the trial's point of one scrambled Sobol sequence over all of them
-(Owen's scramble, seeded): these two designs are joint, so adding an axis to a design changes that design and nothing
-else. Keying by name rather than by call order is our choice, because two skills that branch differently must still see
-the same trial (common random numbers halve the trials that a paired comparison needs).
+(scipy's linear matrix scramble with a digital shift, seeded; no two points are independent): these two designs are
+joint, so adding an axis to a design changes that design and nothing else. Sobol points have periods of two, four ...
+Beside a grid or values axis, which may have the same, they are therefore shuffled over the campaign's trials: else a
+cell of a grid of four meets only one half of the box. Keying by name rather than by call order is our choice, because
+two skills that branch differently must still see the same trial (common random numbers halve the trials that a paired
+comparison needs).
 """
 
 from __future__ import annotations
@@ -87,11 +90,22 @@ def _sobol(spec: CampaignSpec, trials: Sequence[int]) -> Draws:
     names = sorted(n for n, axis in spec.vary.items() if axis.kind == "sobol")
     if not names or not len(trials):
         return {name: np.zeros(0) for name in names}
-    points = _sobol_points(spec.seed, len(names), max(trials))[np.asarray(trials, dtype=int)]
+    places = _sobol_places(spec, trials)
+    points = _sobol_points(spec.seed, len(names), int(places.max()))[places]
     ends = [(float(spec.vary[n].numbers[0]), float(spec.vary[n].numbers[1])) for n in names]
     return {
         name: low + (high - low) * points[:, i] for i, (name, (low, high)) in enumerate(zip(names, ends, strict=True))
     }
+
+
+def _sobol_places(spec: CampaignSpec, trials: Sequence[int]) -> NDArray[np.intp]:
+    """Which point each trial takes: its own number, but shuffled over the campaign beside axes that run in order."""
+    own = np.asarray(trials, dtype=np.intp)
+    if not spec.plan.in_order:
+        return own
+    order = np.random.default_rng(seed_sequence(spec.seed, 0, "sobol order")).permutation(spec.trials)
+    places: NDArray[np.intp] = order[own]
+    return places
 
 
 def _sobol_points(seed: int, dimension: int, last: int) -> Float:

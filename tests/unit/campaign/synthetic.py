@@ -94,18 +94,24 @@ def share_below(axis, limit):
 
 
 @lru_cache(maxsize=1000)
-def make(kind, seed, low=0.05, high=0.95, trials=TRIALS):
-    """A campaign of two skills of the same truth."""
+def drawn(kind, seed):
+    """The campaign, where each skill finds the conditions good, (2, n), and a number in [0, 1) for each, (2, n)."""
     vary, skills = KINDS[kind], ("a.skill.json", "b.skill.json")
-    spec = CampaignSpec(name=kind, seed=seed, trials=trials, robot="r", world="w", skills=skills, vary=vary)
-    drawn = draws(spec, range(trials))
-    slow = drawn.get(SLOW, np.zeros(trials))
-    inside = drawn.get(FAST, np.zeros(trials)) < WIDER
+    spec = CampaignSpec(name=kind, seed=seed, trials=TRIALS, robot="r", world="w", skills=skills, vary=vary)
+    values = draws(spec, range(TRIALS))
+    slow = values.get(SLOW, np.zeros(TRIALS))
+    inside = values.get(FAST, np.zeros(TRIALS)) < WIDER
     mirror = 1.0 - slow if SLOW in vary else slow  # every axis here is symmetric about 1/2
-    coins = np.array([rng.random(2) for rng in trial_rngs(seed, range(trials))]).T
-    success = coins < np.where([inside & (slow < LIMIT), inside & (mirror < LIMIT)], high, low)
-    share = share_below(vary.get(SLOW), LIMIT) * share_below(vary.get(FAST), WIDER)
-    return Made(spec, low + (high - low) * share, success)
+    coins = np.array([rng.random(2) for rng in trial_rngs(seed, range(TRIALS))]).T
+    return spec, np.array([inside & (slow < LIMIT), inside & (mirror < LIMIT)]), coins
+
+
+@lru_cache(maxsize=1000)
+def make(kind, seed, low=0.05, high=0.95):
+    """A campaign of two skills of the same truth."""
+    spec, good, coins = drawn(kind, seed)
+    share = share_below(spec.vary.get(SLOW), LIMIT) * share_below(spec.vary.get(FAST), WIDER)
+    return Made(spec, low + (high - low) * share, coins < np.where(good, high, low))
 
 
 def rows_of(made, done):

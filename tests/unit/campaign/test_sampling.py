@@ -78,7 +78,7 @@ def test_every_prefix_of_whole_sweeps_covers_the_grid_evenly():
 
 @pytest.mark.parametrize("count", [16, 64, 256])
 def test_each_sobol_axis_puts_one_point_into_each_of_2_to_the_m_equal_slices(count):
-    drawn = draws(spec(DESIGNS), range(count))
+    drawn = draws(spec({name: axis for name, axis in DESIGNS.items() if axis.kind == "sobol"}), range(count))
     for name in ("fixture.offset_x", "fixture.offset_y"):
         low, high = DESIGNS[name].numbers
         slices = np.floor((drawn[name] - low) / (high - low) * count)
@@ -109,3 +109,40 @@ def test_text_and_mixed_choices_keep_their_types():
     assert set(draws(spec({"world.profile": axis}), range(50))["world.profile"]) == {"round", "square"}
     mixed = draws(spec({"world.profile": Axis(kind="choice", numbers=("round", 2))}), range(50))["world.profile"]
     assert set(mixed) == {"round", 2}
+
+
+ONE, TWO = ["world.x"], ["world.x", "world.y"]
+
+
+@pytest.mark.parametrize(
+    ("other", "lower", "sobol"),
+    [
+        (Axis(kind="grid", numbers=(0.0, 1.0, 2.0, 3.0)), (0.0, 3.0), ONE),
+        (Axis(kind="values", numbers=(0.0, 1.0, 1.0, 0.0) * 32), (0.0,), ONE),
+        (Axis(kind="grid", numbers=(0.0, 1.0)), (0.0,), TWO),
+    ],
+    ids=["grid of four", "values in turns", "grid of two and a second sobol axis"],
+)
+def test_a_sobol_axis_is_not_bound_to_the_cells_of_a_grid(other, lower, sobol):
+    """Success where a cell of half of them meets the lower half of the box, or neither: 1/2, and not 0 or 1."""
+    rates = []
+    for seed in range(20):
+        vary = {"world.a": other, **{name: Axis(kind="sobol", numbers=(0.0, 1.0)) for name in sobol}}
+        drawn = draws(
+            CampaignSpec(name="s", seed=seed, trials=128, robot="r", world="w", skills=("a.json",), vary=vary),
+            range(128),
+        )
+        rates.append(np.mean(np.isin(drawn["world.a"], lower) == (drawn[sobol[-1]] < 0.5)))
+    # standard deviation of a share of 128 fair coins is 0.044; five of them
+    assert np.abs(np.array(rates) - 0.5).max() < 0.22
+
+
+def test_shuffled_sobol_points_are_the_same_points_and_do_not_depend_on_the_chunks():
+    axis, cells = Axis(kind="sobol", numbers=(0.0, 1.0)), Axis(kind="grid", numbers=(0.0, 1.0))
+    alone, beside = (
+        CampaignSpec(name="s", seed=3, trials=64, robot="r", world="w", skills=("a.json",), vary=vary)
+        for vary in ({"world.b": axis}, {"world.a": cells, "world.b": axis})
+    )
+    whole = draws(beside, range(64))["world.b"]
+    assert sorted(whole) == sorted(draws(alone, range(64))["world.b"])
+    assert [draws(beside, [t])["world.b"][0] for t in (63, 0, 17)] == [whole[63], whole[0], whole[17]]

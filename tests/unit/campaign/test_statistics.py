@@ -9,6 +9,8 @@ from scipy.stats import binom, binomtest
 from skillframe.campaign.statistics import (
     clopper_pearson,
     confidence_sequence,
+    correction,
+    holm,
     log_mixture,
     mcnemar,
     mcnemar_sequential,
@@ -120,3 +122,23 @@ def test_peeking_breaks_plain_mcnemar_and_not_the_sequential_one():
     bound = 0.05 + 3 * math.sqrt(0.05 * 0.95 / 1500)
     assert np.mean([any(valid[w[n - 1], n] for n in looks) for w in wins]) <= bound
     assert np.mean([any(plain[w[n - 1], n] for n in looks) for w in wins]) > bound
+
+
+@given(p=st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12))
+def test_holm_rejects_what_its_step_down_rule_rejects(p):
+    """Holm 1979: go up the sorted p-values and stop at the first with p > alpha / (number left)."""
+    corrected = holm(p)
+    for alpha in (0.01, 0.05, 0.3):
+        rejected = []
+        for i, place in enumerate(sorted(range(len(p)), key=p.__getitem__)):
+            if p[place] * (len(p) - i) > alpha:
+                break
+            rejected.append(place)
+        assert {i for i, value in enumerate(corrected) if value <= alpha} == set(rejected)
+    assert all(c >= value for c, value in zip(corrected, p, strict=True))
+
+
+def test_holm_gives_the_numbers_of_a_hand_calculation():
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([0.02]) == [0.02]
+    assert (correction(1), correction(6)) == ("none, there is one pair", "Holm over 6 pairs")
