@@ -95,14 +95,15 @@ def _tile(results: Results, skill: str, index: int) -> Markup:
 def interval_bar(rate: Rate, index: int) -> Markup:
     """A rate on a scale from 0 to 1 with its interval, if there is one, as a whisker."""
     axes = Axes(width=240, height=22, x=(0.0, 1.0), y=(0.0, 1.0))
-    stroke, whisker = f"s{index % 4 + 1}", Markup("")
+    stroke, whisker, point = f"s{index % 4 + 1}", Markup(""), Markup("")
     if rate.interval is not None:
         low, high = (round(4 + 232 * v, 1) for v in rate.interval)
         whisker = tag("line", x1=low, x2=high, y1=11, y2=11, class_=f"whisker {stroke}")
+    if rate.trials:
+        point = tag("circle", cx=round(4 + 232 * rate.share, 1), cy=11, r=5, class_=f"point {stroke}")
     return picture(
         axes, f"{percent(rate.share)}, {rate.span or 'without an interval'}",
-        tag("line", x1=4, x2=236, y1=11, y2=11, class_="track"), whisker,
-        tag("circle", cx=round(4 + 232 * rate.share, 1), cy=11, r=5, class_=f"point {stroke}"), class_="interval",
+        tag("line", x1=4, x2=236, y1=11, y2=11, class_="track"), whisker, point, class_="interval",
     )  # fmt: skip
 
 

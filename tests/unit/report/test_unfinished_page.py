@@ -1,10 +1,12 @@
 """What a page shows of a campaign that has not ended, and of several skills."""
 
 import re
+import shutil
 
 import numpy as np
 import pytest
-from report_fakes import COLUMNS, campaign, rows, write_csv
+from report_fakes import COLUMNS, rows, write_csv
+from report_fakes import campaign as full_campaign
 
 from skillframe.report.page import write_report
 
@@ -14,6 +16,13 @@ GRID = """
 """
 WHY = "grid and values axes run in order"
 SPAN = re.compile(r'class="span"')
+
+
+def campaign(folder):
+    """Without traces and recordings, which take most of a page's time."""
+    full_campaign(folder)
+    shutil.rmtree(folder / "traces")
+    return folder
 
 
 def page(folder, change=lambda text: text):
@@ -105,3 +114,13 @@ def test_without_a_campaign_file_the_intervals_say_what_they_assume(tmp_path):
 def page_of(folder):
     write_report([folder], folder.with_suffix(".html"))
     return folder.with_suffix(".html").read_text(encoding="utf-8")
+
+
+def test_a_skill_whose_first_trial_is_missing_is_on_the_page_with_no_trials(tmp_path):
+    folder = campaign(tmp_path / "c")
+    kept = [row for row in rows(30) if (row[0], row[1]) != (0, "replay:demo1.npz")]
+    write_csv(folder / "results.csv", kept, COLUMNS)
+    text = page(folder)
+    assert "29 finished runs are not counted" in text
+    assert "0 of 0" in text
+    assert not re.search(r"\bnan\b", text.partition("<main>")[2].partition("<footer>")[0])
