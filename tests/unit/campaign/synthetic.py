@@ -13,17 +13,18 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import norm
 
-from skillframe.campaign import stopping, summary
+from skillframe.campaign import statistics, stopping, summary
 from skillframe.campaign.axes import Axis
 from skillframe.campaign.sampling import draws, trial_rngs
 from skillframe.campaign.spec import CampaignSpec, Stop
-from skillframe.campaign.statistics import confidence_sequence
 
 TRIALS, WIDTH = 120, 0.35
 SLOW, FAST = "world.slow", "world.fast"
 LIMIT, WIDER = 0.7, 0.9
 QUICK_S, LONG_S = 1.0, 5.0  # a success ends early, a failure runs into the time limit
-stopping.confidence_sequence = cache(confidence_sequence)  # the same few pairs of counts over thousands of campaigns
+for name in ("clopper_pearson", "confidence_sequence", "mcnemar", "mcnemar_sequential"):
+    setattr(statistics, name, cache(getattr(statistics, name)))  # the same few counts over thousands of campaigns
+stopping.confidence_sequence = statistics.confidence_sequence
 
 
 def uniform():
@@ -116,10 +117,8 @@ def make(kind, seed, low=0.05, high=0.95):
 
 def rows_of(made, done):
     """Rows as a campaign stores them; done is a list of (trial, skill)."""
-    return [
-        {"trial": t, "skill": made.spec.labels[k], "success": bool(made.success[k, t]), "failure": "stuck"}
-        for t, k in sorted(done)
-    ]
+    labels, success = made.spec.labels, made.success.tolist()
+    return [{"trial": t, "skill": labels[k], "success": success[k][t], "failure": "stuck"} for t, k in sorted(done)]
 
 
 def finished(made, workers, chunk, at):
