@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from campaign_fakes import TEXT, FakeParams, good, run, start, write_campaign
 
+from skillframe.campaign import evaluate
 from skillframe.campaign.folder import prepare
 from skillframe.campaign.runner import Options, run_campaign
 from skillframe.campaign.spec import CampaignSpec
@@ -126,3 +127,30 @@ def test_two_skills_are_one_pair_and_need_no_correction(campaign, tmp_path):
     (pair,) = run(folder)["comparisons"]
     assert pair["p_value"] == pair["p_value_uncorrected"]
     assert pair["correction"] == "none, there is one pair"
+
+
+def resumed(tmp_path, monkeypatch, text, trials):
+    """The exit code of `campaign resume` on a campaign with fake trials."""
+    monkeypatch.setattr(evaluate, "evaluate", good)
+    (tmp_path / "b.skill.json").write_text("{}")
+    spec = CampaignSpec.from_toml(write_campaign(tmp_path, trials=trials, text=text), PegParams)
+    prepare(spec, tmp_path / "out", lambda spec: {}, PegParams)
+    return command(["campaign", "resume", str(tmp_path / "out"), "--traces", "0"])
+
+
+def test_it_is_said_before_the_first_trial_that_a_grid_run_unevenly_will_have_no_interval(
+    tmp_path, monkeypatch, capsys
+):
+    assert resumed(tmp_path, monkeypatch, PEG, 50) == 0
+    said = capsys.readouterr()
+    why = "no interval: 50 trials do not cover the grid's 12 cells equally often; make trials a multiple of 12"
+    assert said.err.startswith(f"there will be {why}")
+    assert why in said.out
+    assert "p =" not in said.out
+
+
+def test_the_command_says_for_how_many_pairs_a_p_value_is_corrected(tmp_path, monkeypatch, capsys):
+    three = PEG.replace(GRID, "").replace('["a.skill.json",', '["a.skill.json", "b.skill.json",')
+    assert resumed(tmp_path, monkeypatch, three, 60) == 0
+    said = capsys.readouterr().out
+    assert said.count(" (Holm over 3 pairs), McNemar (exact") == 3
