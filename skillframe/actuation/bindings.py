@@ -13,7 +13,7 @@ from weakref import WeakValueDictionary
 
 from skillframe.actuation.actuator import DISCARD
 from skillframe.actuation.extract import unpack
-from skillframe.actuation.inspection import FmuFacts, read_description
+from skillframe.actuation.inspection import FmuFacts
 from skillframe.actuation.values import values_of
 from skillframe.errors import SkillframeError
 
@@ -81,17 +81,14 @@ class Instance:
         from fmpy.fmi2 import FMU2Slave
         from fmpy.fmi3 import FMU3Slave
 
-        description = read_description(self.facts.path)
-        self._cs = description.coSimulation
         try:
             self._fmu: Any = (FMU2Slave if self.version == 2 else FMU3Slave)(
-                guid=description.guid if self.version == 2 else description.instantiationToken,
-                unzipDirectory=str(unpack(self.facts.path)), modelIdentifier=self._cs.modelIdentifier,
-                instanceName=self.name,
+                guid=self.facts.token, unzipDirectory=str(unpack(self.facts.path)),
+                modelIdentifier=self.facts.identifier, instanceName=self.name,
             )  # fmt: skip
             self._instantiate()
         except Exception as error:
-            tool = "; its maker's tool must be installed" if self._cs.needsExecutionTool else ""
+            tool = "; its maker's tool must be installed" if self.facts.needs_tool else ""
             raise InstanceFailed(self.sentence(f"does not load: {error}") + tool) from None
         self.component = int(getattr(self._fmu.component, "value", self._fmu.component))
         self._fresh = True

@@ -5,19 +5,31 @@ from __future__ import annotations
 import hashlib
 import lzma
 import os
+import shutil
 import stat
 import tempfile
+import time
 import zipfile
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
 
-from skillframe.errors import InputError
+from skillframe.errors import InputError, SkillframeError
 from skillframe.paths import cache_dir
 
-LARGEST = 2_000_000_000  # bytes unpacked; more is taken for a trap
+LARGEST = 1_000_000_000  # bytes unpacked; more is taken for a trap
+LARGEST_DESCRIPTION = 100_000_000  # bytes
+THIN, DENSEST = 10_000_000, 200  # a file above so many bytes that was packed to less than a 200th is a trap as well
+OLD_S = 3600.0  # age of what an unpacking left that was killed
+DESCRIBED_BY = ("modelDescription.xml", "sources/buildDescription.xml")
 MOST_FILES = 20_000
 LONGEST = 1000  # characters of a name
+UNPACKING = "unpacking-"
+_NUMBERS = ("Float32", "Float64", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64")
+_OTHERS = ("Boolean", "String", "Binary", "Enumeration", "Clock")
+VARIABLE_TAGS = (b"<ScalarVariable ", *(f"<{kind} name=".encode() for kind in (*_NUMBERS, *_OTHERS)))
 
 
 def unpack(path: Path) -> Path:
@@ -29,7 +41,8 @@ def unpack(path: Path) -> Path:
     folder = cache_dir("fmus-unpacked") / content_hash(path)[:32]
     if (folder / "modelDescription.xml").is_file():
         return folder
-    with tempfile.TemporaryDirectory(dir=folder.parent) as work:
+    _tidy(folder.parent)
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=UNPACKING) as work:
         _extract(path, Path(work) / "fmu")
         try:
             os.replace(Path(work) / "fmu", folder)
@@ -37,6 +50,40 @@ def unpack(path: Path) -> Path:
             if not (folder / "modelDescription.xml").is_file():
                 raise
     return folder
+
+
+def forget(path: Path) -> None:
+    """Remove from the cache what was unpacked of an FMU, if anything: it turned out to be of no use."""
+    with suppress(SkillframeError):
+        shutil.rmtree(cache_dir("fmus-unpacked") / content_hash(path)[:32], ignore_errors=True)
+
+
+def _tidy(folder: Path) -> None:
+    """Remove what an unpacking left that was killed."""
+    for left in folder.glob(UNPACKING + "*"):
+        with suppress(OSError):
+            if time.time() - left.stat().st_mtime > OLD_S:
+                shutil.rmtree(left, ignore_errors=True)
+
+
+@contextmanager
+def description_folder(path: Path, most: int) -> Iterator[Path]:
+    """A folder with the model description of an FMU and what it refers to, nothing else; gone afterwards.
+
+    Args:
+        path: the FMU.
+        most: variables that it may describe.
+
+    Raises:
+        InputError: as `unpack`, or a description of more variables.
+    """
+    with tempfile.TemporaryDirectory() as work:
+        _extract(path, Path(work), DESCRIBED_BY)
+        text = (Path(work) / "modelDescription.xml").read_bytes()
+        count = sum(text.count(tag) for tag in VARIABLE_TAGS)
+        if count > most:
+            raise InputError(path, f"describes {count} variables, where {most} are the most", "export fewer of them")
+        yield Path(work)
 
 
 def content_hash(path: Path) -> str:
@@ -93,15 +140,22 @@ def _check(path: Path, members: list[zipfile.ZipInfo]) -> None:
     total = sum(m.file_size for m in members)
     if total > LARGEST or len(members) > MOST_FILES:
         raise InputError(path, f"unpacks to {len(members)} files of {total} bytes", "do not trust this file")
+    for member in members:
+        if member.file_size > max(THIN, DENSEST * member.compress_size):
+            problem = f"holds {member.orig_filename!r}, {member.compress_size} bytes that unpack to {member.file_size}"
+            raise InputError(path, problem, "do not trust this file")
+    described = sum(m.file_size for m in members if m.filename in DESCRIBED_BY)
+    if described > LARGEST_DESCRIPTION:
+        raise InputError(path, f"has a model description of {described} bytes", f"{LARGEST_DESCRIPTION} are the most")
     if "modelDescription.xml" not in {m.filename for m in members}:
         raise InputError(path, "is a zip without modelDescription.xml, so not an FMU", "give the .fmu file")
 
 
-def _extract(path: Path, folder: Path) -> None:
-    member_names(path)
+def _extract(path: Path, folder: Path, only: tuple[str, ...] = ()) -> None:
+    names = member_names(path)
     try:
         with zipfile.ZipFile(path) as archive:
-            archive.extractall(folder)
+            archive.extractall(folder, [name for name in only if name in names] if only else None)
     except OSError as error:
         raise InputError(path, f"cannot be unpacked: {error.strerror}", "copy the file again") from None
     except (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError) as error:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from skillframe.actuation.build import pack
 from skillframe.actuation.extract import content_hash, unpack
-from skillframe.actuation.inspection import inspect_fmu, read_description
+from skillframe.actuation.inspection import inspect_fmu
 from skillframe.actuation.library import BuiltFmu
 from skillframe.actuation.toolchain import compile_library
 from skillframe.errors import InputError
@@ -29,11 +29,9 @@ def build_from_sources(path: Path) -> BuiltFmu:
     if not facts.has_sources:
         raise InputError(path, "carries no C sources", f"ask its maker for {fmpy.platform} or for sources")
     out = cache_dir("fmus-compiled") / content_hash(path)[:24] / path.name
-    description = read_description(path)
-    cs = description.coSimulation
-    if cs is None:
+    if "co_simulation" not in facts.kinds:
         raise InputError(path, f"holds {' and '.join(facts.kinds)} only", "export it as co-simulation")
-    files, defines = _sources(description, cs.modelIdentifier)
+    files, defines = list(facts.source_files), list(facts.definitions)
     if not files:
         raise InputError(path, "does not list its source files", "ask its maker for a binary")
     for name in files:
@@ -43,7 +41,7 @@ def build_from_sources(path: Path) -> BuiltFmu:
     with tempfile.TemporaryDirectory(dir=out.parent) as work:
         tree = Path(work) / "tree"
         shutil.copytree(unpack(path), tree)
-        library = cs.modelIdentifier + fmpy.sharedLibraryExtension
+        library = facts.identifier + fmpy.sharedLibraryExtension
         headers = Path(fmpy.__file__).parent / "c-code"
         extra = ["-fvisibility=default", f"-I{headers}", "-std=gnu11", *defines]
         compile_library(files, library, tree / "sources", extra)
@@ -52,17 +50,3 @@ def build_from_sources(path: Path) -> BuiltFmu:
         os.replace(tree / "sources" / library, where / library)
         os.replace(pack(tree, Path(work) / "made.fmu"), out)
     return BuiltFmu(name=facts.name, fmi_version=facts.fmi_version, path=out)
-
-
-def _sources(description: object, identifier: str) -> tuple[list[str], list[str]]:
-    """Source files, definitions and include folders as listed (fmpy reads both versions' lists)."""
-    files: list[str] = []
-    defines: list[str] = []
-    for configuration in getattr(description, "buildConfigurations", []):
-        if configuration.modelIdentifier != identifier:
-            continue
-        for group in configuration.sourceFileSets:
-            files += group.sourceFiles
-            defines += [f"-D{d.name}={d.value}" if d.value else f"-D{d.name}" for d in group.preprocessorDefinitions]
-            defines += [f"-I{folder}" for folder in group.includeDirectories]
-    return list(dict.fromkeys(files)), defines

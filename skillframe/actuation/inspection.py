@@ -1,17 +1,25 @@
-"""What an FMU is and can do, read from its file without loading any of its code."""
+"""What an FMU is and can do, read from its file without loading any of its code.
+
+A file that is not trusted is read in a child process under limits: its description may be made to take all time and
+memory. What comes back is as small as what is used of it.
+"""
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from skillframe.actuation.extract import content_hash, member_names, unpack
+from skillframe.actuation.allow import is_allowed
+from skillframe.actuation.extract import content_hash, description_folder, member_names
 from skillframe.errors import InputError, UnknownName
 
 FLOATS = ("Real", "Float64")
+MOST_VARIABLES = 100_000
+LONGEST_FACTS = 64 * 1024**2  # bytes of the facts of one FMU
+READING_S = 60.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +53,9 @@ class FmuFacts:
         platforms: folders of binaries inside that hold a library of the model; has_sources: carries C sources.
         runs_here: one of the platforms is this machine's.
         saves_state, serializes_state, variable_step, input_derivatives: claimed capabilities of co-simulation.
-        variables: by name.
+        variables: by name; locals are left out of what is read in a child.
+        token, identifier, needs_tool: what instantiation takes, the library's name, whether its maker's tool is needed.
+        source_files, definitions: C sources of co-simulation and compiler options, as listed.
     """
 
     path: Path
@@ -61,6 +71,11 @@ class FmuFacts:
     variable_step: bool
     input_derivatives: bool
     variables: dict[str, FmuVariable]
+    token: str = ""
+    identifier: str = ""
+    needs_tool: bool = False
+    source_files: tuple[str, ...] = ()
+    definitions: tuple[str, ...] = ()
 
     def names(self, causality: str) -> list[str]:
         """Names of the variables of a causality, in the file's order."""
@@ -110,10 +125,62 @@ class FmuFacts:
 
 
 def inspect_fmu(path: Path) -> FmuFacts:
-    """Facts of an FMU file.
+    """Facts of an FMU file; one that is not allowed inside this process is read in a child.
 
     Raises:
         InputError: not an FMU, one that would escape its folder, or a model description that cannot be read.
+        ChildLost: reading it took more time or memory than it may.
+    """
+    path, digest = path.resolve(), content_hash(path)
+    known = _KNOWN.get((path, digest))
+    if known is not None:
+        return known
+    member_names(path)
+    if is_allowed(path):
+        return inspect_here(path)
+    return _in_child(path, digest)
+
+
+_KNOWN: dict[tuple[Path, str], FmuFacts] = {}
+
+
+@lru_cache(maxsize=64)
+def _in_child(path: Path, digest: str) -> FmuFacts:
+    return facts_from(_asked(path, b"i"), path)
+
+
+def _asked(path: Path, letter: bytes) -> Any:
+    """An answer about a description from a child that has loaded nothing of the FMU."""
+    from skillframe.actuation.child import Child, SandboxLimits
+
+    limits = SandboxLimits()
+    child = Child(path, path.stem, limits)
+    try:
+        return child.ask(letter, {"path": str(path)}, READING_S, "its description was read", LONGEST_FACTS)
+    finally:
+        child.close()
+
+
+def describe_here(facts: FmuFacts) -> dict[str, Any]:
+    """Facts as plain values, without the path and without variables that no one can set or read by name."""
+    told = {name: v for name, v in facts.variables.items() if v.causality in ("input", "output", "parameter")}
+    return {**asdict(replace(facts, variables=told)), "path": ""}
+
+
+def facts_from(given: dict[str, Any], path: Path) -> FmuFacts:
+    """Facts out of `describe_here`; in this process `inspect_fmu` knows them from now on."""
+    lists = {name: tuple(given[name]) for name in ("kinds", "platforms", "source_files", "definitions")}
+    variables = {name: FmuVariable(**v) for name, v in given["variables"].items()}
+    facts = FmuFacts(**{**given, **lists, "path": path, "variables": variables})
+    _KNOWN[path, facts.digest] = facts
+    return facts
+
+
+def inspect_here(path: Path) -> FmuFacts:
+    """As `inspect_fmu`, in this process.
+
+    Raises:
+        InputError: as `inspect_fmu`.
     """
     return _inspect(path.resolve(), content_hash(path))
 
@@ -132,6 +199,7 @@ def _inspect(path: Path, digest: str) -> FmuFacts:
         if kind is not None and re.search(r"[^\w.-]|\.\.|^$", kind.modelIdentifier or ""):
             problem = f"has the model identifier {kind.modelIdentifier!r}, which is no name of a file"
             raise InputError(path, problem, "do not trust this file" if kind.modelIdentifier else "export it again")
+    files, definitions = _sources(description, cs.modelIdentifier if cs else "")
     platforms = _platforms(names, first.modelIdentifier if first is not None else "")
     return FmuFacts(
         path=path,
@@ -147,6 +215,11 @@ def _inspect(path: Path, digest: str) -> FmuFacts:
         variable_step=bool(cs and cs.canHandleVariableCommunicationStepSize),
         input_derivatives=bool(cs and cs.canInterpolateInputs and description.fmiVersion.startswith("2")),
         variables={v.name: _variable(v) for v in description.modelVariables},
+        token=description.guid or description.instantiationToken,
+        identifier=cs.modelIdentifier if cs else "",
+        needs_tool=bool(cs and cs.needsExecutionTool),
+        source_files=files,
+        definitions=definitions,
     )
 
 
@@ -156,13 +229,13 @@ def read_description(path: Path) -> Any:
     Raises:
         InputError: the XML cannot be read, or is of FMI 1.
     """
-    folder = unpack(path)
-    try:
-        description = _read(folder, validate=False)
-    except Exception as error:
-        raise InputError(
-            path, f"has a model description that cannot be read: {_why(folder, error)}", "export it again"
-        ) from None
+    with description_folder(path, MOST_VARIABLES) as folder:
+        try:
+            description = _read(folder, validate=False)
+        except Exception as error:
+            raise InputError(
+                path, f"has a model description that cannot be read: {_why(folder, error)}", "export it again"
+            ) from None
     if description.fmiVersion.startswith("1"):
         raise InputError(path, "is an FMI 1.0 unit", "export it as FMI 2.0 or 3.0 co-simulation")
     if (description.guid or description.instantiationToken) is None:
@@ -196,6 +269,15 @@ def _why(folder: Path, error: Exception) -> str:
 
 
 def problems_of(path: Path) -> list[str]:
+    """As `judge_here`, in a child where the file is not trusted.
+
+    Raises:
+        ChildLost: it took more time or memory than it may.
+    """
+    return judge_here(path) if is_allowed(path) else [str(problem) for problem in _asked(path, b"j")]
+
+
+def judge_here(path: Path) -> list[str]:
     """What fmpy's validation finds: schema, names, structure, units, start values.
 
     An alias of FMI 3 shares the entries of its variable; fmpy 0.3 asks for entries of its own, which is left out here.
@@ -214,6 +296,20 @@ def _asked_of_aliases(path: Path) -> set[str]:
     expected, actual = (", ".join(sorted(names)) for names in (there | shared, there))
     where = "ModelStructure/InitialUnknowns does not contain the expected set of variables."
     return {f"{where} Expected {{{expected}}} but was {{{actual}}}."} if shared else set()
+
+
+def _sources(description: Any, identifier: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Source files, definitions and include folders as listed (fmpy reads both versions' lists)."""
+    files: list[str] = []
+    options: list[str] = []
+    for configuration in getattr(description, "buildConfigurations", []):
+        if configuration.modelIdentifier != identifier:
+            continue
+        for group in configuration.sourceFileSets:
+            files += group.sourceFiles
+            options += [f"-D{d.name}={d.value}" if d.value else f"-D{d.name}" for d in group.preprocessorDefinitions]
+            options += [f"-I{folder}" for folder in group.includeDirectories]
+    return tuple(dict.fromkeys(files)), tuple(options)
 
 
 def _line(error: Exception) -> str:

@@ -12,16 +12,20 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skillframe.actuation.actuator import DISCARD, LOST, OK, STATUS_TEXT, ActuatorSpec, Capabilities
 from skillframe.actuation.bindings import InstanceFailed
-from skillframe.actuation.child import Child, SandboxLimits
-from skillframe.actuation.inspection import FmuFacts
+from skillframe.actuation.child import Child, SandboxLimits, plain
+from skillframe.actuation.extract import unpack
+from skillframe.actuation.inspection import FmuFacts, describe_here
 from skillframe.actuation.wiring import columns, mapping
 from skillframe.errors import SkillframeError
 
 LOADING = 2 * (os.cpu_count() or 1)
 """Children that load at the same time: more of them would wait for each other and be taken for hung."""
+
+LONGEST_SENTENCE = 1 << 16  # bytes of words in an answer to a start or a step
 
 
 class SandboxBank:
@@ -48,10 +52,14 @@ class SandboxBank:
         self.limits = limits or SandboxLimits()
         self._specs, self._facts = list(specs), list(facts)
         self._time = 0.0
+        self._own: list[NDArray[np.int64]] = []  # columns of `y` that each actuator has, in its answers' order
         for spec, fact in zip(specs, facts, strict=True):
             fact.require_runnable()
-            mapping(spec, fact)
+            self._own.append(np.array([self.outputs.index(name) for name in mapping(spec, fact)[1]]))
+            unpack(fact.path)  # a child can write nothing
+        self._answers = [struct.Struct(f"q{len(own)}d") for own in self._own]
         self._children: list[Child | None] = [None] * self.count
+        self._held = [0] * self.count  # bytes, as each said at its last start
         self._problems: dict[int, str] = {}
         self._capabilities: dict[int, Capabilities] = {}
 
@@ -65,15 +73,15 @@ class SandboxBank:
     def _ready(self, index: int) -> Child:
         """The child of an instance; a new one where there is none or the old one has grown fat."""
         child = self._children[index]
-        if child is not None and child.resident_bytes() <= self.limits.memory_bytes // 2:
+        if child is not None and self._held[index] <= self.limits.memory_bytes // 2:
             return child
         if child is not None:
             child.close()
         spec, facts = self._kind(index)
         new = Child(facts.path, self._name(index), self.limits)
-        given = {"spec": asdict(spec), "path": str(facts.path), "name": self._name(index)}
-        given |= {"inputs": self.inputs, "outputs": self.outputs}
-        new.tell(b"l", given)
+        self._held[index] = 0
+        given = {**loading(facts), "spec": asdict(spec), "name": self._name(index), "inputs": self.inputs}
+        new.tell(b"l", {**given, "outputs": [self.outputs[k] for k in self._own[index % len(self._own)]]})
         self._children[index] = new
         return new
 
@@ -104,10 +112,13 @@ class SandboxBank:
         try:
             if new:
                 child.receive(self.limits.start_s, "loading")
-            self.y[index] = np.frombuffer(child.receive(self.limits.start_s, "starting"))
+            answer = child.receive(self.limits.start_s, "starting", self._most(index))
+            if len(answer) < 8:
+                raise child.liar(f"{len(answer)} bytes", "starting")
+            self._held[index] = max(0, *struct.unpack_from("q", answer))
+            self._take(index, child, answer[8:], "starting")
         except SkillframeError as error:
-            self._drop(index)
-            self.active[index], self.status[index], self._problems[index] = 0, LOST, str(error)
+            self._lose(index, error)
 
     def step(self, time: float, step: float) -> bool:
         """Advance from `time` by `step` [s] with inputs `u`; True if every active instance went well."""
@@ -121,28 +132,50 @@ class SandboxBank:
             fine &= self._collect(i, child)
         return fine
 
+    def _most(self, index: int) -> int:
+        """Bytes of an answer: numbers and a sentence."""
+        return self._answers[index % len(self._answers)].size + LONGEST_SENTENCE
+
     def _collect(self, index: int, child: Child) -> bool:
+        what = f"stepping from {self._time:.6g} s"
         try:
-            answer = child.receive(self.limits.step_s, f"stepping from {self._time:.6g} s")
+            answer = child.receive(self.limits.step_s, what, self._most(index))
+            return self._take(index, child, answer, what)
         except SkillframeError as error:
-            self._drop(index)
-            self.active[index], self.status[index], self._problems[index] = 0, LOST, str(error)
+            self._lose(index, error)
             return False
-        status = struct.unpack_from("q", answer)[0]
-        size = 8 + 8 * self.y.shape[1]
-        self.y[index] = np.frombuffer(answer[8:size])
+
+    def _take(self, index: int, child: Child, answer: bytes, what: str) -> bool:
+        """Status and outputs out of an answer, which is checked as if the FMU had written it; True if all is well.
+
+        Raises:
+            ChildLost: it is no answer to this question.
+        """
+        kind = index % len(self._own)
+        form = self._answers[kind]
+        if len(answer) < form.size:
+            raise child.liar(f"{len(answer)} bytes where {form.size} are due", what)
+        status, *values = form.unpack_from(answer)
+        if not OK <= status < LOST:
+            raise child.liar(f"status {status}", what)
+        self.y[index, self._own[kind]] = values
         self.status[index] = status
         if status < DISCARD:
+            total = sum(values)
+            if total - total != 0.0 and not np.isfinite(values).all():
+                raise child.liar("outputs that are no finite numbers", what)
             return True
-        self._problems[index] = answer[size:].decode("utf-8", "replace") or STATUS_TEXT[status]
+        self._problems[index] = plain(answer[form.size :]) or STATUS_TEXT[status]
         self.active[index] = status == DISCARD
         return False
 
-    def _drop(self, index: int) -> None:
+    def _lose(self, index: int, error: SkillframeError) -> None:
+        """End an instance's child and keep why."""
         child = self._children[index]
         if child is not None:
             child.kill()
         self._children[index] = None
+        self.active[index], self.status[index], self._problems[index] = 0, LOST, str(error)
 
     def refresh(self) -> bool:
         """Outputs at the present inputs; no time passes."""
@@ -151,7 +184,10 @@ class SandboxBank:
     def _all(self, letter: bytes, what: str) -> None:
         for i, child in enumerate(self._children):
             if self.active[i] and child is not None:
-                child.ask(letter, None, self.limits.step_s, what)
+                try:
+                    child.ask(letter, None, self.limits.step_s, what)
+                except SkillframeError as error:
+                    self._lose(i, error)
 
     def save(self) -> None:
         """Remember the state of every active instance."""
@@ -175,10 +211,17 @@ class SandboxBank:
 
     def close(self) -> None:
         """End every child."""
-        for child in self._children:
-            if child is not None:
-                child.close()
+        left = [child for child in self._children if child is not None]
+        for child in left:
+            child.release()
+        for child in left:
+            child.kill()
         self._children = [None] * self.count
+
+
+def loading(facts: FmuFacts) -> dict[str, Any]:
+    """What a child is told to load an FMU; it reads no description itself."""
+    return {"facts": describe_here(facts), "path": str(facts.path)}
 
 
 def probe_in_child(spec: ActuatorSpec, facts: FmuFacts, limits: SandboxLimits) -> Capabilities:
@@ -187,9 +230,12 @@ def probe_in_child(spec: ActuatorSpec, facts: FmuFacts, limits: SandboxLimits) -
     Raises:
         ChildLost, InstanceFailed: the FMU does not survive it.
     """
+    what = "its capabilities were tried out"
     child = Child(facts.path, spec.name or facts.name, limits)
     try:
-        given = {"spec": asdict(spec), "path": str(facts.path)}
-        return Capabilities(*child.ask(b"p", given, limits.start_s, "its capabilities were tried out"))
+        found = child.ask(b"p", {**loading(facts), "spec": asdict(spec)}, limits.start_s, what, LONGEST_SENTENCE)
+        if not isinstance(found, list) or [type(x) for x in found] != [bool] * len(Capabilities._fields):
+            raise child.liar("what are no capabilities", what)
+        return Capabilities(*found)
     finally:
         child.close()

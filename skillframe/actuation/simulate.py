@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from skillframe.actuation.bindings import Instance, InstanceFailed
+from skillframe.actuation.extract import forget, unpack
 from skillframe.actuation.inspection import FmuFacts, FmuVariable, inspect_fmu
 from skillframe.actuation.values import values_of
 from skillframe.errors import InputError
@@ -78,24 +79,58 @@ def simulate(request: Request, sandboxed: bool, limit_s: float = 30.0) -> Iterat
     facts = inspect_fmu(request.path)
     check_request(facts, request)
     if not sandboxed:
-        yield from run(request)
+        yield from run(facts, request)
         return
     from skillframe.actuation.child import Child, SandboxLimits
+    from skillframe.actuation.sandbox import loading
 
-    child = Child(facts.path, facts.name, SandboxLimits())
+    unpack(facts.path)
+    last = -1.0
+    child = Child(facts.path, facts.name, SandboxLimits(start_s=limit_s))
     try:
-        child.tell(b"m", {**asdict(request), "path": str(request.path)})
-        what = "simulating"
+        child.tell(b"m", {**loading(facts), "request": {**asdict(request), "path": ""}})
+        what, count = "simulating", 0
         while row := child.heard(limit_s, what):
-            what = "simulating" if row[0] < request.stop else "being freed after its last step"
+            problem = _wrong(row, facts, request, last) or ("too many rows" if count > _count(request) else "")
+            if problem:
+                raise child.liar(problem, what)
+            last, count = row[0], count + 1
+            what = "simulating" if last < request.stop else "being freed after its last step"
             yield row
+        if last != request.stop:
+            raise child.liar("the end", f"simulating from {max(last, 0.0):.6g} s")
     finally:
         child.close()
+        if last < 0.0:
+            forget(facts.path)
 
 
-def run(request: Request) -> Iterator[list[Any]]:
+def _count(request: Request) -> int:
+    """Steps from the start to the stop time."""
+    return max(1, round(request.stop / request.step)) if _even(request) else int(request.stop / request.step) + 1
+
+
+_TYPES: dict[str, tuple[type, ...]] = {"Boolean": (bool, int), "String": (str,)}
+_TYPES |= dict.fromkeys(("Real", "Float64", "Float32"), (float,))
+
+
+def _wrong(row: Any, facts: FmuFacts, request: Request, last: float) -> str:
+    """Why a row that a child sent is none, or "": its length, its time, the types of its values, numbers not finite."""
+    types: list[tuple[type, ...]] = [(float, int)]
+    types += [_TYPES.get(v.type, (int,)) for v in _outputs(facts) for _ in range(v.size)]
+    if not isinstance(row, list) or len(row) != len(types):
+        return "a row of another length"
+    if not all(type(value) in kinds for value, kinds in zip(row, types, strict=True)):
+        return "a row of other types"
+    if not last < row[0] <= request.stop:
+        return f"a row of {row[0]:.6g} s"
+    if any(value - value != 0.0 for value in row if isinstance(value, float)):
+        return "numbers that are not finite"
+    return ""
+
+
+def run(facts: FmuFacts, request: Request) -> Iterator[list[Any]]:
     """As `simulate`, in this process."""
-    facts = inspect_fmu(request.path)
     instance = Instance(facts, facts.name)
     try:
         yield from _rows(instance, facts, request)
@@ -109,7 +144,7 @@ def _rows(instance: Instance, facts: FmuFacts, request: Request) -> Iterator[lis
     instance.start({**request.parameters, **start}, {}, 0.0)
     setters = [facts.variables[name] for name in names]
     yield [0.0, *_read(instance, facts)]
-    count = max(1, round(request.stop / request.step)) if _even(request) else int(request.stop / request.step) + 1
+    count = _count(request)
     for k in range(count):
         time, end = k * request.step, min((k + 1) * request.step, request.stop) if k + 1 < count else request.stop
         try:

@@ -1,68 +1,80 @@
-"""The child process of `sandbox`: one FMU under limits, answering over a socket. Started as a module, never imported.
+"""The worker of `keeper`: one FMU under limits, answering over a channel.
 
-Letters: l load, s start, t step, v save, w restore, p probe, k check, m simulate, q leave. An answer begins with "."
-or, for a problem in words, "!".
+Letters: l load, s start, t step, v save, w restore, p probe, k check, m simulate, i inspect, j judge the description,
+h how confined, q leave. An answer begins with "." or, for a problem in words, with "!" or "?" (an input's).
 """
 
 from __future__ import annotations
 
-import ctypes
 import json
 import os
 import struct
-import sys
 from collections.abc import Callable
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+import fmpy.fmi2
+import fmpy.fmi3  # noqa: F401  loaded before the memory limit holds
 import numpy as np
 
 from skillframe.actuation.actuator import DISCARD, ActuatorSpec
+from skillframe.actuation.channel import Channel
 from skillframe.actuation.driver import FmuBank
-from skillframe.actuation.inspection import inspect_fmu
+from skillframe.actuation.inspection import FmuFacts, describe_here, facts_from, inspect_here, judge_here
 from skillframe.actuation.probe import probe, try_out
-from skillframe.errors import SkillframeError
+from skillframe.errors import InputError, SkillframeError
 
 OUT_OF_MEMORY = 12
+LARGEST_REQUEST = 1 << 30
 
 
 class Worker:
-    """State of the child: a bank of one."""
+    """State of the child: a bank of one.
 
-    def __init__(self, pipe: Connection) -> None:
-        self.pipe, self.bank = pipe, None  # type: Connection, FmuBank | None
-        self.columns: list[int] = []
+    Args:
+        channel: to skillframe.
+        confined: what of the system's confinement holds.
+    """
+
+    def __init__(self, channel: Channel, confined: dict[str, Any]) -> None:
+        self.channel, self.confined = channel, confined
+        self.bank: FmuBank | None = None
         self.calls: dict[bytes, Callable[[bytes], bytes]] = {
             b"l": self.load, b"s": self.start, b"t": self.step, b"v": self.save, b"w": self.restore,
-            b"p": self.probe, b"m": self.simulate, b"k": self.check,
+            b"p": self.probe, b"m": self.simulate, b"k": self.check, b"i": self.inspect, b"j": self.judge,
+            b"h": lambda _: json.dumps(self.confined).encode(),
         }  # fmt: skip
 
     def serve(self) -> None:
         """Answer until told to leave or the parent is gone."""
         while True:
             try:
-                request = self.pipe.recv_bytes()
+                request = self.channel.receive(LARGEST_REQUEST)
             except (EOFError, OSError):
                 return
             if request[:1] == b"q":
                 return
-            try:
-                answer = b"." + self.calls[request[:1]](request[1:])
-            except MemoryError:
-                os._exit(OUT_OF_MEMORY)
-            except SkillframeError as error:
-                answer = b"!" + str(error).encode()
-            except Exception as error:
-                answer = b"!" + f"{type(error).__name__}: {error}".encode()
-            self.pipe.send_bytes(answer)
+            self.channel.send(self._answer(request))
+
+    def _answer(self, request: bytes) -> bytes:
+        try:
+            return b"." + self.calls[request[:1]](request[1:])
+        except MemoryError:
+            os._exit(OUT_OF_MEMORY)
+        except InputError as error:
+            return b"?" + json.dumps([error.where, error.problem, error.fix]).encode()
+        except SkillframeError as error:
+            return b"!" + str(error).encode()
+        except Exception as error:
+            return b"!" + f"{type(error).__name__}: {error}".encode()
 
     def load(self, payload: bytes) -> bytes:
         """Load the FMU; columns of the parent's arrays may be more than ours."""
         given = json.loads(payload)
         spec = ActuatorSpec(**{**given["spec"], "name": given["name"]})
-        self.bank = FmuBank([spec], [inspect_fmu(Path(given["path"]))], compiled=False)
-        self.given_in, self.given_out = given["inputs"], given["outputs"]
+        self.bank = FmuBank([spec], [_facts(given)], compiled=False)
+        self.into = [(k, self.bank.inputs.index(n)) for k, n in enumerate(given["inputs"]) if n in self.bank.inputs]
+        self.out_of = [self.bank.outputs.index(name) for name in given["outputs"]]
         return b""
 
     @property
@@ -77,23 +89,23 @@ class Worker:
         return self.bank
 
     def _take(self, values: Any) -> None:
-        for name, value in zip(self.given_in, values, strict=True):
-            if name in self.one.inputs:
-                self.one.u[0, self.one.inputs.index(name)] = value
+        for given, own in self.into:
+            self.one.u[0, own] = values[given]
 
-    def _row(self) -> bytes:
-        row = np.full(len(self.given_out), np.nan)
-        for k, name in enumerate(self.given_out):
-            if name in self.one.outputs:
-                row[k] = self.one.y[0, self.one.outputs.index(name)]
-        return row.tobytes()
+    def _told(self) -> bytes:
+        """Status, the outputs that were asked for, and a problem in words."""
+        bank = self.one
+        status = int(bank.status[0])
+        text = bank.problem(0) if status >= DISCARD else ""
+        return struct.pack("q", status) + bank.y[0, self.out_of].tobytes() + text.encode()
 
     def start(self, payload: bytes) -> bytes:
-        """Reset and initialise."""
+        """Reset and initialise; the memory held, then as a step."""
         given = json.loads(payload)
         self._take(given["u"])
+        self.one.status[:] = 0
         self.one.start(given["time"], [given["parameters"]])
-        return self._row()
+        return struct.pack("q", _resident()) + self._told()
 
     def step(self, payload: bytes) -> bytes:
         """Step, or refresh for a step of zero."""
@@ -101,10 +113,9 @@ class Worker:
         self._take(np.frombuffer(payload[16:]))
         bank = self.one
         bank._time = time
-        fine = bank.step(time, step) if step > 0.0 else bank.refresh()
-        status = 0 if fine else int(bank.status[0])
-        text = bank.problem(0) if status >= DISCARD else ""
-        return struct.pack("q", status) + self._row() + text.encode()
+        bank.status[0] = 0
+        _ = bank.step(time, step) if step > 0.0 else bank.refresh()
+        return self._told()
 
     def save(self, payload: bytes) -> bytes:
         """Remember the state."""
@@ -119,40 +130,38 @@ class Worker:
     def probe(self, payload: bytes) -> bytes:
         """Try out capabilities."""
         given = json.loads(payload)
-        return json.dumps(list(probe(inspect_fmu(Path(given["path"])), ActuatorSpec(**given["spec"])))).encode()
+        return json.dumps(list(probe(_facts(given), ActuatorSpec(**given["spec"])))).encode()
 
     def check(self, payload: bytes) -> bytes:
         """A short trial with inputs at their start values; whether its state repeats."""
-        return json.dumps(try_out(inspect_fmu(Path(json.loads(payload)["path"])))).encode()
+        return json.dumps(try_out(_facts(json.loads(payload)))).encode()
 
     def simulate(self, payload: bytes) -> bytes:
         """Simulate on its own, sending rows as they come; the last answer is empty."""
         from skillframe.actuation.simulate import Request, run
 
         given = json.loads(payload)
-        request = Request(**{**given, "path": Path(given["path"])})
-        for row in run(request):
-            self.pipe.send_bytes(b"." + json.dumps(row).encode())
+        facts = _facts(given)
+        for row in run(facts, Request(**{**given["request"], "path": facts.path})):
+            self.channel.send(b"." + json.dumps(row).encode())
         return b"[]"
 
+    def inspect(self, payload: bytes) -> bytes:
+        """What the file says."""
+        return json.dumps(describe_here(inspect_here(Path(json.loads(payload)["path"])))).encode()
 
-def limit(memory_bytes: int) -> None:
-    """Limits of this process, and its end when the parent ends (Linux)."""
+    def judge(self, payload: bytes) -> bytes:
+        """What is wrong with its description."""
+        return json.dumps(judge_here(Path(json.loads(payload)["path"]))).encode()
+
+
+def _facts(given: dict[str, Any]) -> FmuFacts:
+    return facts_from(given["facts"], Path(given["path"]))
+
+
+def _resident() -> int:
+    """Memory held now [bytes], 0 where the system does not tell."""
     try:
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_AS, (memory_bytes, memory_bytes))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        ctypes.CDLL(None).prctl(1, 9)  # PR_SET_PDEATHSIG, SIGKILL
-    except (ImportError, OSError, ValueError, AttributeError):
-        pass
-
-
-if __name__ == "__main__":
-    import fmpy.fmi2
-    import fmpy.fmi3  # noqa: F401  loaded before the memory limit holds
-
-    connection = Connection(int(sys.argv[1]))
-    limit(int(sys.argv[2]))
-    Worker(connection).serve()
-    os._exit(0)  # an FMU's own clean-up at exit has hung before
+        return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError, IndexError):
+        return 0

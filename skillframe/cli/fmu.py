@@ -106,10 +106,11 @@ def check(file: str, as_json: bool, allow: bool) -> int:
 
 def _print_check(path: Path, found: dict[str, Any]) -> None:
     """What was found, a line each; then what can be connected and set, with units and start values."""
+    from skillframe.actuation.check import confinement_in_words
     from skillframe.actuation.inspection import inspect_fmu
     from skillframe.cli.output import table
 
-    for key, value in found.items():
+    for key, value in {**found, "confinement": confinement_in_words(found["confinement"])}.items():
         text = ", ".join(map(str, value)) if isinstance(value, list) else str(value)
         click.echo(f"{key.replace('_', ' ')}: {text or 'none'}")
     shown = ("input", "output", "parameter")

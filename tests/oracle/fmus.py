@@ -25,6 +25,9 @@ C2 = r"""
 #ifndef ON_STEP
 #define ON_STEP
 #endif
+#ifndef ON_SETUP
+#define ON_SETUP
+#endif
 #ifndef ON_END
 #define ON_END
 #endif
@@ -52,7 +55,10 @@ C fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String wh
     return m;
 }
 void fmi2FreeInstance(C c) { ON_FREE free(c); }
-S fmi2SetupExperiment(C c, int a, double b, double start, int d, double e) { ((M *)c)->t = start; return fmi2OK; }
+S fmi2SetupExperiment(C c, int a, double b, double start, int d, double e) {
+    ON_SETUP ((M *)c)->t = start;
+    return fmi2OK;
+}
 S fmi2EnterInitializationMode(C c) { return fmi2OK; }
 S fmi2ExitInitializationMode(C c) { return fmi2OK; }
 S fmi2Terminate(C c) { ON_END return fmi2OK; }
@@ -182,13 +188,13 @@ def source(version=2):
     return ours
 
 
-def library(folder: Path, version=2, **hooks):
-    """The shared library of `source`, hooks as preprocessor definitions."""
+def library(folder: Path, version=2, prelude="", **hooks):
+    """The shared library of `source` after a prelude in C, hooks as preprocessor definitions."""
     import fmpy
 
     folder.mkdir(parents=True, exist_ok=True)
     made, text = folder / "lag.so", folder / "lag.c"
-    text.write_text(source(version))
+    text.write_text(prelude + source(version))
     include = f"-I{Path(fmpy.__file__).parent / 'c-code'}"
     defines = [f"-D{name}={text}" for name, text in hooks.items()]
     command = ["gcc", "-shared", "-fPIC", "-O1", "-w", include, *defines, "-o", str(made), str(text), "-lm"]

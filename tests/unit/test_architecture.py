@@ -50,8 +50,11 @@ LOOP = {
 }
 SET_UP = {  # finds, builds and unpacks FMUs before a run, simulates one alone, holds a foreign one in its own process
     f"skillframe/actuation/{name}.py"
-    for name in ("allow", "build", "child", "extract", "foreign", "library", "record", "toolchain", "worker")
-}
+    for name in (
+        "allow", "build", "channel", "child", "confine", "extract", "foreign", "keeper", "library", "record",
+        "toolchain", "worker",
+    )
+}  # fmt: skip
 HEAVY = {"scipy", "casadi", "fmpy", "filterpy", "mujoco", "matplotlib", "pinocchio"}
 
 
