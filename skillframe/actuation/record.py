@@ -17,6 +17,8 @@ from skillframe.actuation.simulate import Request, check_request, output_columns
 from skillframe.actuation.values import values_of
 from skillframe.errors import InputError
 
+EXACT = 2.0**53
+
 
 class Recorded(NamedTuple):
     """Columns and number of rows written; the problem that ended the run early, or ""."""
@@ -90,8 +92,8 @@ def read_inputs(path: Path, facts: FmuFacts) -> tuple[list[str], list[list[float
     rows = []
     for number, line in enumerate(lines[1:], start=2):
         try:
-            values = [float(x) for x in line]
-        except ValueError:
+            values = [_cell(x) for x in line]
+        except (ValueError, OverflowError):
             raise InputError(f"{path}: line {number}", "holds something that is no number", "correct it") from None
         if len(values) != len(names) or any(x - x != 0.0 for x in values):
             raise InputError(f"{path}: line {number}", f"needs {len(names)} finite numbers", "correct it")
@@ -101,6 +103,12 @@ def read_inputs(path: Path, facts: FmuFacts) -> tuple[list[str], list[list[float
     for column, name in enumerate(others, start=1):
         _convertible(path, facts.variables[name], [row[column] for row in rows])
     return others, rows
+
+
+def _cell(text: str) -> float | int:
+    """A number; a whole one exactly, since a double holds no more than 53 bits of it."""
+    number = float(text)
+    return int(text) if abs(number) > EXACT and text.strip().lstrip("+-").isdecimal() else number
 
 
 def _convertible(path: Path, variable: FmuVariable, values: list[float]) -> None:

@@ -122,7 +122,7 @@ def _wrong(row: Any, facts: FmuFacts, request: Request, last: float) -> str:
         return "a row of another length"
     if not all(type(value) in kinds for value, kinds in zip(row, types, strict=True)):
         return "a row of other types"
-    if not last < row[0] <= request.stop:
+    if not last <= row[0] <= request.stop:
         return f"a row of {row[0]:.6g} s"
     if any(value - value != 0.0 for value in row if isinstance(value, float)):
         return "numbers that are not finite"

@@ -102,13 +102,18 @@ ATTACKS = {
     "aborts": Attack("abort();", r"crashed \(SIGABRT\) while"),
     "segment violation": Attack("*(volatile int*)8=1;", r"crashed \(SIGSEGV\) while"),
     "a grandchild that outlives it": Attack(
-        ONCE + "if(fork()==0){setsid();if(fork()==0){for(;;){put(MARK,\"later\");usleep(200000);}}_exit(0);}", FINE
+        ONCE + "int p=fork();if(p<0)abort();"
+        'if(p==0){setsid();if(fork()==0)for(;;){put(MARK,"later");usleep(200000);}_exit(0);}',
+        FINE,
     ),
-    "a hundred children": Attack(ONCE + "for(int i=0;i<100;i++)if(fork()==0){setsid();for(;;)sleep(1);}", FINE),
+    "a hundred children": Attack(
+        ONCE + "for(int i=0;i<100;i++){int p=fork();if(p<0)abort();if(p==0){setsid();for(;;)sleep(1);}}", FINE
+    ),
     "kills its parent": Attack("kill(getppid(),SIGKILL);sleep(1);", r"crashed \(SIGKILL\) while"),
     "kills what it finds": Attack("hunt(MARK);", FINE),
     "writes files": Attack(
-        'put(".","x");put(MARK,"x");put("/tmp","x");put("/var/tmp","x");if(getenv("HOME"))put(getenv("HOME"),"x");',
+        'put(".","x");put(MARK,"x");put("/tmp","x");put("/var/tmp","x");if(getenv("HOME"))put(getenv("HOME"),"x");'
+        'if(access("stolen.txt",R_OK))abort();',
         FINE,
     ),
     "writes the environment's secrets": Attack(

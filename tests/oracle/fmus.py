@@ -190,11 +190,16 @@ def source(version=2):
 
 def library(folder: Path, version=2, prelude="", **hooks):
     """The shared library of `source` after a prelude in C, hooks as preprocessor definitions."""
+    return compiled(folder, prelude + source(version), **hooks)
+
+
+def compiled(folder: Path, code, **hooks):
+    """The shared library of some C."""
     import fmpy
 
     folder.mkdir(parents=True, exist_ok=True)
     made, text = folder / "lag.so", folder / "lag.c"
-    text.write_text(prelude + source(version))
+    text.write_text(code)
     include = f"-I{Path(fmpy.__file__).parent / 'c-code'}"
     defines = [f"-D{name}={text}" for name, text in hooks.items()]
     command = ["gcc", "-shared", "-fPIC", "-O1", "-w", include, *defines, "-o", str(made), str(text), "-lm"]

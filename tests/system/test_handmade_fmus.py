@@ -6,9 +6,9 @@ import csv
 import json
 import math
 import re
+import resource
 import time
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +17,7 @@ from skillframe.actuation.toolchain import find_compiler
 from skillframe.cli.main import run
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.oracle import fmus
+from tests.oracle.attacks import processes
 from tests.system.foreign_fmus import by_fmpy
 
 pytestmark = pytest.mark.slow
@@ -183,13 +184,14 @@ def test_however_it_ends_the_rows_are_kept_and_one_sentence_says_when(said, tmp_
     assert len(out.read_text().splitlines()) == rows
 
 
-def test_what_an_fmu_starts_ends_with_it(said, tmp_path):
-    mark = tmp_path / "pid"
-    hook = f'if(t<0.05&&fork()==0){{FILE*f=fopen("{mark}","w");fprintf(f,"%d",getpid());fclose(f);for(;;)sleep(1);}}'
+def test_what_an_fmu_starts_ends_with_it(said, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))  # which everything that is started here knows
+    hook = "if(t<0.05){int p=fork();if(p==0)for(;;)sleep(1);m->count=p;}"
     path = fmus.pack(tmp_path / "forks.fmu", fmus.describe(), fmus.library(tmp_path / "c", ON_STEP=hook))
-    simulated(said, path, tmp_path / "o.csv")
-    state, patience = Path(f"/proc/{mark.read_text()}/stat"), time.monotonic() + 5.0
-    while state.exists() and state.read_text().split(")")[1].split()[0] != "Z":  # Z: ended, and not yet collected
+    ours = simulated(said, path, tmp_path / "o.csv")
+    assert float(ours["count"][1]) > 1  # it did start a process
+    patience = time.monotonic() + 5.0
+    while processes(tmp_path):
         assert time.monotonic() < patience
         time.sleep(0.01)
 
@@ -273,3 +275,63 @@ def test_an_array_without_end_is_refused_before_it_is_simulated(said, lag, tmp_p
     path = fmus.pack(tmp_path / "wide.fmu", fmus.describe(3, columns=2_000_000_000), binary, 3)
     code, _, err = said("simulate", path, "--stop", 1, "--step", 0.1, "--out", tmp_path / "o.csv")
     assert code == 2 and "has outputs of 4000000004 values" in err
+
+
+def test_a_wide_integer_in_a_table_reaches_the_fmu_to_the_last_digit(said, tmp_path):
+    wide = 2**62 + 1  # a double would make it 2**62
+    code = (
+        fmus.source(3)
+        .replace("uint64_t large; } M", "uint64_t large; int64_t given; } M")
+        .replace(
+            "ACCESS(GetUInt64, uint64_t, case 30: v[at++] = m->large; break;)",
+            "ACCESS(GetUInt64, uint64_t, case 30: v[at++] = m->given; break;)\n"
+            "ACCESS(SetInt64, const int64_t, case 31: m->given = v[at++]; break;)",
+        )
+    )
+    code = code.replace(re.search(r"\nS? ?fmi3Status fmi3SetInt64\(.*", code)[0], "")
+    wired = '<Int64 name="given" valueReference="31" causality="input" start="0"/></ModelVariables>'
+    description = fmus.describe(3).replace("</ModelVariables>", wired)
+    path = fmus.pack(tmp_path / "wide.fmu", description, fmus.compiled(tmp_path / "c", code), 3)
+    table = tmp_path / "in.csv"
+    table.write_text(f"time,given\n0,{wide}\n")
+    assert simulated(said, path, tmp_path / "o.csv", "--input", table)["large"][-1] == str(wide)
+
+
+def described(count):
+    """A model description with so many variables more."""
+    row = '<ScalarVariable name="v{0}" valueReference="{1}" causality="local"><Real/></ScalarVariable>'
+    more = "".join(row.format(k, k + 10) for k in range(count))
+    return fmus.describe().replace("</ModelVariables>", more + "</ModelVariables>")
+
+
+def test_a_description_without_end_is_refused_before_it_is_read(said, tmp_path):
+    path = fmus.pack(tmp_path / "many.fmu", described(600_000))
+    for more in (("check",), ("simulate", "--stop", 1, "--step", 0.1, "--out", tmp_path / "o.csv"), ("build",)):
+        code, _, err = said(more[0], path, *more[1:])
+        assert code == 2 and "describes 600010 variables, where 100000 are the most" in err, err
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < 700 * 1024  # kB; the text alone is 60 MB
+
+
+def test_a_large_description_is_read_in_a_child_and_its_names_are_there(said, tmp_path):
+    binary = fmus.library(tmp_path / "c")
+    path = fmus.pack(tmp_path / "large.fmu", described(20_000), binary)
+    assert len(simulated(said, path, tmp_path / "o.csv")["y"]) == 11
+
+
+def test_a_file_of_zeros_is_refused_and_nothing_stays_in_the_cache(said, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    path = fmus.pack(tmp_path / "zeros.fmu", fmus.describe(), members=[("resources/0", bytes(300_000_000))])
+    for more in (("check",), ("simulate", "--stop", 1, "--step", 0.1, "--out", tmp_path / "o.csv")):
+        code, _, err = said(more[0], path, *more[1:])
+        assert code == 2 and "bytes that unpack to 300000000; do not trust this file" in err, err
+    assert not [p for p in (tmp_path / "cache").rglob("*") if p.is_file()]
+
+
+@pytest.mark.parametrize("command", ["check", "simulate"])
+def test_what_was_unpacked_of_an_fmu_that_does_not_load_is_removed(said, tmp_path, monkeypatch, command):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    path = fmus.pack(tmp_path / "none.fmu", fmus.describe(), b"no library")
+    more = () if command == "check" else ("--stop", 1, "--step", 0.1, "--out", tmp_path / "o.csv")
+    code, out, err = said(command, path, *more)
+    assert code == 1 and "does not load" in out + err
+    assert not [p for p in (tmp_path / "cache").rglob("*") if p.is_file()]
