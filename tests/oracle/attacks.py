@@ -43,7 +43,7 @@ static void forge(unsigned number, unsigned declared, const char *body, unsigned
 }
 static void put(const char *folder, const char *text) {
     char path[4096];
-    snprintf(path, sizeof path, "%s/stolen.txt", folder);
+    snprintf(path, sizeof path, "%s/%s", folder, NAME);
     FILE *f = fopen(path, "w");
     if (f) { fputs(text, f); fclose(f); }
 }
@@ -77,7 +77,8 @@ class Attack:
 
     def source(self, mark: Path) -> str:
         """The prelude and this attack."""
-        return PRELUDE + f'#define MARK "{mark}"\n{self.before}\nstatic void attack(double t) {{ {self.code} }}\n'
+        names = f'#define MARK "{mark}"\n#define NAME "{_name(mark)}"\n'
+        return names + PRELUDE + f"{self.before}\nstatic void attack(double t) {{ {self.code} }}\n"
 
 
 ONCE = "static int done;if(done++)return;"
@@ -109,11 +110,15 @@ ATTACKS = {
     "a hundred children": Attack(
         ONCE + "for(int i=0;i<100;i++){int p=fork();if(p<0)abort();if(p==0){setsid();for(;;)sleep(1);}}", FINE
     ),
+    "a hundred children, and never answers": Attack(
+        "for(int i=0;i<100;i++){int p=fork();if(p<0)abort();if(p==0){setsid();for(;;)sleep(1);}}for(;;)sleep(1);",
+        STOPPED,
+    ),
     "kills its parent": Attack("kill(getppid(),SIGKILL);sleep(1);", r"crashed \(SIGKILL\) while"),
     "kills what it finds": Attack("hunt(MARK);", FINE),
     "writes files": Attack(
         'put(".","x");put(MARK,"x");put("/tmp","x");put("/var/tmp","x");if(getenv("HOME"))put(getenv("HOME"),"x");'
-        'if(access("stolen.txt",R_OK))abort();',
+        'if(access(NAME,R_OK))abort();',
         FINE,
     ),
     "writes the environment's secrets": Attack(
@@ -156,6 +161,12 @@ def processes(mark: Path) -> list[int]:
     return found
 
 
-def written(*places: Path) -> list[str]:
-    """Files that an attack has written."""
-    return [str(p) for place in places for name in ("stolen.txt", "flood") for p in place.rglob(name)]
+def _name(mark: Path) -> str:
+    """Of the files that an attack writes: this test's own."""
+    return f"stolen-{mark.parent.name}-{mark.name}.txt"
+
+
+def written(mark: Path) -> list[str]:
+    """Files that an attack has written, in the test's folder and where anyone may write."""
+    own = [p for name in (_name(mark), "flood") for p in mark.rglob(name)]
+    return [str(p) for p in (*own, Path("/tmp", _name(mark)), Path("/var/tmp", _name(mark))) if p.exists()]
