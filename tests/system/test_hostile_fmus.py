@@ -14,13 +14,16 @@ import numpy as np
 import pytest
 
 from skillframe.actuation.actuator import ActuatorSpec
+from skillframe.actuation.build import build_fmu
 from skillframe.actuation.child import Child, SandboxLimits
 from skillframe.actuation.inspection import inspect_fmu
 from skillframe.actuation.sandbox import SandboxBank
 from skillframe.actuation.toolchain import find_compiler
+from skillframe.trace import Trace
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.oracle import fmus
 from tests.oracle.attacks import ATTACKS, SECRET, processes, written
+from tests.system.crane_fakes import CRANE, OWN, SOURCE, TABLE, crane, driven_by, skill
 
 pytestmark = [pytest.mark.skipif(find_compiler() is None, reason="no C compiler")]
 LIMIT_S = 3.0
@@ -170,3 +173,50 @@ def test_a_forged_number_in_the_loop_ends_its_own_instance_with_a_sentence(mark)
     assert re.match(words, bank.problem(1)), bank.problem(1)
     assert bank.active.tolist() == [1, 0] and bank.problem(0) == "" and np.isfinite(bank.y[0, 0])
     bank.close()
+
+
+IN_A_RUN = (
+    "stray bytes to every descriptor", "leaves in a step", "kills its parent", "a grandchild that outlives it",
+    "writes files", "stops itself", "a message of 4 GB announced",
+)  # fmt: skip
+RUN = "import sys; from skillframe.cli.main import run; sys.exit(run(['run', *sys.argv[1:]]))"
+
+
+@pytest.fixture(scope="module")
+def push(tmp_path_factory):
+    return skill(tmp_path_factory.mktemp("skill"))
+
+
+@pytest.mark.slow
+@pytest.mark.needs_plugins
+@pytest.mark.parametrize("name", IN_A_RUN)
+def test_a_crane_whose_cylinder_attacks_ends_its_run_in_a_sentence_and_leaves_nothing(mark, push, confined, name):
+    attack, step = ATTACKS[name], "steps++; if (m->time > 0.0495) attack(m->time);"
+    good = cylinder(mark / "good", "good", "", "")
+    bad = cylinder(mark / "bad", "bad", "#define CHECK 0\n" + attack.source(mark), step)
+    robot = crane(mark / "crane", driven_by(good, lift=bad))
+    arguments = ["--world", "free", "--robot", robot, "--coc", "0,0,0", "--duration", "0.2", "--out", mark / "run.npz"]
+    code, out, err, seconds = ended_in(mark, RUN, push, *arguments)
+    print(f"{name} | run | {seconds:.1f} s | exit {code} | {err.strip()} | {out.strip()[-300:]}")
+    nothing_is_left(mark, confined["landlock"])
+    words = attack.simulate.replace("within 3 s", "within 5 s")
+    assert "Traceback" not in err and code in (0, 1)
+    assert re.search(words, out + err), (out, err)
+    if words:
+        assert code == 1
+        assert re.search(words, Trace.load(mark / "run.npz").meta["failure"])
+
+
+ROBOT = (CRANE / "robot.toml").read_text()
+
+
+def cylinder(folder, name, prelude, step):
+    """A cylinder of `crane_fakes` that does something of its own in every step."""
+    source = folder / name
+    source.mkdir(parents=True)
+    names = sorted(set(re.findall(r"(\w+) = ", "".join(re.findall(r"parameters = \{(.*)\}", ROBOT)))))
+    rows = "\n".join(f"{n} = {{ {'boolean = true, start = 1' if 'per_edge' in n else 'start = 1'} }}" for n in names)
+    (source / "fmu.toml").write_text(TABLE.format(name=name, parameters=rows))
+    (source / "own.h").write_text(OWN)
+    (source / f"{name}.c").write_text(prelude + SOURCE.format(step=step, share=1.0))
+    return build_fmu(source, 2, out=folder / f"{name}.fmu")
