@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import re
-import tomllib
 import types
 import typing
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
+from skillframe.documents import NotToml, parse_toml, read_text, shown, storable
 from skillframe.errors import InputError, UnknownName
 
 T = TypeVar("T")
+LARGEST = 1e100
+"""Size of a number from outside; beyond it squares overflow."""
 BARE_POINT = re.compile(r"[+-]?(\.\d+|\d+\.)([eE][+-]?\d+)?")
 """Numbers such as .5 and 2., which people type and TOML does not know."""
 
@@ -22,16 +24,9 @@ def read_toml(path: Path) -> dict[str, Any]:
     """The content of a TOML file.
 
     Raises:
-        InputError: missing, not text, or not TOML (with the line).
+        InputError: missing, not text, not TOML (with the line), or anything that `documents.parse_toml` refuses.
     """
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
-        raise InputError(path, "no such file", "check the path") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(path, f"cannot be read as text ({error})", "give a TOML file") from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(path, f"is not valid TOML: {error}", "mend that line") from None
+    return parse_toml(read_text(path, "give a TOML file"), path)
 
 
 def build(cls: type[T], values: Mapping[str, Any], where: str) -> T:
@@ -133,13 +128,24 @@ def parse_setting(text: str) -> tuple[str, Any]:
     """`KEY=VALUE` from the command line; the value is read as TOML, or kept as text where it is none.
 
     Raises:
-        InputError: there is no "=".
+        InputError: there is no "=", or the value is beyond what a file may hold, such as a number of 41 digits.
     """
     key, separator, value = text.partition("=")
     if not separator or not key.strip():
         raise InputError(f"--set {text}", "is not KEY=VALUE", "write for example --set world.friction=0.3")
+    if not storable(text):
+        raise InputError(f"--set {shown(text)}", "is not text in UTF-8", "type it again")
     try:
-        return key.strip(), tomllib.loads(f"x = {value}")["x"]
-    except tomllib.TOMLDecodeError:
+        return key.strip(), parse_toml(f"x = {value}", f"--set {text:.80}")["x"]
+    except NotToml:
         value = value.strip()
         return key.strip(), float(value) if BARE_POINT.fullmatch(value) else value
+
+
+def parse_numbers(text: str) -> tuple[float, ...]:
+    """Numbers from "A,B,...", empty where one of them is none that anything could be computed with."""
+    try:
+        numbers = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        return ()
+    return numbers if all(abs(number) <= LARGEST for number in numbers) else ()

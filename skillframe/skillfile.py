@@ -19,8 +19,9 @@ from typing import Any
 
 from skillframe import __version__
 from skillframe.demonstration.record import Demonstration
-from skillframe.demonstration.safe import replace_file
+from skillframe.documents import check_plain, parse_json, read_text, shown
 from skillframe.errors import InputError, UnknownName
+from skillframe.files import write_whole
 from skillframe.records import CoordinatorType, Document, SkillType
 from skillframe.registry import registry
 
@@ -77,7 +78,7 @@ def _source(demonstration: Demonstration) -> dict[str, str]:
     else:
         for array in (demonstration.time, demonstration.position, demonstration.quaternion, demonstration.wrench):
             digest.update(array.astype("<f8").tobytes())
-    return {"file": demonstration.source or "(in memory)", "sha256": digest.hexdigest()}
+    return {"file": shown(demonstration.source) or "(in memory)", "sha256": digest.hexdigest()}
 
 
 def save(document: Document, path: Path) -> None:
@@ -87,7 +88,7 @@ def save(document: Document, path: Path) -> None:
         InputError: the document breaks the layout, or the file cannot be written.
     """
     _check(document, str(path))
-    replace_file(path, to_text(document).encode())
+    write_whole(path, to_text(document).encode())
 
 
 def to_text(document: Document) -> str:
@@ -153,33 +154,10 @@ def understood(where: object) -> Iterator[None]:
 
 
 def _parse(path: Path) -> Document:
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise InputError(path, "no such file", "check the path") from None
-    except UnicodeDecodeError:
-        raise InputError(path, "is a binary file, not a skill file", _GIVE) from None
-    except OSError as error:
-        raise InputError(path, f"cannot be read ({error.strerror})", _GIVE) from None
-    try:
-        document = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise _not_json(path, text, error) from None
-    except RecursionError:
-        raise InputError(path, "is nested too deeply for a skill file", _AGAIN) from None
+    document = parse_json(read_text(path, _GIVE), path, _GIVE)
     if not isinstance(document, dict):
         raise InputError(path, "is not a skill file: it holds no JSON object", _GIVE)
     return document
-
-
-def _not_json(path: Path, text: str, error: json.JSONDecodeError) -> InputError:
-    if not text.strip():
-        return InputError(path, "is empty", _AGAIN)
-    cut = not text[error.pos :].strip() or "Unterminated string" in error.msg
-    if cut and text.lstrip().startswith("{"):
-        return InputError(path, f"is cut off at line {error.lineno}", "copy it again, or learn the skill again")
-    problem = f"is not JSON: {error.msg} at line {error.lineno}, column {error.colno}"
-    return InputError(path, problem, _GIVE)
 
 
 def _check(document: Document, where: str) -> None:
@@ -197,7 +175,8 @@ def _check(document: Document, where: str) -> None:
         if document.get(key, 1) < 1:
             raise InputError(f"{where}: {key}", f"is {document[key]}, and versions count from 1", "mend it")
     for spot, problem in _no_numbers(document, ""):
-        raise InputError(f"{where}: {spot}", problem, "mend it, or learn the skill again")
+        raise InputError(f"{where}: {spot}", problem, "correct it, or learn the skill again")
+    check_plain(document, where, _AGAIN)
     _check_frame(document["frame"], where)
     for i, source in enumerate(document["learned_from"]):
         for key in ("file", "sha256"):

@@ -6,8 +6,8 @@ and the bodies' poses are in its arrays.
 
 from __future__ import annotations
 
+import io
 import json
-import os
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -15,10 +15,13 @@ from typing import Any
 import numpy as np
 
 from skillframe.errors import InputError
+from skillframe.files import write_whole
 from skillframe.frames import Float
+from skillframe.npzfile import json_member, read_arrays
 from skillframe.tracemeta import LARGEST, check_meta
 
 FORMAT, VERSION = "skillframe.trace", 1
+GIVE = "give a .npz written by skillframe run"
 MACHINE = "machine_"
 """Begins the names of a hydraulic machine's arrays in a file."""
 COLUMNS = {
@@ -76,15 +79,17 @@ class Trace:
     meta: dict[str, Any] = field(default_factory=dict)
 
     def save(self, path: Path) -> None:
-        """Write the trace, whole or not at all."""
+        """Write the trace, whole or not at all.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
         arrays = {name: getattr(self, name) for name in [*COLUMNS, "q", "body_position", "body_quaternion"]}
         arrays.update({MACHINE + name: array for name, array in self.machine.items()})
         meta = json.dumps({"format": FORMAT, "version": VERSION, **self.meta}, sort_keys=True)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_name(path.name + ".tmp")
-        with temporary.open("wb") as file:
-            np.savez_compressed(file, meta=np.array(meta), **arrays)
-        os.replace(temporary, path)
+        buffer = io.BytesIO()
+        np.savez_compressed(buffer, meta=np.array(meta), **arrays)
+        write_whole(path, buffer.getvalue())
 
     @classmethod
     def load(cls, path: Path) -> Trace:
@@ -93,19 +98,13 @@ class Trace:
         Raises:
             InputError: missing, not a trace, or of a newer version.
         """
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                arrays = {name: file[name] for name in file.files}
-            meta = json.loads(str(arrays.pop("meta")), parse_int=_whole)
-        except FileNotFoundError:
-            raise InputError(path, "no such file", "check the path") from None
-        except Exception:
-            raise InputError(
-                path, "is no trace file, or a damaged one", "give a .npz written by skillframe run"
-            ) from None
-        if not isinstance(meta, dict) or meta.get("format") != FORMAT:
-            said = meta.get("format") if isinstance(meta, dict) else meta
-            raise InputError(path, f"has format {said!r}, not {FORMAT!r}", "give a trace file")
+        arrays = read_arrays(path, "trace file", GIVE)
+        meta = json_member(path, arrays, "meta", GIVE) if "meta" in arrays else None
+        if meta is None:
+            raise InputError(path, "is not a readable trace file, or is damaged (it holds no JSON object meta)", GIVE)
+        del arrays["meta"]
+        if meta.get("format") != FORMAT:
+            raise InputError(path, f"has format {meta.get('format')!r}, not {FORMAT!r}", "give a trace file")
         if not isinstance(meta.get("version"), int) or meta["version"] > VERSION:
             raise InputError(path, f"is of version {meta.get('version')}, newer than {VERSION}", "update skillframe")
         machine = {name: arrays.pop(name) for name in list(arrays) if name.startswith(MACHINE)}
@@ -144,10 +143,3 @@ def _check_numbers(path: Path, arrays: dict[str, Float]) -> None:
             raise InputError(path, f"array {name} holds a number out of all bounds in row {row}", "run it again")
     if np.any(np.diff(arrays["time"]) <= 0.0):
         raise InputError(path, "its time does not increase", "write the trace again")
-
-
-def _whole(text: str) -> int:
-    """A whole number of JSON, which may be longer than any that is meant."""
-    if len(text) > 100:
-        raise ValueError(text)
-    return int(text)

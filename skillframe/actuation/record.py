@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,6 +15,7 @@ from skillframe.actuation.library import find_fmu
 from skillframe.actuation.simulate import Request, check_request, output_columns, simulate
 from skillframe.actuation.values import values_of
 from skillframe.errors import InputError
+from skillframe.files import writing_whole
 
 EXACT = 2.0**53
 
@@ -49,9 +49,9 @@ def simulate_to_csv(
 
 def _write(out: Path, columns: list[str], rows: Iterator[list[Any]]) -> Recorded:
     """Rows as they come; whatever ends them, those that were reached are kept."""
-    out.parent.mkdir(parents=True, exist_ok=True)
-    part, count, problem = out.with_name(out.name + ".part"), 0, ""
-    with part.open("w", newline="", encoding="utf-8") as file:
+    count, problem = 0, ""
+    other: BaseException | None = None
+    with writing_whole(out) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(columns)
         try:
@@ -60,8 +60,12 @@ def _write(out: Path, columns: list[str], rows: Iterator[list[Any]]) -> Recorded
                 count += 1
         except (InstanceFailed, ChildLost) as error:
             problem = str(error)
-        finally:
-            os.replace(part, out)
+        except OSError:  # a full disk: there is no table
+            raise
+        except BaseException as error:  # raised again once the table is in its place
+            other = error
+    if other is not None:
+        raise other
     return Recorded(columns, count, problem)
 
 

@@ -17,8 +17,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from skillframe.campaign.rows import Row, cell, columns, decode, encode
+from skillframe.campaign.rows import Row, cell, check_row, columns, decode, encode
 from skillframe.campaign.spec import CampaignSpec
+from skillframe.documents import parse_json
 from skillframe.errors import InputError
 
 ROWS, RESULTS = "rows.jsonl", "results.csv"
@@ -108,27 +109,30 @@ def read_rows(folder: Path, campaign: str | None = None) -> tuple[Done, list[dic
     if records:
         _check_header(path, records[0], campaign)
     done: Done = {}
-    for row in records[1:]:
+    for number, row in enumerate(records[1:], start=2):
         if "session" not in row:
+            check_row(f"{path}: line {number}", row)
             done.setdefault((row["trial"], row["skill"]), decode(row))
-    return done, [r["session"] for r in records if "session" in r]
+    return done, [r["session"] for r in records if isinstance(r.get("session"), dict)]
 
 
 def _record(path: Path, number: int, line: bytes) -> Row:
+    where, again = f"{path}: line {number}", "delete that line, its trial will run again"
     try:
-        record = json.loads(line)
-    except ValueError:
-        record = None
+        record = parse_json(line, where, again)
+    except InputError as error:
+        raise InputError(where, f"is damaged ({error.problem})", again) from None
     if not isinstance(record, dict):
-        raise InputError(f"{path}: line {number}", "is damaged", "delete that line, its trial will run again")
+        raise InputError(where, "is damaged", again)
     return record
 
 
 def _check_header(path: Path, header: Row, campaign: str | None) -> None:
     if header.get("format") != FORMAT:
         raise InputError(f"{path}: line 1", "is not the head of a campaign's rows", "start again in a new folder")
-    if header.get("version", 0) > VERSION:
-        raise InputError(f"{path}: line 1", f"version {header['version']} is newer than {VERSION}", "update skillframe")
+    version = header.get("version")
+    if not isinstance(version, int) or version > VERSION:
+        raise InputError(f"{path}: line 1", f"version {version!r:.40} is newer than {VERSION}", "update skillframe")
     if campaign is not None and header.get("campaign") != campaign:
         raise InputError(
             path, f"its rows are of campaign {str(header.get('campaign'))[:12]}, but the files beside it now make "

@@ -13,6 +13,7 @@ from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.statistics import correction, holm
 from skillframe.campaign.store import FORMAT, VERSION, write_text
 from skillframe.campaign.validity import Basis, Validity, unbroken, validity_of
+from skillframe.documents import read_json
 from skillframe.errors import InputError
 
 SUMMARY = "summary.json"
@@ -128,12 +129,10 @@ def read_summary(folder: Path) -> dict[str, Any]:
         InputError: there is none, or it is damaged.
     """
     path = folder / SUMMARY
-    try:
-        content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(path, "no such file", f"type skillframe campaign resume {folder}") from None
-    except ValueError as error:
-        raise InputError(path, f"is not JSON ({error})", f"type skillframe campaign resume {folder}") from None
+    again = f"type skillframe campaign resume {folder}"
+    content = read_json(path, again)
+    if not isinstance(content, dict):
+        raise InputError(path, "holds no JSON object", again)
     return content
 
 

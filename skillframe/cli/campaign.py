@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from skillframe.cli.endings import TRACE
+from skillframe.cli.numbers import COUNT, NATURAL, POSITIVE
 
 if TYPE_CHECKING:
     from skillframe.campaign.runner import Options, Progress
@@ -35,14 +36,14 @@ def command() -> None:
 def _running(function: Callable[..., int]) -> Callable[..., int]:
     """The options that `run` and `resume` share."""
     options = [
-        click.option("--workers", type=click.IntRange(min=1), help="Worker processes on this machine [in-process]."),
+        click.option("--workers", type=COUNT, help="Worker processes on this machine [in-process]."),
         click.option("--scheduler", metavar="ADDRESS", help="A running Dask scheduler, e.g. tcp://10.0.0.5:8786."),
-        click.option("--chunk", type=click.IntRange(min=1), help="Largest number of trials per job [64]."),
+        click.option("--chunk", type=COUNT, help="Largest number of trials per job [64]."),
         click.option(
-            "--time-limit", "time_limit_s", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS",
+            "--time-limit", "time_limit_s", type=POSITIVE, metavar="SECONDS",
             help="Wall time after which a worker is taken for hung [60 s + 0.25 s per simulated second and trial].",
         ),
-        click.option("--traces", type=click.IntRange(min=0), help="Trials per skill that leave a trace [8]."),
+        click.option("--traces", type=NATURAL, help="Trials per skill that leave a trace [8]."),
     ]  # fmt: skip
     for option in reversed(options):
         function = option(function)
@@ -118,7 +119,7 @@ def status(folder: Path, as_json: bool) -> int:
 
 @command.command()
 @click.argument("folder", type=_FOLDER)
-@click.argument("trial", type=click.IntRange(min=0))
+@click.argument("trial", type=NATURAL)
 @click.option("--skill", help="Skill as in results.csv, or its beginning [the first].")
 @click.option("--out", type=TRACE, help="Trace file (.npz).")
 def replay(folder: Path, trial: int, skill: str | None, out: Path | None) -> int:
@@ -132,8 +133,8 @@ def replay(folder: Path, trial: int, skill: str | None, out: Path | None) -> int
     """
     from skillframe.campaign import evaluate
     from skillframe.campaign.replay import replay_trial
-    from skillframe.campaign.store import write_bytes
     from skillframe.cli.output import table
+    from skillframe.files import write_whole
 
     found = replay_trial(folder, trial, evaluate.evaluate, skill)
     names = list(dict.fromkeys([*found.then, *found.now]))
@@ -143,7 +144,7 @@ def replay(folder: Path, trial: int, skill: str | None, out: Path | None) -> int
         [[n, found.then.get(n, ""), found.now.get(n, ""), marks[n]] for n in names],
     )
     if out is not None and found.trace is not None:
-        write_bytes(out, found.trace)
+        write_whole(out, found.trace)
         click.echo(f"trace: {out}")
     for line in found.environment:
         click.echo(f"not as in the campaign: {line}", err=True)

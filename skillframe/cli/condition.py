@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from skillframe.cli.demonstration import six
+from skillframe.cli.numbers import NUMBER
 from skillframe.cli.output import emit_json
+from skillframe.config import parse_numbers
 
 if TYPE_CHECKING:
     from skillframe.conditioning.kalman import WrenchModel
@@ -35,7 +37,7 @@ if TYPE_CHECKING:
 )
 @click.option("--free-air", metavar="FROM,TO", help="Stretch without contact [s] [default: start to first contact].")
 @click.option("--noise", metavar="N,NM", help="Sensor noise per sample [N, Nm] [default: from the recording].")
-@click.option("--corner", type=float, help="Corner frequency [Hz] [default: the recording's most likely].")
+@click.option("--corner", type=NUMBER, help="Corner frequency [Hz] [default: the recording's most likely].")
 @click.option("--json", "as_json", is_flag=True, help="What was identified as JSON on stdout.")
 def command(
     file: Path, out: Path, method: str, bias: bool, weight: bool | None, free_air: str | None, noise: str | None,
@@ -90,13 +92,10 @@ def _pair(name: str, text: str | None) -> tuple[float, float] | None:
     """Two numbers from "A,B"."""
     if text is None:
         return None
-    try:
-        first, second = (float(part) for part in text.split(","))
-    except ValueError:
-        raise click.UsageError(f"{name} {text!r} is not two numbers; write for example {name} 0,2.5") from None
-    if not (math.isfinite(first) and math.isfinite(second)):
-        raise click.UsageError(f"{name} {text!r} is not finite")
-    return first, second
+    numbers = parse_numbers(text)
+    if len(numbers) != 2:
+        raise click.UsageError(f"{name} {text!r} is not two finite numbers; write for example {name} 0,2.5")
+    return numbers[0], numbers[1]
 
 
 def _model(demonstration: Demonstration, noise: tuple[float, float] | None, corner: float | None) -> WrenchModel:

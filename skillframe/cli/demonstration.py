@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from skillframe.cli.numbers import NUMBER
 from skillframe.cli.output import emit_json
 
 if TYPE_CHECKING:
@@ -57,18 +58,18 @@ _OPTIONS = [
     ),
     click.option("--units", help='Units that are not SI, in any order: "mm,deg,us,kN,Nmm".'),
     click.option("--euler", help='Order of roll, pitch, yaw: "xyz" about fixed axes, "ZYX" about moving ones.'),
-    click.option("--rate", type=float, help="Sample rate [Hz] where there is no clock; replaces a clock."),
+    click.option("--rate", type=NUMBER, help="Sample rate [Hz] where there is no clock; replaces a clock."),
     click.option("--wrench", type=click.Path(path_type=Path), help="Separate file with the wrench, on its own clock."),
     click.option("--wrench-columns", help="Its columns (default: its header, or t,fx,fy,fz,tx,ty,tz)."),
     click.option("--wrench-units", help="Its units (default: those of --units)."),
-    click.option("--wrench-rate", type=float, help="Its sample rate [Hz] (default: --rate)."),
-    click.option("--wrench-shift", type=float, default=0.0, help="Seconds added to its clock."),
+    click.option("--wrench-rate", type=NUMBER, help="Its sample rate [Hz] (default: --rate)."),
+    click.option("--wrench-shift", type=NUMBER, default=0.0, help="Seconds added to its clock."),
     click.option(
         "--clock", type=click.Choice(["auto", "pose", "wrench"]), default="auto", show_default=True,
         help="Whose samples are kept when two files are joined; auto takes the faster.",
     ),
-    click.option("--from", "start", type=float, help="First time kept [s]."),
-    click.option("--to", "stop", type=float, help="Last time kept [s]."),
+    click.option("--from", "start", type=NUMBER, help="First time kept [s]."),
+    click.option("--to", "stop", type=NUMBER, help="Last time kept [s]."),
     click.option("--zero-time", is_flag=True, help="Let the clock start at 0; --from and --to then count from there."),
     click.option("--position", help='Constant tool point "x,y,z" [m] for a file that holds orientation only.'),
     click.option("--arm", help="Arm to read from a file with columns ARM_px, ARM_fx, ..."),

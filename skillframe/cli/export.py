@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from skillframe.cli.numbers import WHOLE
+
 if TYPE_CHECKING:
     from skillframe.frames import Float
 
@@ -15,7 +17,7 @@ if TYPE_CHECKING:
 @click.argument("skill", required=False, type=click.Path(path_type=Path))
 @click.option("--to", "form", metavar="FORMAT", help="Format to write; --list names them.")
 @click.option("--out", type=click.Path(path_type=Path), help="File to write (.yaml).")
-@click.option("--phase", type=int, help="Phase of a policy, counted from 1.")
+@click.option("--phase", type=WHOLE, help="Phase of a policy, counted from 1.")
 @click.option("--coc", help='Centre of compliance: "x,y,z" in the tool frame, or a frame (tip) [as learned].')
 @click.option("--attitude", metavar="QX,QY,QZ,QW", help="The tool's attitude in base at the start of the phase.")
 @click.option("--list", "listing", is_flag=True, help="List formats, write nothing.")
@@ -64,10 +66,10 @@ def _list(as_json: bool) -> None:
 
 def _write(skill: Path, form: str, out: Path, phase: int | None, coc: str | None, attitude: str | None) -> None:
     from skillframe.demonstration.record import resolve_point
-    from skillframe.demonstration.safe import replace_file
     from skillframe.errors import UnknownName
     from skillframe.export.formats import FORMATS, settings_text
     from skillframe.export.impedance import moving_impedance
+    from skillframe.files import write_whole
     from skillframe.registry import registry
     from skillframe.skillfile import load
 
@@ -81,19 +83,17 @@ def _write(skill: Path, form: str, out: Path, phase: int | None, coc: str | None
         frame["center_of_compliance"] = resolve_point(coc, frame.get("frames", {})).tolist()
     turned = None if attitude is None else _attitude(attitude)
     moving = moving_impedance(document, phase, FORMATS[form].axes, turned, str(skill))
-    replace_file(out, settings_text(FORMATS[form], moving, [f"{skill.name}: {line}" for line in words]).encode())
+    write_whole(out, settings_text(FORMATS[form], moving, [f"{skill.name}: {line}" for line in words]).encode())
 
 
 def _attitude(text: str) -> Float:
     import numpy as np
 
+    from skillframe.config import parse_numbers
     from skillframe.errors import InputError
     from skillframe.frames import matrix_from_quaternion
 
-    try:
-        q = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        q = np.zeros(0)
+    q = np.array(parse_numbers(text))
     if q.shape != (4,) or not abs(np.sqrt(q @ q) - 1.0) < 0.01:
         raise InputError("--attitude", f"{text!r} is not a unit quaternion", "give qx,qy,qz,qw, w last")
     rotation: Float = matrix_from_quaternion(q / np.sqrt(q @ q))

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from skillframe.cli.numbers import POSITIVE
+from skillframe.cli.numbers import NUMBER, POSITIVE
 
 
 @click.group(name="fmu")
@@ -126,8 +126,8 @@ def _print_check(path: Path, found: dict[str, Any]) -> None:
 
 @command.command("simulate")
 @click.argument("file")
-@click.option("--stop", required=True, type=float, help="End time [s].")
-@click.option("--step", required=True, type=float, help="Communication step [s].")
+@click.option("--stop", required=True, type=NUMBER, help="End time [s].")
+@click.option("--step", required=True, type=NUMBER, help="Communication step [s].")
 @click.option("--input", "table", type=click.Path(path_type=Path), help="CSV: time, then inputs by name; rows hold.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="CSV: time, then every output by name.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter or start value of an input.")

@@ -6,6 +6,8 @@ its command is used, so that `skillframe --help` loads no scientific library.
 
 from __future__ import annotations
 
+import errno
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -37,6 +39,9 @@ COMMANDS = {
 }
 
 
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
 class LazyGroup(click.Group):
     """A group whose commands live in `skillframe.cli.<name>`, imported on use; absent modules are not listed."""
 
@@ -61,9 +66,11 @@ class LazyGroup(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         """As click does; that the reader of our output has left, as `head` does, is no error."""
         try:
-            return super().invoke(ctx)
+            result = super().invoke(ctx)
+            sys.stdout.flush()
+            return result
         except BrokenPipeError:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            _discard_output()
             return 0
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
@@ -97,6 +104,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def run(arguments: Sequence[str], debug: bool = False) -> int:
     """Run a command line and return its exit code; messages go to stderr."""
+    _print_anything()
     try:
         result = cli.main(list(arguments), prog_name="skillframe", standalone_mode=False)
     except click.ClickException as error:
@@ -110,14 +118,40 @@ def run(arguments: Sequence[str], debug: bool = False) -> int:
     except (KeyboardInterrupt, click.Abort):
         click.echo("interrupted; what was finished is kept", err=True)
         return 130
-    except OSError as error:
-        if debug or error.filename is None:
-            return _internal(error, debug)
-        click.echo(f"error: {error.filename}: {error.strerror}", err=True)
+    except (OSError, MemoryError) as error:
+        if debug:
+            raise
+        click.echo(f"error: {_of_the_system(error)}", err=True)
         return 2
     except Exception as error:
         return _internal(error, debug)
     return result if isinstance(result, int) else 0
+
+
+def _print_anything() -> None:
+    """Let both streams escape what the terminal's encoding lacks, such as a file name's bytes that are no text."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _of_the_system(error: OSError | MemoryError) -> str:
+    """What the system refused, in a sentence: the file if it is known, else what was written to, and what to do."""
+    if isinstance(error, MemoryError):
+        return "memory ran out; give smaller files or fewer trials at a time, or free memory"
+    said = error.strerror or str(error) or type(error).__name__
+    if error.errno not in FULL:
+        return f"{error.filename or 'the system'}: {said}"
+    _discard_output()
+    return f"{error.filename or 'what is printed (standard output) cannot be written'}: {said}; make room there"
+
+
+def _discard_output() -> None:
+    """Let what is still to be printed go nowhere: Python would try once more at its end, and fail once more."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _internal(error: Exception, debug: bool) -> int:

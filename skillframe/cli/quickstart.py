@@ -14,7 +14,8 @@ from pathlib import Path
 
 import click
 
-from skillframe.cli.numbers import SEED
+from skillframe.cli.numbers import COUNT, SEED
+from skillframe.files import write_whole
 
 MARKER = ".skillframe-quickstart"
 VALLEY = """\
@@ -54,10 +55,8 @@ TASKS = (("valley", "valley", VALLEY, None), ("peg", "peg_in_hole", PEG, "tip"))
 @click.command(name="quickstart")
 @click.option("--out", default="demo", show_default=True, type=click.Path(path_type=Path), help="Folder to make.")
 @click.option("--robot", default="panda", show_default=True, help="Robot to teach.")
-@click.option("--trials", default=96, show_default=True, type=click.IntRange(1), help="Trials per skill and campaign.")
-@click.option(
-    "--workers", default=2, show_default=True, type=click.IntRange(1), help="Worker processes of the campaigns."
-)
+@click.option("--trials", default=96, show_default=True, type=COUNT, help="Trials per skill and campaign.")
+@click.option("--workers", default=2, show_default=True, type=COUNT, help="Worker processes of the campaigns.")
 @click.option("--seed", default=1, show_default=True, type=SEED, help="Seed of the demonstrations.")
 def command(out: Path, robot: str, trials: int, workers: int, seed: int) -> int:
     """Demonstrate, learn, run and prove two skills, and write a report.
@@ -73,7 +72,7 @@ def command(out: Path, robot: str, trials: int, workers: int, seed: int) -> int:
     began = time.perf_counter()
     for name, _, template, _ in TASKS:
         text = template.format(trials=trials, robot=robot)
-        (out / f"{name}.campaign.toml").write_text(text, encoding="utf-8")
+        write_whole(out / f"{name}.campaign.toml", text.encode())
     for number, step in enumerate(_steps(out, robot, workers, seed), start=1):
         code = _type(step, number)
         if code:
@@ -98,7 +97,7 @@ def _make_room(out: Path) -> None:
     if out.exists():
         shutil.rmtree(out)
     (out / "demonstrations").mkdir(parents=True)
-    (out / MARKER).write_text("made by skillframe quickstart, which clears this folder\n", encoding="utf-8")
+    write_whole(out / MARKER, b"made by skillframe quickstart, which clears this folder\n")
 
 
 def _steps(out: Path, robot: str, workers: int, seed: int) -> Iterator[list[str]]:

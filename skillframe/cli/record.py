@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from skillframe.cli.numbers import NOT_NEGATIVE, POSITIVE, SEED
+from skillframe.cli.numbers import COUNT, NOT_NEGATIVE, NUMBER, POSITIVE, SEED
 from skillframe.cli.output import progress
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ QUIET_S = 5.0  # a recording that is over by then needs no progress
     "--teacher", type=click.Choice(["kinesthetic", "teleoperation", "blind"]), default="kinesthetic", show_default=True
 )
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="File; with --count N: NAME1, NAME2, ...")
-@click.option("--count", default=1, show_default=True, type=click.IntRange(1), help="Number of demonstrations.")
+@click.option("--count", default=1, show_default=True, type=COUNT, help="Number of demonstrations.")
 @click.option("--seed", default=0, show_default=True, type=SEED, help="Everything random follows from it.")
 @click.option(
     "--noise", type=NOT_NEGATIVE, help="Standard deviation of the person's aim [degrees]; default 8, machines 6."
@@ -49,7 +49,7 @@ QUIET_S = 5.0  # a recording that is over by then needs no progress
     "--feed-velocity", is_flag=True, help="Machines: feed the master's velocity as well (mind the loop gain)."
 )
 @click.option("--packet-rate", type=POSITIVE, help="Machines: packets a second, held between them; default 100.")
-@click.option("--angle", type=float, help="Machines: push at this angle in their plane, -90 straight down [degrees].")
+@click.option("--angle", type=NUMBER, help="Machines: push at this angle in their plane, -90 straight down [degrees].")
 @click.option("--belief", metavar="X,Y,TURN", help="Blind: deviation of goal minus start [mm, mm, degrees].")
 @click.option("--centre", metavar="X,Y,TURN", help="Blind: mean of goal minus start [mm, mm, degrees]; default 0,0,0.")
 @click.option("--rate", type=POSITIVE, help="Sample rate [Hz]; default 500, machines 100.")
@@ -213,16 +213,15 @@ def _blind(scene: Scene, belief: str | None, centre: str | None) -> BlindSetting
 
 def _place(text: str, option: str) -> tuple[float, float, float]:
     """A place on the surface in metres and radians from "mm,mm,degrees"."""
-    from math import isfinite, radians
+    from math import radians
 
+    from skillframe.config import parse_numbers
     from skillframe.errors import InputError
 
-    try:
-        x, y, turn = (float(part) for part in text.split(","))
-    except ValueError:
-        x = y = turn = float("nan")
-    if not all(map(isfinite, (x, y, turn))):
+    numbers = parse_numbers(text)
+    if len(numbers) != 3:
         raise InputError(
             option, f"expected three numbers X,Y,TURN, got {text!r}", "give millimetres and degrees: 4,4,0"
         )
+    x, y, turn = numbers
     return (1e-3 * x, 1e-3 * y, radians(turn))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from skillframe.cli.numbers import SEED
+from skillframe.cli.numbers import COUNT, SEED
 
 if TYPE_CHECKING:
     from skillframe.reproduce.runner import Outcome
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @click.option("--quick", is_flag=True, help="Fewer trials: all rows in less than three minutes on two cores.")
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a row's setting.")
 @click.option("--seed", default=0, show_default=True, type=SEED, help="Seed of everything random.")
-@click.option("--workers", type=click.IntRange(min=1), help="Rows at a time [number of cores].")
+@click.option("--workers", type=COUNT, help="Rows at a time [number of cores].")
 @click.option("--fresh", is_flag=True, help="Compute rows again that OUT holds already.")
 @click.option("--list", "only_list", is_flag=True, help="List rows and their settings, compute nothing.")
 @click.option("--json", "as_json", is_flag=True, help="The table as JSON on stdout.")
@@ -77,12 +77,12 @@ def _settings(values: Mapping[str, Any]) -> str:
 
 
 def _write(entries: Sequence[Mapping[str, Any]], out: Path) -> None:
-    from skillframe.demonstration.safe import replace_file
+    from skillframe.files import write_whole
     from skillframe.reproduce import document, page, store
 
     store.write_table(out, entries)
-    replace_file(out / "reproduce.html", page.render(entries).encode())
-    replace_file(out / "reproduce.md", document.render(entries).encode())
+    write_whole(out / "reproduce.html", page.render(entries).encode())
+    write_whole(out / "reproduce.md", document.render(entries).encode())
 
 
 def _end(outcome: Outcome, out: Path, quick: bool, as_json: bool) -> int:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from skillframe.cli.endings import SKILL
+from skillframe.cli.numbers import WHOLE
 from skillframe.cli.words import tell
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--out", required=True, type=SKILL, help="Policy file to write (.json).")
-@click.option("--phases", type=int, help="Number of phases; default: it is found.")
+@click.option("--phases", type=WHOLE, help="Number of phases; default: it is found.")
 @click.option("--segmenter", default="wrench_hmm", show_default=True, help="How phases are told apart.")
 @click.option("--skill", default="lmc", show_default=True, help="Kind of skill that each phase is learned as.")
 @click.option(

@@ -80,7 +80,7 @@ def explain(file: Path, out: Path) -> None:
     Example:
       skillframe skill explain peg.skill.json --out peg.html
     """
-    from skillframe.demonstration.safe import replace_file
+    from skillframe.files import write_whole
     from skillframe.registry import registry
     from skillframe.skillfile import load
 
@@ -88,7 +88,7 @@ def explain(file: Path, out: Path) -> None:
     kind = registry().behaviour(document["type"])
     words = kind.describe(document) if kind.describe is not None else [kind.summary]
     pictures = kind.explain(document) if kind.explain is not None else []
-    replace_file(out, _page(file.name, document, words, pictures).encode())
+    write_whole(out, _page(file.name, document, words, pictures).encode())
     click.echo(f"{out}: {len(pictures)} picture{'s' * (len(pictures) != 1)}")
 
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from skillframe.errors import InputError
+from skillframe.files import write_whole
 
 TEMPLATE = Path(__file__).resolve().parent / "plugin_template"
 ENDING = ".in"
@@ -41,8 +42,7 @@ def write_template(name: str, folder: Path) -> Iterator[Path]:
     }
     for source in sorted(path for path in TEMPLATE.rglob(f"*{ENDING}")):
         target = folder / _filled(source.relative_to(TEMPLATE).as_posix().removesuffix(ENDING), words)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(_filled(source.read_text(encoding="utf-8"), words), encoding="utf-8")
+        write_whole(target, _filled(source.read_text(encoding="utf-8"), words).encode())
         yield target
 
 

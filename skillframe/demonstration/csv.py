@@ -10,8 +10,8 @@ from skillframe.demonstration.columns import CANONICAL, Columns
 from skillframe.demonstration.delimited import read_delimited
 from skillframe.demonstration.metafile import meta_path, toml_text
 from skillframe.demonstration.record import Demonstration
-from skillframe.demonstration.safe import replace_file
 from skillframe.errors import InputError
+from skillframe.files import write_whole
 
 
 def read_csv(path: Path, options: Mapping[str, Any]) -> Demonstration:
@@ -42,5 +42,5 @@ def write_csv(demonstration: Demonstration, path: Path) -> None:
             raise InputError(path, f"column name {name!r} cannot stand in a CSV header", "rename it, or write .npz")
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     text = "\n".join([",".join(columns), *(",".join(map(repr, row)) for row in rows)]) + "\n"
-    replace_file(path, text.encode())
-    replace_file(meta_path(path), toml_text({"quaternion": "xyzw", **demonstration.meta}).encode())
+    write_whole(path, text.encode())
+    write_whole(meta_path(path), toml_text({"quaternion": "xyzw", **demonstration.meta}).encode())

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import zipfile
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -18,9 +16,10 @@ from skillframe.demonstration.csv import demonstration_columns
 from skillframe.demonstration.delimited import read_wrench_file
 from skillframe.demonstration.options import ReadOptions, read_options
 from skillframe.demonstration.record import Demonstration
-from skillframe.demonstration.safe import replace_file
 from skillframe.errors import InputError
+from skillframe.files import write_whole
 from skillframe.frames import Float
+from skillframe.npzfile import json_member, read_arrays
 
 FORMAT, VERSION = "skillframe.demonstration", 1
 
@@ -37,7 +36,7 @@ def read_npz(path: Path, options: Mapping[str, Any]) -> Demonstration:
     """
     chosen = read_options(options)
     _refuse_text_settings(path, chosen)
-    arrays = _load(path)
+    arrays = read_arrays(path, "npz file", "write it again")
     meta = _meta(path, arrays)
     notes = list[str]()
     columns = Columns(_columns(path, arrays, notes), str(path))
@@ -52,53 +51,14 @@ def _refuse_text_settings(path: Path, options: ReadOptions) -> None:
             )
 
 
-def _load(path: Path) -> dict[str, Any]:
-    try:
-        with path.open("rb") as handle:
-            file = np.load(handle, allow_pickle=False)
-            if isinstance(file, np.ndarray):
-                raise ValueError("a single array")
-            return {name: file[name] for name in file.files}
-    except FileNotFoundError:
-        raise InputError(path, "no such file", "check the path") from None
-    except IsADirectoryError:
-        raise InputError(path, "is a folder", "give a file") from None
-    except EOFError:
-        raise InputError(path, "is empty", "write it again") from None
-    except (
-        ValueError,
-        OSError,
-        zipfile.BadZipFile,
-        zlib.error,
-        KeyError,
-        AttributeError,
-        TypeError,
-        NotImplementedError,
-        MemoryError,
-    ) as error:
-        raise InputError(path, f"is not a readable npz file, or is truncated{_why(error)}", "write it again") from None
-
-
-def _why(error: Exception) -> str:
-    """The cause in brackets; numpy takes any binary file for a pickle and says how to load one, which nobody should."""
-    text = str(error).strip("'\"")
-    if text.startswith("Object arrays"):
-        return " (it holds Python objects, which are never loaded)"
-    return "" if "pickle" in text or not text else f" ({text})"
-
-
 def _meta(path: Path, arrays: dict[str, Any]) -> dict[str, Any]:
     """The metadata, with format and version checked and taken off."""
     if "meta" not in arrays:
         raise InputError(
             path, "holds no meta", f'store a JSON text meta with "format": "{FORMAT}", "version": {VERSION}'
         )
-    try:
-        text = arrays["meta"].reshape(-1)[0] if arrays["meta"].size == 1 else arrays["meta"]
-        meta = json.loads(text if isinstance(text, bytes) else str(text))
-    except (ValueError, TypeError, IndexError, RecursionError):
-        meta = None
-    if not isinstance(meta, dict):
+    meta = json_member(path, arrays, "meta", "store one JSON text")
+    if meta is None:
         raise InputError(f"{path}: meta", "is not a JSON object", "store one JSON text")
     form, version = meta.pop("format", None), meta.pop("version", None)
     if form != FORMAT:
@@ -150,4 +110,4 @@ def write_npz(demonstration: Demonstration, path: Path) -> None:
         raise InputError(path, "a column is called meta", "rename it")
     buffer = io.BytesIO()
     np.savez(buffer, allow_pickle=False, meta=np.array(json.dumps(meta, sort_keys=True)), **columns)
-    replace_file(path, buffer.getvalue())
+    write_whole(path, buffer.getvalue())

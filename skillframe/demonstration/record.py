@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from skillframe.config import parse_numbers
 from skillframe.errors import InputError, UnknownName
 from skillframe.frames import Float, Pose, matrix_from_quaternion
 
@@ -115,11 +116,8 @@ def resolve_point(text: str | None, frames: dict[str, Any], where: str = "") -> 
         return np.zeros(3)
     if text in frames:
         return np.array(frames[text], dtype=float)
-    try:
-        values = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        values = np.empty(0)
-    if values.shape != (3,) or not np.all(np.isfinite(values)):
+    values = np.array(parse_numbers(text))
+    if values.shape != (3,):
         note = 'or give "x,y,z" in metres in the tool frame'
         raise UnknownName("point", text, [*frames, "tool"], note=note, where=where)
     return values

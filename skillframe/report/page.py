@@ -5,12 +5,12 @@ The document's own policy forbids every address: styles and scripts are inline, 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 
 from skillframe.errors import InputError
+from skillframe.files import write_whole
 from skillframe.report.headline import lead, tiles
 from skillframe.report.learned import learned_section
 from skillframe.report.markup import Markup, join, note, tag
@@ -37,13 +37,7 @@ def write_report(inputs: Sequence[Path], out: Path) -> int:
         InputError: nothing to report on, input that cannot be read, or a file that cannot be written.
     """
     page = render(read_chapters(inputs)).encode("utf-8")
-    temporary = out.with_name(out.name + ".tmp")
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_bytes(page)
-        os.replace(temporary, out)
-    except OSError as error:
-        raise InputError(out, f"cannot be written ({error.strerror})", "choose another --out") from None
+    write_whole(out, page)
     return len(page)
 
 

@@ -8,7 +8,6 @@ and cannot be read is refused, except a trace or demonstration inside a folder, 
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,12 +18,14 @@ from skillframe.campaign.spec import flatten
 from skillframe.campaign.validity import Plan, plan_of
 from skillframe.config import read_toml
 from skillframe.demonstration.record import Demonstration
+from skillframe.documents import read_json, read_text
 from skillframe.errors import InputError, SkillframeError
 from skillframe.report.results import Results, read_results
 from skillframe.trace import Trace
 
 CAMPAIGN = ("campaign.toml", "results.csv", "summary.json")
 PARTS = (*CAMPAIGN, "skills", "traces", "demonstrations")
+REMOVE = "correct or remove it"
 MOST_RUNS, MOST_DEMONSTRATIONS = 4, 4
 
 
@@ -115,7 +116,7 @@ def read_folder(folder: Path) -> Chapter:
     chapter = Chapter(name=folder.resolve().name, folder=folder.name or folder.resolve().name)
     if (folder / "campaign.toml").is_file():
         chapter.spec = read_toml(folder / "campaign.toml")
-        chapter.spec_text = (folder / "campaign.toml").read_text(encoding="utf-8")
+        chapter.spec_text = read_text(folder / "campaign.toml")
         chapter.name = str(chapter.spec.get("name") or chapter.name)
         _remember(chapter, folder / "campaign.toml", "campaign.toml")
     if (folder / "results.csv").is_file():
@@ -178,12 +179,9 @@ def load_trace(path: Path) -> Trace:
 def _json_if_there(chapter: Chapter, path: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
-    try:
-        values = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise InputError(path, f"is not valid JSON ({error})", "mend or remove it") from None
+    values = read_json(path, REMOVE)
     if not isinstance(values, dict):
-        raise InputError(path, "holds no JSON object", "mend or remove it")
+        raise InputError(path, "holds no JSON object", REMOVE)
     _remember(chapter, path, path.name)
     return values
 

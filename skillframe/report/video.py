@@ -6,7 +6,6 @@ and kept. Played back, a second is a second. H.264 in 4:2:0, which browsers and 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.errors import InputError
+from skillframe.files import writing_whole
 from skillframe.frames import Float, norm
 from skillframe.report.raster import Canvas, Image, blank, paint, picture
 from skillframe.report.shapes import Mesh
@@ -66,15 +66,8 @@ def write_film(trace: Trace, path: Path, tell: Callable[[int, int], None] = lamb
     if stage is None:
         raise InputError(path, "cannot be drawn: the trace holds no geometry", "write the trace again")
     samples = film_samples(np.asarray(trace.time, dtype=float))
-    temporary = path.with_name(path.name + ".tmp")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with writing_whole(path) as temporary:
         _encode(_frames(trace, stage, samples, tell), temporary)
-        os.replace(temporary, path)
-    except OSError as error:
-        raise InputError(path, f"cannot be written ({error.strerror or error})", "choose another file") from None
-    finally:
-        temporary.unlink(missing_ok=True)
     return len(samples)
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from skillframe.documents import read_json
 from skillframe.paths import data_dirs
 
 FOLDER = "docs/reproduced"
@@ -16,7 +16,7 @@ def verdicts(*, quick: bool) -> dict[str, str]:
     for folder in data_dirs(FOLDER):
         path = folder / ("quick.json" if quick else "reproduce.json")
         if path.is_file():
-            return {each["row"]: each["verdict"] for each in json.loads(path.read_text(encoding="utf-8"))}
+            return {each["row"]: each["verdict"] for each in read_json(path, "install again")}
     return {}
 
 

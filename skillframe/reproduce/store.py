@@ -11,7 +11,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from skillframe.demonstration.safe import replace_file
+from skillframe.documents import read_json
+from skillframe.errors import InputError
+from skillframe.files import write_whole
 from skillframe.records import RowResult, RowType
 from skillframe.reproduce.jobs import Job
 
@@ -49,7 +51,7 @@ def verdict(row: RowType, result: RowResult) -> str:
 
 def keep(folder: Path, found: Mapping[str, Any]) -> None:
     """Write one row's file, whole or not at all."""
-    replace_file(path_of(folder, found["row"]), _text(found))
+    write_whole(path_of(folder, found["row"]), _text(found))
 
 
 def path_of(folder: Path, row: str) -> Path:
@@ -60,15 +62,15 @@ def path_of(folder: Path, row: str) -> Path:
 def kept(folder: Path, job: Job) -> dict[str, Any] | None:
     """A row computed earlier by an equal job, or None; one that an older version kept without `cpu_s` is none."""
     try:
-        found: dict[str, Any] = json.loads(path_of(folder, job.row).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        found = read_json(path_of(folder, job.row), "compute the row again")
+    except InputError:
         return None
     return found if isinstance(found, dict) and found.get("key") == job.key and "cpu_s" in found else None
 
 
 def write_table(folder: Path, entries: Sequence[Mapping[str, Any]]) -> None:
     """Write `reproduce.json`."""
-    replace_file(folder / TABLE, _text(table(entries)))
+    write_whole(folder / TABLE, _text(table(entries)))
 
 
 def table(entries: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:

@@ -16,7 +16,7 @@ PACKAGE = ROOT / "skillframe"
 PLUGINS = sorted(p for p in (ROOT / "plugins").iterdir() if (p / "src").is_dir())
 
 FLOORS = [
-    {"errors", "paths", "frames", "config"},
+    {"errors", "paths", "frames", "config", "files", "documents", "npzfile"},
     {"demonstration", "conditioning", "skill", "records", "hookspecs"},
     {"sequence", "skillfile", "export", "robot", "registry", "skillsource"},
     {"control", "actuation"},

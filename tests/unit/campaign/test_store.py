@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from skillframe.campaign.lock import FolderLock, holder
-from skillframe.campaign.rows import decode, differences, encode
+from skillframe.campaign.rows import MEASURES, decode, differences, encode
 from skillframe.campaign.store import RowLog, read_rows, repair_tail
 from skillframe.errors import InputError
 
@@ -102,10 +102,11 @@ def test_rows_of_a_newer_version_and_foreign_files_are_refused(out):
 
 
 def test_a_trial_keeps_its_first_row(tmp_path):
+    first = {"trial": 0, "skill": "a", "seed": 1, "success": True, "failure": "", **dict.fromkeys(MEASURES, 1.0)}
     with RowLog(tmp_path, "hash") as log:
-        assert log.append([{"trial": 0, "skill": "a", "success": True}]) != []
-        assert log.append([{"trial": 0, "skill": "a", "success": False}]) == []
-    assert read_rows(tmp_path, "hash")[0] == {(0, "a"): {"trial": 0, "skill": "a", "success": True}}
+        assert log.append([first]) != []
+        assert log.append([{**first, "success": False}]) == []
+    assert read_rows(tmp_path, "hash")[0] == {(0, "a"): first}
 
 
 def test_measures_that_are_not_numbers_survive_a_resume(out):
