@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.demonstration.files import BAG_FACTS
+from skillframe.demonstration.mcap import verify
 from skillframe.errors import InputError, MissingDependency
 
 MAGIC = {".bag": b"#ROSBAG V2.0\n", ".db3": b"SQLite format 3\0", ".mcap": b"\x89MCAP0\r\n"}
@@ -59,6 +60,17 @@ def refuse_other_files(path: Path) -> None:
         raise InputError(path, f"is no {path.suffix} recording", "check what wrote it; ROS 1 bags must be version 2.0")
 
 
+def checksum_notes(path: Path) -> list[str]:
+    """Verify the checksums of every MCAP file of a bag; notes on those that carry none.
+
+    Raises:
+        InputError: damage.
+    """
+    files = sorted(path.glob("*.mcap")) if path.is_dir() else [path] if path.suffix.lower() == ".mcap" else []
+    with _foreign(path):
+        return [note for file in files for note in verify(file)]
+
+
 @contextmanager
 def opened(path: Path) -> Iterator[Any]:
     """The bag, open for reading.
@@ -71,7 +83,7 @@ def opened(path: Path) -> Iterator[Any]:
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
-        raise MissingDependency("rosbags", f"reading {path}", "pip install rosbags") from None
+        raise _no_rosbags(path) from None
     with _foreign(path):
         bag = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))  # older .db3 carry no types
         bag.open()
@@ -81,11 +93,19 @@ def opened(path: Path) -> Iterator[Any]:
         bag.close()
 
 
+def _no_rosbags(path: Path) -> MissingDependency:
+    return MissingDependency("rosbags", f"reading {path}", "pip install rosbags")
+
+
 @contextmanager
 def _foreign(path: Path) -> Iterator[None]:
     """Whatever the library raises on a damaged file, as one sentence."""
     try:
         yield
+    except InputError:
+        raise
+    except ImportError:
+        raise _no_rosbags(path) from None
     except Exception as error:  # foreign code on foreign bytes: struct.error, apsw errors, TypeError ...
         first = str(error).strip().splitlines()
         whole = path.is_file() and (path.parent / BAG_FACTS).is_file()

@@ -20,6 +20,7 @@ from skillframe.demonstration.assemble import assemble
 from skillframe.demonstration.bagfile import (
     TREES,
     Recorded,
+    checksum_notes,
     opened,
     parts_note,
     read_topic,
@@ -66,7 +67,7 @@ def read_bag(path: Path, options: Mapping[str, Any], tool_poses: ToolPoses) -> D
     _refuse_text_options(path, chosen)
     refuse_other_files(path)
     meta = read_meta(path)
-    notes += parts_note(path)
+    notes += [*parts_note(path), *checksum_notes(path)]
     with opened(path) as bag:
         topics = topics_of(path, bag)
         wrenches = _wrench_topic(path, topics, chosen, meta)
