@@ -86,7 +86,8 @@ class Trace:
         """
         arrays = {name: getattr(self, name) for name in [*COLUMNS, "q", "body_position", "body_quaternion"]}
         arrays.update({MACHINE + name: array for name, array in self.machine.items()})
-        meta = json.dumps({"format": FORMAT, "version": VERSION, **self.meta}, sort_keys=True)
+        meta = json.dumps({"format": FORMAT, "version": VERSION, **self.meta}, sort_keys=True, ensure_ascii=False)
+        meta = meta.encode("utf-8", "replace").decode()  # half a surrogate pair is no text
         buffer = io.BytesIO()
         np.savez_compressed(buffer, meta=np.array(meta), **arrays)
         write_whole(path, buffer.getvalue())

@@ -15,6 +15,7 @@ import numpy as np
 
 from skillframe.campaign.sampling import draws
 from skillframe.campaign.spec import CampaignSpec
+from skillframe.documents import shown
 from skillframe.errors import InputError
 
 Row = dict[str, Any]
@@ -79,8 +80,9 @@ def dead_row(spec: CampaignSpec, skill: int, trial: int, failure: str) -> Row:
 
 
 def plain_value(value: Any) -> Any:
-    """A numpy scalar as Python's own."""
-    return value.item() if isinstance(value, np.generic) else value
+    """A numpy scalar as Python's own; a skill's words as text that can be stored."""
+    value = value.item() if isinstance(value, np.generic) else value
+    return shown(value) if isinstance(value, str) else value
 
 
 def encode(value: Any) -> Any:

@@ -68,8 +68,8 @@ def command(
         from skillframe.report.video import check_film
 
         check_film(video)
-    name, document = load_skill(skill)
     params, draws = split_settings(world, dict(parse_setting(text) for text in settings))
+    name, document = load_skill(skill)
     runnable, setup = prepare(load_robot_model(robot), load_world(world, params), document, coc)
     with progress("s simulated", QUIET_S) as show:
         result = simulate(
