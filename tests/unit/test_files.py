@@ -8,15 +8,21 @@ import stat
 import subprocess
 import sys
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from skillframe.cli.main import run
 from skillframe.demonstration.files import write_demonstration
 from skillframe.errors import InputError
-from skillframe.files import write_whole, writing_whole
 from tests.unit.demonstration.conftest import make
+
+
+@pytest.fixture
+def files() -> Any:
+    return import_module("skillframe.files")
 
 
 def names(folder: Path) -> list[str]:
@@ -30,10 +36,10 @@ def demo(tmp_path: Path) -> Path:
     return tmp_path / "in" / "demo.csv"
 
 
-def test_a_file_is_written_with_the_permissions_that_the_umask_gives(tmp_path: Path) -> None:
+def test_a_file_is_written_with_the_permissions_that_the_umask_gives(tmp_path: Path, files: Any) -> None:
     before = os.umask(0o027)
     try:
-        write_whole(tmp_path / "new" / "a.txt", b"content")
+        files.write_whole(tmp_path / "new" / "a.txt", b"content")
     finally:
         os.umask(before)
     assert (tmp_path / "new" / "a.txt").read_bytes() == b"content"
@@ -41,11 +47,11 @@ def test_a_file_is_written_with_the_permissions_that_the_umask_gives(tmp_path: P
     assert names(tmp_path / "new") == ["a.txt"]
 
 
-def test_an_error_while_writing_leaves_the_old_file_and_nothing_beside_it(tmp_path: Path) -> None:
+def test_an_error_while_writing_leaves_the_old_file_and_nothing_beside_it(tmp_path: Path, files: Any) -> None:
     (tmp_path / "a.txt").write_text("old")
 
     def stumble() -> None:
-        with writing_whole(tmp_path / "a.txt") as temporary:
+        with files.writing_whole(tmp_path / "a.txt") as temporary:
             temporary.write_text("half")
             raise ZeroDivisionError
 
@@ -54,27 +60,27 @@ def test_an_error_while_writing_leaves_the_old_file_and_nothing_beside_it(tmp_pa
     assert names(tmp_path) == ["a.txt"] and (tmp_path / "a.txt").read_text() == "old"
 
 
-def test_a_link_is_replaced_and_what_it_points_to_is_left_alone(tmp_path: Path) -> None:
+def test_a_link_is_replaced_and_what_it_points_to_is_left_alone(tmp_path: Path, files: Any) -> None:
     (tmp_path / "precious").write_text("precious")
     (tmp_path / "a.txt").symlink_to("precious")
-    write_whole(tmp_path / "a.txt", b"new")
+    files.write_whole(tmp_path / "a.txt", b"new")
     assert (tmp_path / "precious").read_text() == "precious" and not (tmp_path / "a.txt").is_symlink()
 
 
-def test_a_name_of_255_characters_is_written(tmp_path: Path) -> None:
-    write_whole(tmp_path / ("a" * 255), b"new")
+def test_a_name_of_255_characters_is_written(tmp_path: Path, files: Any) -> None:
+    files.write_whole(tmp_path / ("a" * 255), b"new")
     assert names(tmp_path) == ["a" * 255]
 
 
-def test_a_device_is_never_replaced_by_a_file(tmp_path: Path) -> None:
+def test_a_device_is_never_replaced_by_a_file(tmp_path: Path, files: Any) -> None:
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError, match="device or a pipe"):
-        write_whole(tmp_path / "pipe", b"new")
+        files.write_whole(tmp_path / "pipe", b"new")
     assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)
 
 
 def test_file_and_folder_are_synced_in_the_order_that_survives_a_power_cut(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, files: Any
 ) -> None:
     """Content before the rename, the folder's entry after it."""
     done: list[str] = []
@@ -90,7 +96,7 @@ def test_file_and_folder_are_synced_in_the_order_that_survives_a_power_cut(
 
     monkeypatch.setattr(os, "fsync", synced)
     monkeypatch.setattr(os, "replace", renamed)
-    write_whole(tmp_path / "a.txt", b"new")
+    files.write_whole(tmp_path / "a.txt", b"new")
     assert done == ["file", "rename", "folder"]
 
 
