@@ -25,6 +25,7 @@ from skillframe.trace import Trace
 
 CAMPAIGN = ("campaign.toml", "results.csv", "summary.json")
 PARTS = (*CAMPAIGN, "skills", "traces", "demonstrations")
+TABLES, SHOWN = ("hashes", "versions", "params", "analytic", "analytic_over"), ("summary.json", "scene.json")
 REMOVE = "correct or remove it"
 MOST_RUNS, MOST_DEMONSTRATIONS = 4, 4
 
@@ -182,6 +183,9 @@ def _json_if_there(chapter: Chapter, path: Path) -> dict[str, Any]:
     values = read_json(path, REMOVE)
     if not isinstance(values, dict):
         raise InputError(path, "holds no JSON object", REMOVE)
+    for key in TABLES:
+        if values.get(key) is not None and not isinstance(values[key], dict) and path.name in SHOWN:
+            raise InputError(f"{path}: {key}", f"is {values[key]!r:.60}, not an object", REMOVE)
     _remember(chapter, path, path.name)
     return values
 

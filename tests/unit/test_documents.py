@@ -94,6 +94,15 @@ def test_a_report_on_a_damaged_summary_or_scene_is_refused(tmp_path: Path, refus
         assert not (tmp_path / "page.html").exists()
 
 
+@pytest.mark.parametrize(
+    ("name", "key"), [("scene.json", "params"), ("scene.json", "analytic"), ("summary.json", "hashes")]
+)
+def test_a_report_refuses_a_number_where_a_table_is_shown(tmp_path: Path, refused: Said, name: str, key: str) -> None:
+    (tmp_path / "summary.json").write_text("{}")
+    (tmp_path / name).write_text(json.dumps({key: 2.5}))
+    assert f"{name}: {key}: is 2.5, not an object" in refused("report", tmp_path, "--out", tmp_path / "page.html")
+
+
 HUGE = "1" * 41
 TYPED = [
     ["run", "x.json", "--world", "free", "--seed", HUGE],
