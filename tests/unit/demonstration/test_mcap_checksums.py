@@ -17,7 +17,7 @@ from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
 from tests.unit.demonstration.conftest import make
 
-pytest.importorskip("rosbags", reason="rosbags is not installed (pip install 'skillframe[ros]')")
+pytest.importorskip("rosbags", reason="rosbags is not installed (pip install rosbags)")
 
 from tests.unit.demonstration.bags_written import poses, wrenches, write_bag
 
