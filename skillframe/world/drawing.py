@@ -6,7 +6,10 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
+from skillframe.frames import Float
+from skillframe.robot.convexity import hull_of
 from skillframe.world.convert import BASE, FIXTURE, SPRUNG, TOOL
 from skillframe.world.plant import Plant
 from skillframe.world.scene import Geom
@@ -33,7 +36,15 @@ def geom_json(geom: Geom) -> dict[str, Any]:
         "position": [round(float(p), 6) for p in geom.position],
         "quaternion": [round(float(q), 8) for q in geom.quaternion], "rgba": list(geom.rgba),
     }  # fmt: skip
-    if geom.vertices is not None and geom.faces is not None:
-        result["vertices"] = np.round(geom.vertices, 6).tolist()
-        result["faces"] = np.asarray(geom.faces).tolist()
+    if geom.vertices is not None:
+        vertices, faces = _surface(geom.vertices, geom.faces)
+        result["vertices"], result["faces"] = np.round(vertices, 6).tolist(), faces.tolist()
     return result
+
+
+def _surface(vertices: Float, faces: NDArray[np.int64] | None) -> tuple[Float, NDArray[np.int64]]:
+    """Vertices and triangles of a mesh as it collides: without triangles of its own, those of its hull."""
+    hull = hull_of(vertices) if faces is None else None
+    if hull is not None:
+        return hull.vertices, hull.faces
+    return vertices, np.zeros((0, 3), dtype=np.int64) if faces is None else np.asarray(faces)

@@ -14,10 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.errors import InputError, UnknownName
 from skillframe.frames import Float, Pose
+from skillframe.robot.convexity import unfit_to_collide
 
 Vector = tuple[float, float, float]
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
+KINDS = ("box", "capsule", "cylinder", "mesh", "plane", "sphere")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +31,7 @@ class Geom:
         kind: "box" (half sizes), "sphere" (radius), "capsule" and "cylinder" (radius, half length), "plane", "mesh".
         size: in MuJoCo's meaning for the kind; empty for a mesh.
         position: (3,) [m]; quaternion: x, y, z, w.
-        vertices: (V, 3) of a convex mesh; faces: (F, 3) triangles, for drawing as well.
+        vertices: (V, 3) of a convex mesh; faces: (F, 3) its triangles, closed; without them the hull is meant.
         collide: takes part in contact; a geom that does not is there to be seen.
         visible: is drawn.
     """
@@ -155,6 +158,10 @@ class Scene:
         holder: lets a second arm hold the fixture; None: it always stands still.
         analytic: figures of closed-form theory for the report (e.g. {"largest_tilt": ...}).
         params: the parameters it was built from, plain values.
+
+    Raises:
+        InputError: a mesh that collides is not convex, not closed, flat or of the wrong scale.
+        UnknownName: a geom is of no known kind.
     """
 
     name: str
@@ -171,3 +178,22 @@ class Scene:
     holder: Holder | None = None
     analytic: dict[str, float] = field(default_factory=dict)
     params: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        groups = {"fixture": self.fixture, "tool": self.tool.geoms}
+        groups |= {f"sprung part {part.name!r}": part.geoms for part in self.sprung}
+        for group, geoms in groups.items():
+            for index, geom in enumerate(geoms):
+                _check(geom, f"world {self.name}: {geom.kind} {index} of the {group}")
+
+
+def _check(geom: Geom, where: str) -> None:
+    """Refuse a geom that would collide as something else than it is drawn."""
+    if geom.kind not in KINDS:
+        raise UnknownName("kind", geom.kind, KINDS, where=where)
+    if geom.kind != "mesh":
+        return
+    if geom.vertices is None:
+        raise InputError(where, "has no vertices", "give them as (V, 3) in metres")
+    if geom.collide and (unfit := unfit_to_collide(geom.vertices, geom.faces)):
+        raise InputError(where, *unfit)
