@@ -26,6 +26,7 @@ from skillframe.robot.spec import Limits
 from skillframe.skill import Command, Impedance, Observation, Reasons, Skill, Status, no_reasons
 from skillframe.trace import Trace
 from skillframe.world.convert import held
+from skillframe.world.intrusion import LinkIntrusion
 from skillframe.world.placement import QUANTITIES, check_quantities, fixture_poses, start_configurations
 from skillframe.world.plant import Draws, Kinematics, Plant
 from skillframe.world.rates import ratio
@@ -161,6 +162,7 @@ class Loop:
         varied = any(key.startswith("grasp.") or key in ("robot.mass_scale", "robot.payload") for key in draws)
         self.nominal = Plant(robot, scene, count, fixture, {}, timestep=self.dt) if varied else self.plant
         self.plant.reset(self._configurations(draws))
+        self.intrusion = LinkIntrusion(self.plant)
         self._prepare_rows()
         self.sensors = self._sensors([pair[0] for pair in children], draws)
         self.filter = WrenchFilter(dt=self.dt).steady()
@@ -273,6 +275,9 @@ class Loop:
         twist, wrench = observation.twist, observation.wrench
         for i, cause in self._violations(position, twist, wrench, law):
             self._end(np.array([i]), time, f"{cause} (at {time:.3f} s)", True)
+        if tick % SLOW_TICKS == 0 and len(self.active):
+            for i, cause in self.intrusion.causes(self.plant, self.active):
+                self._end(np.array([i]), time, f"{cause} (at {time:.3f} s)", True)
         if command.status.any():
             for i in self.active[command.status[self.active] != Status.RUNNING]:
                 self.status[i] = command.status[i]

@@ -118,8 +118,7 @@ def _points(shape: ET.Element, path: Path) -> Float | None:
     if shape.tag == "mesh":
         file = resolve_mesh(shape.get("filename", ""), path)
         vertices = mesh_vertices(file) if file else None
-        scale: Float = _scale(shape)
-        return None if vertices is None else vertices * scale
+        return None if vertices is None else vertices * mesh_scale(shape)
     if shape.tag not in ("sphere", "cylinder", "capsule"):
         return None
     radius = numbers(shape, "radius", 1, (0.0,))[0]
@@ -131,7 +130,8 @@ def _points(shape: ET.Element, path: Path) -> Float | None:
     return np.vstack([axes + along, axes - along])
 
 
-def _scale(mesh: ET.Element) -> Float:
+def mesh_scale(mesh: ET.Element) -> Float:
+    """(3,) scale of a <mesh>, 1 where it says none or none that can be read."""
     try:
         return np.array(numbers(mesh, "scale", 3, (1.0, 1.0, 1.0)))
     except ValueError:

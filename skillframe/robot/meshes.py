@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from urllib.parse import unquote
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skillframe.frames import Float
 
@@ -64,6 +66,35 @@ def mesh_vertices(path: Path) -> Float | None:
         return None
     usable = vertices is not None and vertices.size > 0 and bool(np.isfinite(vertices).all())
     return vertices if usable else None
+
+
+def mesh_triangles(path: Path) -> Float | None:
+    """Corners (T, 3, 3) of the triangles of an STL or OBJ mesh, or None as `mesh_vertices`."""
+    vertices = mesh_vertices(path)
+    if vertices is None:
+        return None
+    if path.suffix.lower() == ".stl":
+        return vertices[: len(vertices) // 3 * 3].reshape(-1, 3, 3)
+    try:
+        faces = _obj_faces(path.read_bytes(), len(vertices))
+    except (OSError, ValueError):
+        return None
+    return vertices[faces] if len(faces) else None
+
+
+def _obj_faces(content: bytes, count: int) -> NDArray[np.int64]:
+    """Triangles (T, 3) of polygons `f a/.. b/.. c/..`, counted from 1, or from the end where negative."""
+    faces: list[tuple[int, int, int]] = []
+    for line in content.decode("utf-8", "replace").splitlines():
+        words = line.split()
+        if len(words) >= 4 and words[0] == "f":
+            corner = [int(word.partition("/")[0]) for word in words[1:]]
+            corner = [i - 1 if i > 0 else count + i for i in corner]
+            faces += [(corner[0], b, c) for b, c in pairwise(corner[1:])]
+    found = np.array(faces, dtype=np.int64).reshape(-1, 3)
+    if len(found) and (found.min() < 0 or found.max() >= count):
+        raise ValueError("a face of vertices that are not there")
+    return found
 
 
 def _stl_vertices(content: bytes) -> Float:

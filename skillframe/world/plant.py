@@ -247,6 +247,10 @@ class Plant:
         turned = np.concatenate([rotate(back, wrench[:, :3]), rotate(back, wrench[:, 3:])], axis=-1)
         return State(in_fixture, turned)
 
+    def body_frames(self) -> tuple[Float, Float]:
+        """Positions (N, B, 3) and axes (N, B, 3, 3) of all bodies, the world first; a live view of the positions."""
+        return self._xpos, self._xmat.reshape(*self._xpos.shape, 3)
+
     def body_poses(self) -> tuple[Float, Float]:
         """Positions (N, B, 3) and quaternions x, y, z, w (N, B, 4) of the drawn bodies: all but the world."""
         quaternion = self._xquat[:, 1:]

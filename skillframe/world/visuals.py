@@ -6,7 +6,7 @@ Meshes are left out: a URDF's links that are only meshes are drawn as capsules b
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Container, Iterator, Mapping
 
 import numpy as np
 import pinocchio as pin
@@ -30,18 +30,27 @@ def link_geoms(robot: RobotModel) -> dict[str, tuple[Geom, ...]]:
             continue
         frame = model.frames[model.getBodyId(name)]
         for visual in link.findall("visual"):
-            geom = _visual(visual, frame.placement, materials)
+            geom = placed_geom(visual, frame.placement, materials)
             if geom is not None:
                 found[model.names[frame.parentJoint]].append(geom)
-    for joint in range(2, model.njoints):
-        parent = model.names[model.parents[joint]]
-        reach = np.array(model.jointPlacements[joint].translation)
-        if not found[parent] and norm(reach) > 0.02:
-            found[parent].append(_bone(reach))
+    for name, bone in bones(model, {name for name, geoms in found.items() if geoms}):
+        found[name].append(bone)
     return {name: tuple(geoms) for name, geoms in found.items()}
 
 
-def _visual(visual: ET.Element, placement: pin.SE3, materials: Mapping[str, ET.Element]) -> Geom | None:
+def bones(model: pin.Model, shaped: Container[str]) -> Iterator[tuple[str, Geom]]:
+    """A capsule from its joint to the next for every body that has no shape, by name of the joint that moves it."""
+    boned: set[str] = set()
+    for joint in range(2, model.njoints):
+        parent = model.names[model.parents[joint]]
+        reach = np.array(model.jointPlacements[joint].translation)
+        if parent not in shaped and parent not in boned and norm(reach) > 0.02:
+            boned.add(parent)
+            yield parent, _bone(reach)
+
+
+def placed_geom(visual: ET.Element, placement: pin.SE3, materials: Mapping[str, ET.Element]) -> Geom | None:
+    """The primitive of a `<visual>` or `<collision>` of a link that is placed so in its body; None for a mesh."""
     shape = visual.find("geometry")
     child = None if shape is None else next(iter(shape), None)
     if child is None:

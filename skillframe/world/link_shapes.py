@@ -1,0 +1,123 @@
+"""Shapes of a robot's links, to tell whether one of them stands in the fixture.
+
+Of each link its `<collision>` shapes count, where one of them can be read, else its `<visual>` shapes. A body that has
+neither (meshes that are not there, or of a kind that is not read) counts as a capsule from its joint to the next, as it
+is drawn. Links at and beyond an arm's tool frame, and a payload, are the tool: they are meant to touch. Our choice.
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from skillframe.frames import Float, Pose, cross, norm
+from skillframe.robot.bodies import mesh_scale
+from skillframe.robot.bodies import placement as origin_of
+from skillframe.robot.convexity import hull_of, is_convex
+from skillframe.robot.meshes import mesh_triangles, resolve_mesh
+from skillframe.robot.model import RobotModel
+from skillframe.world.scene import Geom
+from skillframe.world.visuals import bones, placed_geom
+
+SPACING, MOST, MOST_PIECES = 0.005, 5000, 200
+"""Distance of points on a link's mesh [m], how many there are if they would be more, and parts of an edge."""
+
+
+class LinkShape(NamedTuple):
+    """A shape of a link: convex, in the frame of the body that a joint moves.
+
+    Attributes:
+        link: name of the URDF's link; body: name of the joint that moves it, "universe" for what stands still.
+        surface: (P, 3) points of the surface where the geom is only the hull of a mesh that is not convex; else None.
+    """
+
+    link: str
+    body: str
+    geom: Geom
+    surface: Float | None = None
+
+
+def link_shapes(robot: RobotModel) -> list[LinkShape]:
+    """Shapes of every link but the tool's, in the order of the URDF."""
+    tool = tool_links(robot)
+    found: list[LinkShape] = []
+    bodies_with_any: set[str] = set()
+    for name, link in robot.urdf.links.items():
+        if not robot.model.existBodyName(name):
+            continue
+        frame = robot.model.frames[robot.model.getBodyId(name)]
+        shapes = _shapes_of(robot, name, link, frame)
+        bodies_with_any |= {shape.body for shape in shapes}
+        found += [shape for shape in shapes if name not in tool]
+    heads = {joint.name: joint.child for joint in robot.urdf.joints.values()}
+    for joint, bone in bones(robot.model, bodies_with_any):
+        head = heads.get(joint, robot.urdf.root)
+        if head not in tool:
+            found.append(LinkShape(head, joint, bone))
+    return found
+
+
+def tool_links(robot: RobotModel) -> set[str]:
+    """Links at and beyond the tool frames, and what is carried."""
+    children = robot.urdf.children()
+    layer = [arm.tool_frame for arm in robot.spec.arm]
+    layer += [] if robot.spec.payload is None else [robot.spec.payload.link]
+    tool: set[str] = set()
+    while layer:
+        tool.update(layer)
+        layer = [joint.child for link in layer for joint in children.get(link, [])]
+    return tool
+
+
+def _shapes_of(robot: RobotModel, name: str, link: ET.Element, frame: pin.Frame) -> list[LinkShape]:
+    body = robot.model.names[frame.parentJoint]
+    for tag in ("collision", "visual"):
+        made = [_shape(robot, element, frame.placement) for element in link.findall(tag)]
+        shapes = [LinkShape(name, body, *pair) for pair in made if pair is not None]
+        if shapes:
+            return shapes
+    return []
+
+
+def _shape(robot: RobotModel, element: ET.Element, placement: pin.SE3) -> tuple[Geom, Float | None] | None:
+    """A shape as a convex geom and, if it is not convex, points of its surface; None where it cannot be read."""
+    mesh = element.find("geometry/mesh")
+    if mesh is None:
+        geom = placed_geom(element, placement, {})
+        return None if geom is None or min(geom.size) <= 0.0 else (geom, None)
+    file = resolve_mesh(mesh.get("filename", ""), robot.urdf.path)
+    corners = None if file is None else mesh_triangles(file)
+    if corners is None:
+        return None
+    at = Pose(np.array(placement.translation), np.array(placement.rotation)).compose(origin_of(element))
+    return _mesh((corners * mesh_scale(mesh)) @ at.rotation.T + at.position)
+
+
+def _mesh(triangles: Float) -> tuple[Geom, Float | None] | None:
+    """The hull of triangles (T, 3, 3), and points of the surface if that fills something; None if it is flat."""
+    corners = np.ascontiguousarray(triangles.reshape(-1, 3))
+    hull = hull_of(corners)
+    if hull is None:
+        return None
+    faces = np.arange(len(corners)).reshape(-1, 3)
+    geom = Geom(kind="mesh", vertices=hull.vertices, faces=hull.faces)
+    return geom, None if is_convex(corners, faces, hull) else points_on(triangles)
+
+
+def points_on(triangles: Float) -> Float:
+    """Points (P, 3) on triangles (T, 3, 3): their corners, and between them so many that `SPACING` is kept."""
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    area = 0.5 * float(np.sum(norm(cross(b - a, c - a))))
+    spacing = max(SPACING, math.sqrt(area / MOST))
+    longest = np.maximum(np.maximum(norm(b - a), norm(c - b)), norm(a - c))
+    pieces = np.ceil(longest / spacing).astype(int).clip(1, MOST_PIECES)
+    found = [triangles.reshape(-1, 3)]
+    for n in np.unique(pieces[pieces > 1]):
+        chosen = pieces == n
+        weights = np.array([(n - i - j, i, j) for i in range(n + 1) for j in range(n + 1 - i)]) / n
+        found.append(np.einsum("pk,tkx->tpx", weights, triangles[chosen]).reshape(-1, 3))
+    return np.unique(np.concatenate(found), axis=0)
