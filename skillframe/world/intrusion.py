@@ -95,13 +95,11 @@ class LinkIntrusion:
 
     def _shapes(self, geom: NDArray[np.int64], body: NDArray[np.int64]) -> _Shapes:
         probe = self._probe
-        box = probe.geom_aabb[geom]
-        half = np.where((probe.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE)[:, None], _FAR, box[:, 3:])
-        quaternion = probe.geom_quat[geom][:, [1, 2, 3, 0]]
-        return _Shapes(
-            geom, body, probe.geom_pos[geom].copy(), matrix_from_quaternion(quaternion), box[:, :3].copy(), half,
-            norm(half),
-        )  # fmt: skip
+        centre, half = probe.geom_aabb[geom, :3].copy(), probe.geom_aabb[geom, 3:].copy()
+        endless = probe.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE  # all that is below it counts as inside
+        centre[endless], half[endless] = (0.0, 0.0, -_FAR), _FAR
+        rotation = matrix_from_quaternion(probe.geom_quat[geom][:, [1, 2, 3, 0]])
+        return _Shapes(geom, body, probe.geom_pos[geom].copy(), rotation, centre, half, norm(half))
 
     def _box_around(self, body: int) -> tuple[Float, Float]:
         """Centre and half sizes (3,) of the box around all fixture shapes of a body, in its frame."""

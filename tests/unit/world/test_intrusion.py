@@ -1,0 +1,276 @@
+"""Links inside the fixture: found with the right depth, alone or in a batch, and never where nothing is wrong."""
+
+import dataclasses
+import struct
+
+import numpy as np
+import pytest
+
+from skillframe.executor import simulate
+from skillframe.robot.model import load_model
+from skillframe.robot.spec import load_robot
+from skillframe.world.placement import fixture_poses, start_configurations
+from skillframe.world.plant import Plant
+from skillframe.world.scene import Geom
+from tests.laws.pushing import Hold, Push, impedance
+from tests.laws.runs import run, setup
+
+STIFF = np.diag([1000.0] * 3 + [20.0] * 3)
+WALL = Geom(kind="box", size=(0.01, 0.6, 0.5), position=(-0.25, 0.0, 0.3))  # between the panda's base and its tool
+INERTIAL = '<inertial><mass value="2"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
+
+
+def walled(name="panda", world="free", *geoms, **options):
+    now = setup(name, world, **options)
+    return dataclasses.replace(now, scene=dataclasses.replace(now.scene, fixture=(*now.scene.fixture, *geoms)))
+
+
+def causes(plant, rows=None):
+    """(row, words) of what is found now."""
+    from skillframe.world.intrusion import LinkIntrusion
+
+    return LinkIntrusion(plant).causes(plant, np.arange(plant.count) if rows is None else np.asarray(rows))
+
+
+@pytest.fixture
+def slide(tmp_path, scene):
+    """A plant whose robot is a link on a slide along x, with its flange 1 m above, at positions q (N,)."""
+
+    def make(shapes, q, *fixture, toml="", more=""):
+        text = f"""<robot name="slide"><link name="base"/><link name="carriage">{INERTIAL}{shapes}</link>
+        <link name="flange"/>{more}<joint name="x" type="prismatic"><parent link="base"/><child link="carriage"/>
+        <axis xyz="1 0 0"/><limit lower="-2" upper="2" effort="100" velocity="1"/></joint><joint name="up" type="fixed">
+        <parent link="carriage"/><child link="flange"/><origin xyz="0 0 1"/></joint></robot>"""
+        (tmp_path / "slide.urdf").write_text(text)
+        arm = '[[arm]]\nname = "arm"\ntool_frame = "flange"\n'
+        (tmp_path / "robot.toml").write_text(f'urdf = "slide.urdf"\n{arm}{toml}')
+        model = load_model(load_robot(tmp_path / "robot.toml"))
+        now = dataclasses.replace(scene("free"), fixture=fixture)
+        plant = Plant(model, now, len(q), fixture_poses(model, {}, len(q)), {})
+        plant.reset(np.array(q, dtype=float)[:, None])
+        return plant
+
+    return make
+
+
+def shape(inside, tag="visual", xyz="0 0 0"):
+    return f'<{tag}><origin xyz="{xyz}"/><geometry>{inside}</geometry></{tag}>'
+
+
+def stl(path, triangles):
+    records = [struct.pack("<12fH", 0, 0, 0, *np.ravel(t), 0) for t in triangles]
+    path.write_bytes(b" " * 80 + struct.pack("<I", len(records)) + b"".join(records))
+
+
+BOX = Geom(kind="box", size=(0.05, 0.05, 0.05))
+SPHERE = shape('<sphere radius="0.1"/>')
+
+
+# --- runs ---
+
+
+def test_a_wall_between_base_and_tool_is_a_failure_and_not_a_success():
+    result = run(Hold(STIFF), walled("panda", "free", WALL), duration_s=0.3)
+    assert not result.success[0]
+    assert "inside the fixture (at 0.000 s)" in result.failure[0]
+    assert "link 'link" in result.failure[0]
+
+
+def test_a_long_steep_valley_is_a_failure_of_the_arm_that_passes_its_slopes():
+    """The slopes of 0.6 m at 63 degrees reach 0.53 m up, beside a flange at 0.2 m: the forearm passes through one."""
+    steep = setup("panda", params={"length": 0.6, "slope": 1.1})
+    result = run(Push((0, 0, -1), impedance(free_axes="x"), stall=False), steep)
+    assert "79 mm inside the fixture" in result.failure[0]
+    assert not result.success[0]
+
+
+def test_a_link_that_comes_to_touch_ends_the_trial_within_a_hundredth_of_a_second():
+    """The tool goes down at 0.1 m/s beside a post that ends 5 mm under link 7: the flange's rim hits it once 1 mm is
+    passed, and at most 10 ms and 1 mm of approach later the trial is over."""
+    down = Push((0.0, 0.0, -1.0), STIFF, speed=0.1, stall=False)
+    free = run(down, setup("panda", "free"), duration_s=1.0)
+    post = Geom(kind="box", size=(0.03, 0.03, 0.05), position=(0.06, 0.0, 0.15))
+    result = run(down, walled("panda", "free", post), duration_s=1.0)
+    assert "inside the fixture" not in free.failure[0]
+    assert "is 1 mm inside the fixture" in result.failure[0] or "is 2 mm inside the fixture" in result.failure[0]
+    assert 0.05 < result.duration_s[0] < 1.0
+
+
+def test_a_trial_among_others_ends_with_the_same_words_as_alone():
+    """Three of four fixtures are turned towards the forearm; in any order and number each trial ends as alone."""
+    skill, now = (
+        Hold(STIFF),
+        walled("panda", "free", Geom(kind="box", size=(0.1, 0.02, 0.4), position=(-0.1, 0.3, 0.3))),
+    )
+    tilt = np.array([0.0, 1.2, 2.2, 1.21])
+
+    def ended(rows):
+        rngs = [np.random.default_rng([1, i]) for i in rows]
+        return simulate(skill, now, {"fixture.tilt_z": tilt[rows]}, rngs, duration_s=0.05).failure
+
+    together = ended([0, 1, 2, 3])
+    assert {bool(text) for text in together} == {True, False}
+    assert [ended([i])[0] for i in range(4)] == list(together)
+    assert list(ended([3, 1, 0, 2])) == [together[i] for i in (3, 1, 0, 2)]
+
+
+# --- depths ---
+
+
+@pytest.mark.parametrize(("q", "depth"), [(0.2, None), (0.1495, None), (0.14, 10), (0.1, 50), (-0.07, 80)])
+def test_the_depth_of_a_sphere_in_a_box_is_that_of_the_shortest_way_out(slide, q, depth):
+    """r + a - |q|; half a millimetre is within the tolerance."""
+    found = causes(slide(SPHERE, [q], BOX))
+    assert found == ([] if depth is None else [(0, f"link 'carriage' is {depth} mm inside the fixture")])
+
+
+def test_every_kind_of_geom_of_a_fixture_is_seen(slide):
+    corners = np.array([[x, y, z] for x in (-0.05, 0.05) for y in (-0.05, 0.05) for z in (-0.05, 0.05)])
+    sideways = (0.0, 0.5**0.5, 0.0, 0.5**0.5)
+    kinds = [
+        BOX, Geom(kind="sphere", size=(0.05,)), Geom(kind="capsule", size=(0.05, 0.1)),
+        Geom(kind="mesh", vertices=corners), Geom(kind="cylinder", size=(0.05, 0.1)),
+        Geom(kind="plane", size=(1, 1, 0.1), quaternion=sideways),
+    ]  # fmt: skip
+    for geom in kinds:
+        surface = 0.0 if geom.kind == "plane" else 0.05
+        found = causes(slide(SPHERE, [surface + 0.08, surface + 0.11], geom))
+        assert found == [(0, "link 'carriage' is 20 mm inside the fixture")], geom.kind
+
+
+def test_what_of_a_fixture_is_only_drawn_does_not_count(slide):
+    assert causes(slide(SPHERE, [0.0], dataclasses.replace(BOX, collide=False))) == []
+
+
+def test_only_the_trials_that_are_asked_for_are_answered(slide):
+    plant = slide(SPHERE, [0.0, 0.5, 0.1], BOX)
+    assert [row for row, _ in causes(plant)] == [0, 2]
+    assert [row for row, _ in causes(plant, [1, 2])] == [2]
+
+
+# --- which shapes ---
+
+
+def test_collision_shapes_count_before_drawn_ones(slide):
+    drawn = shape('<sphere radius="0.3"/>')
+    collides = shape('<box size="0.02 0.02 0.02"/>', "collision")
+    assert causes(slide(drawn + collides, [0.2], BOX)) == []
+    assert causes(slide(drawn, [0.2], BOX)) == [(0, "link 'carriage' is 150 mm inside the fixture")]
+
+
+def test_links_at_and_beyond_the_tool_frame_are_the_tool(slide):
+    hand = (
+        f'<link name="hand">{SPHERE}</link><joint name="h" type="fixed"><parent link="flange"/><child link="hand"/>'
+        '<origin xyz="0 0 -1"/></joint>'
+    )
+    assert causes(slide("", [0.0], BOX, more=hand)) == []
+
+
+def test_a_ring_around_a_post_is_free_and_its_rim_is_not(slide, tmp_path):
+    """A square ring of edges 0.2 and 0.3 m: its hull holds the post, the ring itself does not."""
+    inner, outer = (np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half for half in (0.1, 0.15))
+    triangles = []
+    for i in range(4):
+        j = (i + 1) % 4
+        for one, two in (((inner, -1), (inner, 1)), ((inner, 1), (outer, 1)), ((outer, 1), (outer, -1)),
+                         ((outer, -1), (inner, -1))):  # fmt: skip
+            (p, a), (q, b) = one, two
+            corner = [(*p[i], 0.05 * a), (*p[j], 0.05 * a), (*q[j], 0.05 * b), (*q[i], 0.05 * b)]
+            triangles += [[corner[0], corner[1], corner[2]], [corner[0], corner[2], corner[3]]]
+    stl(tmp_path / "ring.stl", triangles)
+    ring = shape('<mesh filename="ring.stl"/>', "collision")
+    post = Geom(kind="box", size=(0.04, 0.04, 0.2))
+    assert causes(slide(ring, [0.0, 0.055], post)) == []  # 60 mm of play on every side
+    assert causes(slide(ring, [0.08], post)) == [(0, "link 'carriage' is 20 mm inside the fixture")]
+
+
+def test_a_mesh_of_a_link_counts_as_it_stands_scaled_and_placed(slide, tmp_path):
+    corners = [(0, 0, 0), (100, 0, 0), (0, 100, 0), (0, 0, 100)]
+    stl(tmp_path / "tetra.stl", [[corners[i] for i in face] for face in ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))])
+    mesh = shape('<mesh filename="tetra.stl" scale="0.001 0.001 0.001"/>', xyz="0.2 0 0")
+    found = causes(slide(mesh, [-0.16, -0.14], BOX))  # its flat side stands at x = q + 0.2
+    assert found == [(0, "link 'carriage' is 10 mm inside the fixture")]
+
+
+def test_a_link_of_meshes_that_are_not_there_counts_as_the_capsule_that_is_drawn(tmp_path, scene):
+    """A bar of 0.6 m along x whose mesh is missing: a capsule of 40 mm radius meets a post beside its middle."""
+    missing = shape('<mesh filename="no.stl"/>')
+    text = f"""<robot name="bar"><link name="base"/><link name="bar">{INERTIAL}{missing}</link>
+    <link name="end">{INERTIAL}</link><link name="flange"/>
+    <joint name="a" type="revolute"><parent link="base"/><child link="bar"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="9" velocity="1"/></joint>
+    <joint name="b" type="revolute"><parent link="bar"/><child link="end"/><origin xyz="0.6 0 0"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" effort="9" velocity="1"/></joint>
+    <joint name="f" type="fixed"><parent link="end"/><child link="flange"/></joint></robot>"""
+    (tmp_path / "bar.urdf").write_text(text)
+    (tmp_path / "robot.toml").write_text('urdf = "bar.urdf"\n[[arm]]\nname = "arm"\ntool_frame = "flange"\n')
+    model = load_model(load_robot(tmp_path / "robot.toml"))
+    post = Geom(kind="box", size=(0.02, 0.02, 0.2), position=(0.3, 0.05, 0.0))
+    plant = Plant(model, dataclasses.replace(scene("free"), fixture=(post,)), 1, fixture_poses(model, {}, 1), {})
+    plant.reset(np.zeros((1, 2)))
+    assert causes(plant) == [(0, "link 'bar' is 10 mm inside the fixture")]  # 40 mm of radius, 30 mm to the face
+
+
+# --- shipped robots ---
+
+
+@pytest.mark.parametrize(
+    "world", ["free", "valley", "funnel", "peg_in_hole", "hose_coupler", "corner", "socket"]
+)  # fmt: skip
+def test_a_panda_starts_free_of_every_shipped_world_from_each_of_its_starts(plant, scene, world):
+    starts = scene(world).task.starts
+    for start in starts:
+        assert causes(plant("panda", world, start)) == []
+
+
+def test_a_panda_cannot_reach_under_the_table_of_the_edge_but_through_it(plant):
+    """The wrist stands beyond and below the edge, the arm comes from the other side: its forearm is in the table."""
+    assert causes(plant("panda", "edge")) == [(0, "link 'link4' is 65 mm inside the fixture")]
+
+
+def test_a_free_tool_has_no_links_that_could_be_inside(plant):
+    assert causes(plant("free_tool", "valley", length=0.6, slope=1.1)) == []
+
+
+def at_start(model, task, more, configuration):
+    """What is found with geoms added to a scene's fixture."""
+    now = dataclasses.replace(task, fixture=(*task.fixture, *more))
+    plant = Plant(model, now, 1, fixture_poses(model, {}, 1), {})
+    plant.reset(configuration(now))
+    return causes(plant)
+
+
+@pytest.mark.needs_plugins
+def test_the_arm_that_holds_the_fixture_may_touch_it_and_the_other_may_not(robot):
+    """A ball of the held fixture at the wrist of one arm or the other; wrists are 0.26 m from the fixture's origin."""
+    from skillframe.prepare import load_world
+
+    model, task = robot("dual_panda"), load_world("dual_peg", {})
+    plant = Plant(model, task, 1, fixture_poses(model, {}, 1), {})
+    plant.reset(start_configurations(model, task, {}, 1))
+    position, rotation = plant.body_frames()
+    fixture = plant.model.body("fixture").id
+
+    def ball_at(joint):
+        there = rotation[0, fixture].T @ (position[0, plant.model.body(joint).id] - position[0, fixture])
+        ball = Geom(kind="sphere", size=(0.05,), position=tuple(there.tolist()))
+        return at_start(model, task, [ball], lambda now: start_configurations(model, now, {}, 1))
+
+    assert ball_at("right_joint7") == []
+    ((_, words),) = ball_at("left_joint7")
+    assert "link 'left_link" in words
+
+
+def test_a_boom_in_the_fixture_is_found_and_the_load_on_it_is_not(robot, scene):
+    """At home the crane stands free of the pallets. A bar through the middle of its boom is found, and one through the
+    load, 1.2 m further out and in the stack by design, is not."""
+    model, task = robot("hiab_xs031"), scene("pallets")
+
+    def bar_at(x, z):
+        bar = Geom(kind="box", size=(0.05, 0.5, 0.05), position=(x - 3.0, 0.0, z))  # the fixture stands at x = 3 m
+        return at_start(model, task, [bar], lambda now: model.home[None])
+
+    assert at_start(model, task, [], lambda now: model.home[None]) == []
+    ((_, words),) = bar_at(0.34, 1.45)  # half way from the lift joint (-0.19, 0.85) to the tilt joint (0.87, 2.05)
+    assert "link 'lift_boom'" in words
+    assert bar_at(2.65, 0.5) == []
