@@ -1,7 +1,7 @@
 """Can this robot be used for dynamics? The mass audit behind `skillframe robots check`.
 
-Fatal: a zero or singular mass matrix, an impossible inertia, a moving body whose inertia is too large for its size
-(contract: `robots check`). Each comes with the robot.toml lines that mend it. Everything else is a warning.
+Fatal: a zero or singular mass matrix, a moving body whose inertia is impossible or too large for its size (contract:
+`robots check`). Each comes with the robot.toml lines that mend it. Everything else is a warning.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def audit(robot: RobotSpec | RobotModel) -> Audit:
     bodies, given = rigid_bodies(robot.urdf), given_inertias(robot)
     problems = [
         *mass_matrix_problems(robot, given, bodies),
-        *impossible_inertias(given, bodies),
+        *impossible_inertias(robot, given, bodies),
         *oversized_inertias(robot, given, bodies),
         *missing_inertias(robot, given, bodies),
         *toy_masses(robot, given),

@@ -26,13 +26,14 @@ class Body:
     """A rigid body.
 
     Attributes:
-        joint: that moves it, None for the root body.
+        joint: that moves it, None for the root body; parent: index of the body that carries it, -1 for the root.
         links: names of its links, the first one carries the joint.
         reach: to child joints and geometry [m], 0 where unknown; bound: the reach is only a lower bound.
         far: (3,) the child joint farthest away, in body axes [m].
     """
 
     joint: str | None
+    parent: int = -1
     links: list[str] = field(default_factory=list)
     reach: float = 0.0
     bound: bool = False
@@ -43,10 +44,10 @@ def rigid_bodies(urdf: Urdf) -> list[Body]:
     """Bodies of a tree, root first."""
     children = urdf.children()
     bodies: list[Body] = []
-    heads: list[tuple[str | None, str]] = [(None, urdf.root)]
-    for joint, head in heads:  # grows while it is walked
-        body = Body(joint=joint)
-        heads += _gather(body, urdf, children, head)
+    heads: list[tuple[str | None, str, int]] = [(None, urdf.root, -1)]
+    for index, (joint, head, parent) in enumerate(heads):  # grows while it is walked
+        body = Body(joint=joint, parent=parent)
+        heads += [(*leaving, index) for leaving in _gather(body, urdf, children, head)]
         bodies.append(body)
     return bodies
 
@@ -77,9 +78,9 @@ def placement(element: ET.Element | None) -> Pose:
     return Pose(np.array(numbers(origin, "xyz", 3, _ZERO3)), rotation)
 
 
-def _gather(body: Body, urdf: Urdf, children: dict[str, list[Joint]], head: str) -> list[tuple[str | None, str]]:
+def _gather(body: Body, urdf: Urdf, children: dict[str, list[Joint]], head: str) -> list[tuple[str, str]]:
     """Fill a body with the links that are fixed to its head; returns the joints that leave it."""
-    leaving: list[tuple[str | None, str]] = []
+    leaving: list[tuple[str, str]] = []
     links = [(head, Pose(np.zeros(3), np.eye(3)))]
     for name, pose in links:  # grows while it is walked
         body.links.append(name)

@@ -9,19 +9,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from skillframe.frames import Float
 from skillframe.robot.bodies import Body, placement, size_of
+from skillframe.robot.guesses import cylinder, guessed_masses, lengths
 from skillframe.robot.model import RobotModel
 from skillframe.robot.numbers import INERTIA, numbers
-from skillframe.robot.problems import Problem, guessed_inertia, overlay_fix
+from skillframe.robot.problems import Problem, overlay_fix
 
 _ROUNDING = 1e-3  # relative: URDFs carry three to four digits, and flat plates meet the triangle inequality exactly
 _NEGLIGIBLE = 1e-15  # of the whole robot: exporters leave rounding such as 1e-18 kg m^2 on decorative links
 _GYRATION = 3.0  # contract: radius of gyration over size
+_SLENDER = 5.0  # length of a guessed cylinder over size, whose radius of gyration is 0.3 times its length
 
 
 class Given(NamedTuple):
@@ -56,32 +58,59 @@ def given_inertias(robot: RobotModel) -> dict[str, Given]:
 def mending_lines(links: list[str], given: Mapping[str, Given], bodies: list[Body]) -> str:
     """The cure: overlay lines for links, with the mass and centre that they have if these are possible."""
     lines = {}
-    for body in bodies:
+    for body, length, mass in zip(bodies, lengths(bodies), guessed_masses(bodies), strict=True):
         size = size_of(body, bodies)
+        solid = min(length, _SLENDER * size) if size > 0.0 else length  # or the cure would be oversized itself
         for name in (n for n in links if n in body.links):
             own = given.get(name)
-            center = own.com if own is not None and np.linalg.norm(own.com) <= size else 0.5 * body.far
-            lines[name] = guessed_inertia(size, center, own.mass if own is not None else 0.0)
+            center = own.com if own is not None and np.linalg.norm(own.com) <= max(size, length) else 0.5 * body.far
+            known = own is not None and own.mass > 0.0
+            at = (float(center[0]), float(center[1]), float(center[2]))
+            lines[name] = cylinder(own.mass if own is not None and known else mass, solid, at, not known)
     return overlay_fix(lines)
 
 
-def impossible_inertias(given: Mapping[str, Given], bodies: list[Body]) -> Iterator[Problem]:
-    """Links whose mass is negative or whose moments no distribution of mass can have."""
+def impossible_inertias(robot: RobotModel, given: Mapping[str, Given], bodies: list[Body]) -> Iterator[Problem]:
+    """Links whose mass is negative or whose moments no distribution of mass can have.
+
+    Dynamics know bodies only: such a link is fatal where the body that it is welded into moves and is impossible too.
+    """
     whole = sum(abs(g.mass) for g in given.values()) * max(body.reach for body in bodies) ** 2
     for name, inertia in given.items():
         low, middle, high = (float(x) for x in inertia.principal)
         if inertia.mass >= 0.0 and max(high - low - middle, -low) <= _NEGLIGIBLE * whole:
             continue
-        if inertia.mass < 0.0:
-            text = f"has a negative mass ({inertia.mass:g} kg)"
-        elif low < -_ROUNDING * max(abs(high), abs(low)):
-            text = f"has a negative principal moment of inertia ({low:.3g} kg m^2)"
-        elif low + middle < high * (1.0 - _ROUNDING):
-            text = f"has principal moments {low:.3g}, {middle:.3g}, {high:.3g} kg m^2 against the triangle inequality"
-        else:
-            continue
-        fix = mending_lines([name], given, bodies)
-        yield Problem(code="impossible_inertia", severity="fatal", where=name, message=f"link {name!r} {text}", fix=fix)
+        if text := _impossible(inertia.mass, inertia.principal):
+            body = next(body for body in bodies if name in body.links)
+            index, fix = _joint_index(robot, body), mending_lines([name], given, bodies)
+            harm, why = _harm(robot, body, index)
+            message = f"link {name!r} {text}{why}"
+            yield Problem(code="impossible_inertia", severity=harm, where=name, message=message, fix=fix)
+
+
+def _harm(robot: RobotModel, body: Body, index: int | None) -> tuple[Literal["fatal", "warning"], str]:
+    """How bad an impossible link of a body is, and why no worse."""
+    if index is None:
+        return "warning", "; it does not move, so no motion depends on it"
+    welded = robot.model.inertias[index]
+    if _impossible(float(welded.mass), np.linalg.eigvalsh(np.asarray(welded.inertia))):
+        return "fatal", ""
+    return (
+        "warning",
+        f"; the body that it is fixed in ({_some(body.links)}, {welded.mass:.3g} kg) is possible as a whole",
+    )
+
+
+def _impossible(mass: float, principal: Float) -> str:
+    """What is impossible of a mass and its principal moments, ascending; "" if nothing is."""
+    low, middle, high = (float(x) for x in principal)
+    if mass < 0.0:
+        return f"has a negative mass ({mass:g} kg)"
+    if low < -_ROUNDING * max(abs(high), abs(low)):
+        return f"has a negative principal moment of inertia ({low:.3g} kg m^2)"
+    if low + middle < high * (1.0 - _ROUNDING):
+        return f"has principal moments {low:.3g}, {middle:.3g}, {high:.3g} kg m^2 against the triangle inequality"
+    return ""
 
 
 def oversized_inertias(robot: RobotModel, given: Mapping[str, Given], bodies: list[Body]) -> Iterator[Problem]:

@@ -71,11 +71,13 @@ class LinkInertia:
 
     Attributes:
         mass: [kg]; com: centre of mass [m]; inertia: xx, yy, zz, xy, xz, yz about the centre of mass [kg m^2].
+        guessed: the mass is a guess, as `robots check` prints it; what fails with it says so.
     """
 
     mass: float
     com: Vector = (0.0, 0.0, 0.0)
     inertia: tuple[float, float, float, float, float, float]
+    guessed: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
