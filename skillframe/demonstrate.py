@@ -17,6 +17,7 @@ from skillframe.demonstration.record import Demonstration
 from skillframe.errors import SkillframeError
 from skillframe.executor import Result, Setup, simulate
 from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, rotate
+from skillframe.robot.guesses import guess_note
 from skillframe.robot.model import RobotModel
 from skillframe.staged_teacher import teacher_for
 from skillframe.teacher import TeacherSettings
@@ -120,11 +121,14 @@ def collect(
                 rejected.append(f"demonstration {slot}, attempt {number}: {failure}")
         if progress is not None:
             progress(f"{len(done)} of {count} demonstrations recorded, {len(rejected)} rejected")
+            if rejected and (note := guess_note(robot.spec)):
+                progress(f"note: {note}")
         if len(done) == count:
             return Recording(demonstrations=[done[slot] for slot in range(count)], rejected=rejected)
     raise SkillframeError(
         f"world {scene.name}: the teacher failed {MOST_ATTEMPTS} times for one demonstration "
         f"(last: {rejected[-1]}); lower the noise or choose another start"
+        + (f"; {note}" if (note := guess_note(robot.spec)) else "")
     )
 
 

@@ -16,6 +16,7 @@ from skillframe.demonstrate import MOST_ATTEMPTS, Recording, Watch, beginning, d
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError, SkillframeError
 from skillframe.executor import Result, Setup, simulate
+from skillframe.robot.guesses import guess_note
 from skillframe.robot.model import RobotModel
 from skillframe.skill import Status
 from skillframe.world.scene import Scene
@@ -76,11 +77,14 @@ def record_blind(
                 rejected.append(f"demonstration {slot}, attempt {attempt}: {result.failure[i]}")
         if progress is not None:
             progress(f"{len(done)} of {count} searches recorded, {len(rejected)} rejected")
+            if rejected and (note := guess_note(robot.spec)):
+                progress(f"note: {note}")
         if len(done) == count:
             return Recording(demonstrations=[done[slot] for slot in range(count)], rejected=rejected)
     raise SkillframeError(
         f"world {scene.name}: the blind teacher failed {MOST_ATTEMPTS} times for one demonstration "
         f"(last: {rejected[-1]}); push less or raise the robot's limits"
+        + (f"; {note}" if (note := guess_note(robot.spec)) else "")
     )
 
 

@@ -182,6 +182,8 @@ def _go_on(folder: Path, options: Options) -> int:
 
 def _conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any]) -> int:
     from skillframe.campaign.summary import below_bar
+    from skillframe.robot.guesses import guess_note
+    from skillframe.robot.spec import load_robot
 
     _show_rates(summary["skills"])
     for pair in summary["comparisons"]:
@@ -191,6 +193,9 @@ def _conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any]) -> int:
     if summary["stopped_after_trial"] is not None:
         click.echo(f"stopped early after trial {summary['stopped_after_trial']}: the intervals are narrow enough")
     click.echo(f"results: {folder / 'results.csv'}")
+    failed = any(skill["failures"] for skill in summary["skills"].values())
+    if failed and (note := guess_note(load_robot(str(spec.folder / spec.robot)))):
+        click.echo(f"note: {note}", err=True)
     short = below_bar(spec, summary)
     if short:
         click.echo(short, err=True)

@@ -62,6 +62,7 @@ def command(
     from skillframe.config import parse_setting
     from skillframe.executor import simulate
     from skillframe.prepare import load_robot_model, load_world, prepare, split_settings
+    from skillframe.robot.guesses import guess_note
     from skillframe.skillsource import load_skill
 
     if video is not None:
@@ -71,6 +72,8 @@ def command(
     params, draws = split_settings(world, dict(parse_setting(text) for text in settings))
     name, document = load_skill(skill)
     runnable, setup = prepare(load_robot_model(robot), load_world(world, params), document, coc)
+    model = load_robot_model(robot)
+    runnable, setup = prepare(model, load_world(world, params), document, coc)
     with progress("s simulated", QUIET_S) as show:
         result = simulate(
             runnable, setup, {key: np.array([value]) for key, value in draws.items()}, [np.random.default_rng(seed)],
@@ -80,6 +83,8 @@ def command(
     trace = result.traces[0]
     typed = _typed(skill, world, robot, coc, settings, seed, duration, rate)
     trace.meta.update({"skill": name, "seed": seed, "draws": draws, "command": typed})
+    if not result.success[0] and (note := guess_note(model.spec)):
+        trace.meta["notes"] = [*trace.meta.get("notes", []), note]
     if out is not None:
         trace.save(out)
     if replay is not None:

@@ -1,10 +1,10 @@
 r"""Masses of links that a URDF does not give: a guess from their lengths, and a sentence where one was run with.
 
 Collaborative arms weigh about as much per metre whatever their length: the seven of the tests, 0.7 to 1.9 m from first
-to last joint, move 6 to 32 kg per metre, most of them 13 to 22. Every joint brings a motor, and what carries more is heavier. Our choice, fitted to those arms:
-\(m_i = \lambda (L_i + d) \sqrt{R_i / R}\), with \(L_i\) the reach of a body to its next joint and its geometry, d a
-quarter of the longest such reach, for the motor, \(R_i\) the sum of L + d from the body to the end of its longest
-branch, and R the largest of these. An industrial arm or a machine is heavier.
+to last joint, move 6 to 32 kg per metre, most of them 13 to 22. Every joint brings a motor, and what carries more is
+heavier. Our choice, fitted to those arms: \(m_i = \lambda (L_i + d) \sqrt{R_i / R}\), with \(L_i\) the reach of a body
+to its next joint and its geometry, d a quarter of the longest such reach, for the motor, \(R_i\) the sum of L + d from
+the body to the end of its longest branch, and R the largest of these. An industrial arm or a machine is heavier.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def cylinder(mass: float, length: float, center: tuple[float, float, float], gue
 
 
 def guess_note(spec: RobotSpec) -> str:
-    """What to say of a run that failed with guessed masses; "" if none is."""
+    """What to say where something failed with guessed masses; "" if none is guessed."""
     links = [name for name, inertia in spec.inertia.items() if inertia.guessed]
     if not links:
         return ""

@@ -76,6 +76,7 @@ def test_a_success_that_is_neither_yes_nor_no_is_refused(tmp_path):
     [
         ("force limit: 80.1 N is above 80 N (at 2.199 s)", "force limit"),
         ("goal not reached: came to rest, 24 mm from the start", "goal not reached: came to rest"),
+        ("link 'l4' is 79 mm inside the fixture (at 1.230 s)", "link 'l4' is inside the fixture"),
         ("worker died (killed)", "worker died (killed)"),
         ("", "no cause given"),
     ],

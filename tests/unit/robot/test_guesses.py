@@ -136,3 +136,56 @@ def test_an_impossible_link_that_makes_its_body_impossible_stays_fatal(urdf, sav
     result = audit(load_robot(save(welded(urdf, impossible(1.0, 0.1, 0.1, 9.0)))))
     assert "impossible_inertia" in {p.code for p in result.problems if p.severity == "fatal"}
     assert not result.usable
+
+
+# --- a failure names the guess ---
+
+
+def guessed_panda(tmp_path, guessed):
+    """A copy of the shipped arm that says of two masses that they are guesses."""
+    import shutil
+
+    from skillframe.robot.spec import robot_names
+
+    folder = tmp_path / "my_panda"
+    shutil.copytree(robot_names()["panda"], folder)
+    flag = ", guessed = true" if guessed else ""
+    lines = [
+        f"{link} = {{ mass = {mass}, com = [0, 0, 0.05], inertia = [0.03, 0.03, 0.03, 0, 0, 0]{flag} }}"
+        for link, mass in (("link5", 1.2), ("link6", 1.7))
+    ]
+    with (folder / "robot.toml").open("a") as file:
+        file.write("\n[inertia]\n" + "\n".join(lines) + "\n")
+    return folder
+
+
+@pytest.mark.parametrize("guessed", [True, False])
+def test_a_demonstration_that_is_never_recorded_names_the_guessed_masses(tmp_path, capsys, guessed):
+    """Under a table's edge the arm cannot go but through it, so every attempt fails at its start."""
+    folder = guessed_panda(tmp_path, guessed)
+    words = ["demonstration", "record", "--world", "edge", "--robot", str(folder), "--teacher", "kinesthetic"]
+    assert run([*words, "--out", str(tmp_path / "d.csv")]) == 2
+    said = capsys.readouterr().err
+    assert "inside the fixture" in said
+    assert ("my_panda runs on guessed masses: link5, link6, 2.9 kg together" in said) == guessed
+    assert not (tmp_path / "d.csv").exists()
+
+
+@pytest.mark.needs_plugins
+@pytest.mark.parametrize("guessed", [True, False])
+def test_a_run_and_a_campaign_that_fail_name_the_guessed_masses(tmp_path, capsys, guessed):
+    from skillframe.conformance.examples import example_demonstrations
+    from skillframe.demonstration.files import write_demonstration
+
+    folder = guessed_panda(tmp_path, guessed)
+    write_demonstration(example_demonstrations()[0], tmp_path / "left.npz")
+    skill = f"lmc:{tmp_path / 'left.npz'}"
+    assert run(["run", skill, "--world", "edge", "--robot", str(folder), "--duration", "0.1"]) == 1
+    assert ("note: my_panda runs on guessed masses" in capsys.readouterr().err) == guessed
+    campaign = ['name = "c"', "seed = 1", "trials = 2", "duration_s = 0.1", 'robot = "my_panda"', 'world = "edge"']
+    campaign += [f'skills = ["{skill}"]', "[vary]", '"world.friction" = { uniform = [0.1, 0.2] }', ""]
+    (tmp_path / "c.toml").write_text("\n".join(campaign))
+    assert run(["campaign", "run", str(tmp_path / "c.toml"), "--out", str(tmp_path / "c")]) == 0
+    told = capsys.readouterr()
+    assert ("note: my_panda runs on guessed masses" in told.err) == guessed
+    assert "2 x link 'link4' is inside the fixture" in told.out
