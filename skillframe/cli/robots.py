@@ -120,5 +120,6 @@ def _print_audit(robot: str, result: Audit) -> None:
     for problem in result.problems:
         click.echo(f"\n{problem.severity} {problem.code} at {problem.where}\n  {problem.message}")
         lines = problem.fix.splitlines()
-        click.echo("  fix: " + ("as above" if len(lines) > 1 and said.issuperset(lines) else "\n    ".join(lines)))
+        known = len(lines) > 1 and said.issuperset(lines[1:])  # the first one differs in what the masses add up to
+        click.echo("  fix: " + ("as above" if known else "\n    ".join(lines)))
         said.update(lines)

@@ -76,8 +76,11 @@ def open_edges(vertices: Float, faces: NDArray[np.int64]) -> int:
     return int(np.sum(count % 2))
 
 
-def dent(vertices: Float, faces: NDArray[np.int64], hull: Hull) -> float:
-    """How deep the surface lies inside its hull at worst [m], looked at in corners, centroids and halves of edges."""
+def dent(vertices: Float, faces: NDArray[np.int64], hull: Hull, enough: float = np.inf) -> float:
+    """How deep the surface lies inside its hull at worst [m], looked at in corners, centroids and halves of edges.
+
+    Once it is deeper than `enough`, nothing more is looked at.
+    """
     corners = vertices[faces]
     halves = 0.5 * (corners + np.roll(corners, 1, axis=1)).reshape(-1, 3)
     points = np.concatenate([vertices[np.unique(faces)], corners.mean(axis=1), halves])
@@ -86,12 +89,15 @@ def dent(vertices: Float, faces: NDArray[np.int64], hull: Hull) -> float:
     for start in range(0, len(points), step):
         part = points[start : start + step] @ hull.planes[:, :3].T + hull.planes[:, 3]
         deepest = max(deepest, float((-part.max(axis=1)).max()))
+        if deepest > enough:
+            break
     return deepest
 
 
 def is_convex(vertices: Float, faces: NDArray[np.int64], hull: Hull) -> bool:
     """Does a mesh fill its hull but for rounding?"""
-    return dent(vertices, faces, hull) <= DENT + ROUNDING * float(np.ptp(vertices, axis=0).max())
+    allowed = DENT + ROUNDING * float(np.ptp(vertices, axis=0).max())
+    return dent(vertices, faces, hull, allowed) <= allowed
 
 
 def unfit_to_collide(vertices: Float, faces: NDArray[np.int64] | None) -> tuple[str, str] | None:

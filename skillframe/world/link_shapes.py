@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -94,12 +95,15 @@ def _shape(robot: RobotModel, element: ET.Element, placement: pin.SE3) -> tuple[
     if corners is None:
         return None
     at = Pose(np.array(placement.translation), np.array(placement.rotation)).compose(origin_of(element))
-    return _mesh((corners * mesh_scale(mesh)) @ at.rotation.T + at.position)
+    placed = (corners * mesh_scale(mesh)) @ at.rotation.T + at.position
+    return _mesh(np.ascontiguousarray(placed).tobytes())
 
 
-def _mesh(triangles: Float) -> tuple[Geom, Float | None] | None:
+@lru_cache(maxsize=256)  # a campaign asks for the same links in every chunk
+def _mesh(content: bytes) -> tuple[Geom, Float | None] | None:
     """The hull of triangles (T, 3, 3), and points of the surface if that fills something; None if it is flat."""
-    corners = np.ascontiguousarray(triangles.reshape(-1, 3))
+    triangles = np.frombuffer(content).reshape(-1, 3, 3)
+    corners = triangles.reshape(-1, 3)
     hull = hull_of(corners)
     if hull is None:
         return None

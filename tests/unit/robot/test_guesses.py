@@ -102,6 +102,14 @@ def test_a_cure_for_a_link_much_shorter_than_the_others_is_not_oversized_itself(
     assert audit(load_robot(bare((0.01, 1.0, 0.01), "\n".join(fix.splitlines()[1:])))).usable
 
 
+def test_the_same_lines_are_printed_once(bare, capsys):
+    """The first problem prints all six; each of the six links without inertia after it refers to them."""
+    assert run(["robots", "check", str(bare(ARMS["UR5e"][0]))]) == 1
+    said = capsys.readouterr().out
+    assert said.count("guessed = true") == 6
+    assert said.count("fix: as above") == 6
+
+
 # --- an impossible link in a possible body ---
 
 
