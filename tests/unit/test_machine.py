@@ -21,6 +21,7 @@ from skillframe.robot.model import load_model
 from skillframe.robot.payload import with_payload
 from skillframe.robot.spec import load_robot, robot_names
 from skillframe.world.loops import SOLIMP
+from skillframe.world.scene import Geom
 from tests.fmu_cache import own_cache  # noqa: F401
 
 HOME = np.array([FIXTURE[0], 0.0, ABOVE])
@@ -249,3 +250,13 @@ def test_the_record_holds_the_force_as_it_is_now_and_the_law_gets_the_late_one(r
     np.testing.assert_array_equal(loop._read(seen).wrench[0, [0, 2]], [3.0, 4.0])
     np.testing.assert_array_equal(loop._measured().force, [[0.5, 1.0]])
     assert trace.machine["force_sigma"].shape[1:] == (2,) and set(np.unique(trace.machine["force_valid"])) <= {0.0, 1.0}
+
+
+def test_a_crane_with_a_link_in_the_fixture_ends_its_trial_with_the_link_s_name():
+    """A plate through the pillar, which stands upright behind the machine's base."""
+    now = setup()
+    plate = Geom(kind="box", size=(0.6, 0.5, 0.02), position=(-FIXTURE[0], 0.0, 0.45))
+    now = dataclasses.replace(now, scene=dataclasses.replace(now.scene, fixture=(*now.scene.fixture, plate)))
+    result = simulate(Follow(diamond, MOVING), now, {}, rngs([0]), duration_s=0.1)
+    assert "inside the fixture (at 0.000 s)" in result.failure[0]
+    assert not result.success[0]

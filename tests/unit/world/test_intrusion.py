@@ -11,7 +11,7 @@ from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot
 from skillframe.world.placement import fixture_poses, start_configurations
 from skillframe.world.plant import Plant
-from skillframe.world.scene import Geom
+from skillframe.world.scene import Geom, Sprung
 from tests.laws.pushing import Hold, Push, impedance
 from tests.laws.runs import run, setup
 
@@ -36,7 +36,7 @@ def causes(plant, rows=None):
 def slide(tmp_path, scene):
     """A plant whose robot is a link on a slide along x, with its flange 1 m above, at positions q (N,)."""
 
-    def make(shapes, q, *fixture, toml="", more=""):
+    def make(shapes, q, *fixture, toml="", more="", sprung=()):
         text = f"""<robot name="slide"><link name="base"/><link name="carriage">{INERTIAL}{shapes}</link>
         <link name="flange"/>{more}<joint name="x" type="prismatic"><parent link="base"/><child link="carriage"/>
         <axis xyz="1 0 0"/><limit lower="-2" upper="2" effort="100" velocity="1"/></joint><joint name="up" type="fixed">
@@ -45,7 +45,7 @@ def slide(tmp_path, scene):
         arm = '[[arm]]\nname = "arm"\ntool_frame = "flange"\n'
         (tmp_path / "robot.toml").write_text(f'urdf = "slide.urdf"\n{arm}{toml}')
         model = load_model(load_robot(tmp_path / "robot.toml"))
-        now = dataclasses.replace(scene("free"), fixture=fixture)
+        now = dataclasses.replace(scene("free"), fixture=fixture, sprung=sprung)
         plant = Plant(model, now, len(q), fixture_poses(model, {}, len(q)), {})
         plant.reset(np.array(q, dtype=float)[:, None])
         return plant
@@ -140,6 +140,18 @@ def test_every_kind_of_geom_of_a_fixture_is_seen(slide):
 
 def test_what_of_a_fixture_is_only_drawn_does_not_count(slide):
     assert causes(slide(SPHERE, [0.0], dataclasses.replace(BOX, collide=False))) == []
+
+
+def test_a_part_of_the_fixture_that_yields_counts_where_it_stands(slide):
+    """A box on a spring: found at rest, and 30 mm further out once it is pushed that far."""
+    spring = Sprung(name="pad", geoms=(BOX,), axis=(1.0, 0.0, 0.0), stiffness=1e4)
+    plant = slide(SPHERE, [0.12, 0.12], sprung=(spring,))
+    assert [words for _, words in causes(plant)] == ["link 'carriage' is 30 mm inside the fixture"] * 2
+    position, _ = plant.state
+    position[1, int(plant.model.joint("sprung_pad").qposadr[0])] = -0.03
+    plant.set_state(position.copy(), 0.0 * plant.state[1], np.arange(2))
+    assert causes(plant)[0] == (0, "link 'carriage' is 30 mm inside the fixture")
+    assert [row for row, _ in causes(plant)] == [0]  # 0.12 m is just out of reach of 0.1 + 0.05 - 0.03
 
 
 def test_only_the_trials_that_are_asked_for_are_answered(slide):
@@ -240,25 +252,38 @@ def at_start(model, task, more, configuration):
     return causes(plant)
 
 
-@pytest.mark.needs_plugins
-def test_the_arm_that_holds_the_fixture_may_touch_it_and_the_other_may_not(robot):
-    """A ball of the held fixture at the wrist of one arm or the other; wrists are 0.26 m from the fixture's origin."""
+def ball_at(robot, joint):
+    """The scene of two arms, with a ball of 50 mm of the held fixture at a joint of one arm, clear of both tools."""
     from skillframe.prepare import load_world
 
     model, task = robot("dual_panda"), load_world("dual_peg", {})
     plant = Plant(model, task, 1, fixture_poses(model, {}, 1), {})
     plant.reset(start_configurations(model, task, {}, 1))
     position, rotation = plant.body_frames()
-    fixture = plant.model.body("fixture").id
+    fixture, body = (plant.model.body(name).id for name in ("fixture", joint))
+    there = rotation[0, fixture].T @ (position[0, body] - position[0, fixture])
+    ball = Geom(kind="sphere", size=(0.05,), position=tuple(there.tolist()))
+    return dataclasses.replace(task, fixture=(*task.fixture, ball))
 
-    def ball_at(joint):
-        there = rotation[0, fixture].T @ (position[0, plant.model.body(joint).id] - position[0, fixture])
-        ball = Geom(kind="sphere", size=(0.05,), position=tuple(there.tolist()))
-        return at_start(model, task, [ball], lambda now: start_configurations(model, now, {}, 1))
 
-    assert ball_at("right_joint7") == []
-    ((_, words),) = ball_at("left_joint7")
-    assert "link 'left_link" in words
+@pytest.mark.needs_plugins
+def test_the_arm_that_holds_the_fixture_may_touch_it_and_the_other_may_not(robot):
+    for joint, link in (("right_joint7", None), ("left_joint7", "link 'left_link")):
+        model, task = robot("dual_panda"), ball_at(robot, joint)
+        found = at_start(model, task, [], lambda now: start_configurations(robot("dual_panda"), now, {}, 1))
+        assert [words[: len(link or "")] for _, words in found] == ([] if link is None else [link])
+
+
+@pytest.mark.needs_plugins
+def test_a_run_of_two_arms_ends_where_the_one_is_in_what_the_other_holds(robot):
+    now = dataclasses.replace(setup("dual_panda", "free"), center_of_compliance=np.zeros(3))
+    failures = {
+        joint: run(Hold(STIFF), dataclasses.replace(now, scene=ball_at(robot, joint)), duration_s=0.05).failure[0]
+        for joint in ("left_joint7", "right_joint7")
+    }
+    assert failures["left_joint7"].startswith("link 'left_link")
+    assert failures["left_joint7"].endswith("inside the fixture (at 0.000 s)")
+    assert "inside the fixture" not in failures["right_joint7"]
 
 
 def test_a_boom_in_the_fixture_is_found_and_the_load_on_it_is_not(robot, scene):
