@@ -2,8 +2,8 @@
 
 The depth of a pair of convex shapes is MuJoCo's own (`mj_geomDistance`: the shortest way that parts them), asked of a
 model of its own in which nothing touches anything. Most pairs are ruled out before: the sphere around a link's shape
-against the box around all of a body of the fixture, then against the box of each shape. All of it looks at one trial
-at a time, so that a trial's answer does not depend on its neighbours.
+against sphere and box around all of a body of the fixture, then against the box of each shape. All of it looks at one
+trial at a time, so that a trial's answer does not depend on its neighbours.
 
 The tool, the payload and the second arm that holds the fixture are meant to touch it and are left out (`link_shapes`).
 Only shapes of the fixture that collide count. A link may be `TOLERANCE` deep: drawn shapes are no better than that.
@@ -42,6 +42,15 @@ class _Shapes(NamedTuple):
     centre: Float
     half: Float
     radius: Float
+
+
+class _Box(NamedTuple):
+    """A box in a body's frame: the body's id, middle and half sizes (3,), squared distances (L,) within which links count."""
+
+    body: int
+    middle: Float
+    half: Float
+    reach_squared: Float
 
 
 class LinkIntrusion:
@@ -89,8 +98,9 @@ class LinkIntrusion:
         ids = np.array([self._probe.geom(f"g{index}").id for index in range(len(geoms))])
         bodies = np.array([self._body(body) for body, _ in geoms])
         self._links = self._shapes(ids[: len(links)], bodies[: len(links)])
+        self._inside = self._links.position + rotate(self._links.rotation, self._links.centre)
         self._fixture = self._shapes(ids[len(links) :], bodies[len(links) :])
-        self._boxes = [(body, *self._box_around(body)) for body in dict.fromkeys(self._fixture.body.tolist())]
+        self._boxes = [self._box_around(body) for body in dict.fromkeys(self._fixture.body.tolist())]
         self._point_geom = int(self._probe.geom(_PROBE).id)
 
     def _shapes(self, geom: NDArray[np.int64], body: NDArray[np.int64]) -> _Shapes:
@@ -101,14 +111,15 @@ class LinkIntrusion:
         rotation = matrix_from_quaternion(probe.geom_quat[geom][:, [1, 2, 3, 0]])
         return _Shapes(geom, body, probe.geom_pos[geom].copy(), rotation, centre, half, norm(half))
 
-    def _box_around(self, body: int) -> tuple[Float, Float]:
-        """Centre and half sizes (3,) of the box around all fixture shapes of a body, in its frame."""
+    def _box_around(self, body: int) -> _Box:
+        """The box around all fixture shapes of a body."""
         mine = self._fixture.body == body
         rotation = self._fixture.rotation[mine]
         centre = self._fixture.position[mine] + rotate(rotation, self._fixture.centre[mine])
         half = rotate(np.abs(rotation), self._fixture.half[mine])
         low, high = (centre - half).min(axis=0), (centre + half).max(axis=0)
-        return 0.5 * (low + high), 0.5 * (high - low)
+        box = 0.5 * (high - low)
+        return _Box(body, 0.5 * (low + high), box, (self._links.radius + norm(box)) ** 2)
 
     def causes(self, plant: Plant, rows: NDArray[np.int64]) -> list[tuple[int, str]]:
         """Of some trials those with a link in the fixture, each with the deepest link in words."""
@@ -117,22 +128,31 @@ class LinkIntrusion:
         position, rotation = plant.body_frames()
         centre = self._centres(position, rotation, rows)
         found: dict[int, tuple[float, int]] = {}
-        for body, middle, half in self._boxes:
-            local = _into(centre - position[rows, None, body], rotation[rows, body][:, None])
-            near = _beyond(local - middle, half) < self._links.radius
-            for k, link in np.argwhere(near).tolist():
+        for box in self._boxes:
+            for k, link in self._near(centre, position[rows, box.body], rotation[rows, box.body], box):
                 row = int(rows[k])
-                depth = self._depth(position[row], rotation[row], link, body, centre[k, link])
+                depth = self._depth(position[row], rotation[row], link, box.body, centre[k, link])
                 if depth > max(TOLERANCE, found.get(row, (0.0, 0))[0]):
                     found[row] = depth, link
         return [(row, _in_words(self._names[link], depth)) for row, (depth, link) in sorted(found.items())]
 
     def _centres(self, position: Float, rotation: Float, rows: NDArray[np.int64]) -> Float:
         """(R, L, 3) middles of the links' shapes in base."""
-        links = self._links
-        inside = links.position + rotate(links.rotation, links.centre)
-        bodies = links.body
-        return position[rows][:, bodies] + rotate(rotation[rows][:, bodies], inside)
+        bodies, inside = self._links.body, self._inside
+        at, turn = position[rows[:, None], bodies], rotation[rows[:, None], bodies]
+        for k in range(3):  # sums of columns: a stack of small matrix products takes several times as long
+            at += turn[..., k] * inside[:, k, None]
+        return at
+
+    def _near(self, centre: Float, position: Float, rotation: Float, box: _Box) -> list[tuple[int, int]]:
+        """Pairs of a row and a link whose spheres reach into the box around a body of the fixture."""
+        around = centre - (position + rotate(rotation, box.middle))[:, None]
+        k, link = np.nonzero(np.vecdot(around, around) < box.reach_squared)
+        if not len(k):
+            return []
+        local = _into(around[k, link], rotation[k])
+        close = _beyond(local, box.half) < self._links.radius[link]
+        return list(zip(k[close].tolist(), link[close].tolist(), strict=True))
 
     def _depth(self, position: Float, rotation: Float, link: int, body: int, centre: Float) -> float:
         """How deep a link's shape stands in a body of the fixture at worst [m], 0 if it does not; one trial."""
