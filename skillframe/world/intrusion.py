@@ -45,7 +45,7 @@ class _Shapes(NamedTuple):
 
 
 class _Box(NamedTuple):
-    """A box in a body's frame: the body's id, middle and half sizes (3,), squared distances (L,) within which links count."""
+    """A box in a body's frame: the body's id, middle, half sizes, squared distances (L,) within which links count."""
 
     body: int
     middle: Float
