@@ -71,7 +71,6 @@ def command(
         check_film(video)
     params, draws = split_settings(world, dict(parse_setting(text) for text in settings))
     name, document = load_skill(skill)
-    runnable, setup = prepare(load_robot_model(robot), load_world(world, params), document, coc)
     model = load_robot_model(robot)
     runnable, setup = prepare(model, load_world(world, params), document, coc)
     with progress("s simulated", QUIET_S) as show:
