@@ -10,6 +10,7 @@ import click
 from skillframe.cli.numbers import WHOLE
 
 if TYPE_CHECKING:
+    from skillframe.export.formats import Format
     from skillframe.frames import Float
 
 
@@ -45,13 +46,16 @@ def command(
     assert skill is not None
     assert form is not None
     assert out is not None
-    _write(skill, form, out, phase, coc, attitude)
+    chosen = _write(skill, form, out, phase, coc, attitude)
     if as_json:
         from skillframe.cli.output import emit_json
 
-        emit_json({"file": str(out), "format": form})
-    else:
-        click.echo(f"{out}: {form}")
+        emit_json({"file": str(out), "format": form, "checked_against": chosen.checked, "notes": list(chosen.notes)})
+        return
+    click.echo(f"{out}: {form}")
+    click.echo(f"checked against {chosen.checked}")
+    for line in chosen.notes:
+        click.echo(f"note: {line}" if line is chosen.notes[0] else f"      {line}")
 
 
 def _list(as_json: bool) -> None:
@@ -59,12 +63,18 @@ def _list(as_json: bool) -> None:
     from skillframe.export.formats import FORMATS
 
     if as_json:
-        emit_json([{"name": f.name, "summary": f.summary, "axes": f.axes} for f in FORMATS.values()])
+        emit_json(
+            [
+                {"name": f.name, "summary": f.summary, "axes": f.axes, "checked_against": f.checked}
+                for f in FORMATS.values()
+            ]
+        )
         return
-    table(("format", "axes", "what it is"), [(f.name, f.axes, f.summary) for f in FORMATS.values()])
+    rows = [(f.name, f.axes, f.summary, f.checked) for f in FORMATS.values()]
+    table(("format", "axes", "what it is", "checked against"), rows)
 
 
-def _write(skill: Path, form: str, out: Path, phase: int | None, coc: str | None, attitude: str | None) -> None:
+def _write(skill: Path, form: str, out: Path, phase: int | None, coc: str | None, attitude: str | None) -> Format:
     from skillframe.demonstration.record import resolve_point
     from skillframe.errors import UnknownName
     from skillframe.export.formats import FORMATS, settings_text
@@ -84,6 +94,7 @@ def _write(skill: Path, form: str, out: Path, phase: int | None, coc: str | None
     turned = None if attitude is None else _attitude(attitude)
     moving = moving_impedance(document, phase, FORMATS[form].axes, turned, str(skill))
     write_whole(out, settings_text(FORMATS[form], moving, [f"{skill.name}: {line}" for line in words]).encode())
+    return FORMATS[form]
 
 
 def _attitude(text: str) -> Float:

@@ -1,9 +1,9 @@
 """What controllers that others wrote want to be told: parameters and messages, as YAML with the rest in comments.
 
-Sources: the parameter declarations of crisp_controllers' `CartesianController` (cartesian_controller.yaml), the README
-of cartesian_controllers' `CartesianComplianceController`, and aic_control_interfaces' `MotionUpdate.msg` with
-`TrajectoryGenerationMode.msg` and aic_controller's documentation. None of these controllers was run here: try them in
-free air first.
+Sources: the parameter declarations of crisp_controllers' `CartesianController` (cartesian_controller.yaml), the source
+of cartesian_controllers' `CartesianComplianceController` and of its two bases, and aic_control_interfaces'
+`MotionUpdate.msg` with `TrajectoryGenerationMode.msg` and aic_controller's documentation and bring-up. Each format says
+which version of them it was checked against. None of these controllers was run here: try them in free air first.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from skillframe.frames import Float
 
 DIRECTIONS = ("x", "y", "z")
 WIDE_OPEN = {"translation": 0.1, "rotation": 0.5}  # crisp's defaults, on axes without stiffness [m, rad]
+CRISP_LARGEST = 5000.0  # its bound of every stiffness and damping: it refuses to load a larger one
 VELOCITY_MODE = 1  # aic_control_interfaces/TrajectoryGenerationMode
 
 
@@ -32,6 +33,8 @@ class Format:
         summary: one line.
         axes: what its numbers are expressed in.
         body: the settings.
+        checked: the controller's version, or repository and commit, that names and types were checked against.
+        notes: what must be known before it is used, a line each; in the file and on the terminal.
         comments: how they are used, a line each.
     """
 
@@ -39,6 +42,8 @@ class Format:
     summary: str
     axes: Axes
     body: Callable[[MovingImpedance], Mapping[str, Any]]
+    checked: str
+    notes: tuple[str, ...]
     comments: tuple[str, ...]
 
 
@@ -48,11 +53,20 @@ def crisp(phase: MovingImpedance) -> Mapping[str, Any]:
     clip: dict[str, float] = {}
     for part, short, prefix, lead, at in _parts(phase):
         k, d = _gains(phase, at)
+        _refuse_beyond(np.concatenate([k, d]), part)
         for axis, stiffness, damping in zip(DIRECTIONS, k.tolist(), d.tolist(), strict=True):
             task[f"k_{short}_{axis}"], task[f"d_{short}_{axis}"] = stiffness, damping
             clip[prefix + axis] = lead / stiffness if stiffness > 0.0 else WIDE_OPEN[part]
     fixed = {"use_operational_space": False, "use_local_jacobian": False, "limit_error": True}
     return {"cartesian_controller": {"ros__parameters": {**fixed, "task": {**task, "error_clip": clip}}}}
+
+
+def _refuse_beyond(values: Float, part: str) -> None:
+    if values.max() > CRISP_LARGEST:
+        raise InputError(
+            f"skill: {part}", f"holds a stiffness or damping of {values.max():g}, and crisp_controllers takes "
+            f"{CRISP_LARGEST:g} at most", "learn with a smaller --set stiffness_n_m or stiffness_nm_rad",
+        )  # fmt: skip
 
 
 def cartesian_compliance(phase: MovingImpedance) -> Mapping[str, Any]:
@@ -74,7 +88,7 @@ def motion_update(phase: MovingImpedance) -> Mapping[str, Any]:
         "target_stiffness": phase.stiffness.reshape(-1).tolist(),
         "target_damping": phase.damping.reshape(-1).tolist(),
         "feedforward_wrench_at_tip": {"force": zero, "torque": zero},
-        "wrench_feedback_gains_at_tip": {"force": zero, "torque": zero},
+        "wrench_feedback_gains_at_tip": [0.0] * 6,
         "trajectory_generation_mode": {"mode": VELOCITY_MODE},
     }
 
@@ -84,6 +98,11 @@ FORMATS = {
     for f in (
         Format(
             name="crisp", summary="crisp_controllers CartesianController (ROS 2 parameters)", axes="base", body=crisp,
+            checked="utiasDSL/crisp_controllers 2b33ab7 (releases 2.2.0 to 2.3.1)",
+            notes=(
+                "needs crisp_controllers 1.3.0 or newer: before, use_local_jacobian: false acts at the base's origin,",
+                "where a push makes a torque (20 N at 0.5 m: 10 Nm) about axes that the skill leaves free",
+            ),
             comments=(
                 "Add joints, base_frame and end_effector_frame of your robot; the latter at the centre of compliance.",
                 "Publish target_pose: the pose at the start of the phase, moving with the twist above.",
@@ -93,15 +112,30 @@ FORMATS = {
         Format(
             name="cartesian_controllers", axes="tool", body=cartesian_compliance,
             summary="cartesian_controllers CartesianComplianceController (ROS 2 parameters)",
+            checked="fzi-forschungszentrum-informatik/cartesian_controllers f53f798 (2024-10-20, ros2)",
+            notes=(
+                "the spring acts at end_effector_link; compliance_ref_link gives only its axes and the sensor's point:",
+                "put both at the centre of compliance, with the tool's axes",
+                "it holds stiffness alone: damping and speed follow from its own pd_gains and solver",
+            ),
             comments=(
-                "Add joints and links of your robot; compliance_ref_link at the centre of compliance, the tool's axes.",
-                "Publish target_frame: the pose at the start of the phase, moving with the twist above, but ahead of",
-                "the measured one by no more than lead over stiffness. Damping is the controller's own (pd_gains).",
+                "Add joints, links, command_interfaces, solver and pd_gains of your robot, and ft_sensor_ref_link.",
+                "The stiffness turns with the tool. The twist above is in the tool's axes at the start of the phase:",
+                "turn it into robot_base_link, in which target_frame is read.",
+                "Publish target_frame: the pose at the start of the phase, moving with that twist, but ahead of the",
+                "measured one by no more than lead over stiffness: the controller itself clips at 1 m and 1 rad only.",
+                "Publish ft_sensor_wrench, the environment's force on the tool, without bias and the tool's weight, in",
+                "the axes of ft_sensor_ref_link: without it nothing gives way. Leave target_wrench at zero.",
             ),
         ),
         Format(
             name="aic_motion_update", summary="aic_control_interfaces MotionUpdate (ROS 2 message)", axes="base",
-            body=motion_update,
+            body=motion_update, checked="intrinsic-dev/aic db40abc (2026-03-13)",
+            notes=(
+                "for aic_control_interfaces from 2026-02-19 on (2b0f671): wrench_feedback_gains_at_tip is float64[6]",
+                "the toolkit's bring-up limits the wrench to 10 N and 10 Nm per axis (impedance.maximum_wrench):",
+                "a larger push never arrives",
+            ),
             comments=(
                 "Publish it on /aic_controller/pose_commands, with the controller in its Cartesian target mode.",
                 "In velocity mode nothing limits how far the target leads a blocked tool: end the phase in time.",
@@ -124,6 +158,8 @@ def settings_text(form: Format, phase: MovingImpedance, words: list[str]) -> str
         f"twist of the desired pose: {_numbers(phase.twist)} m/s, rad/s",
         f"lead: {phase.lead_force:g} N, {phase.lead_torque:g} Nm at most",
         f"the phase ends with: {stops}",
+        f"checked against {form.checked}",
+        *form.notes,
         *form.comments,
     ]
     return "".join(f"# {line}\n" for line in [form.summary, *said]) + "".join(_lines(form.body(phase), ""))

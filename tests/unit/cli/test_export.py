@@ -60,3 +60,20 @@ def test_what_cannot_be_exported_is_one_sentence_and_no_file(
     assert run(["export", skill, *options, "--out", str(out)]) == 2
     assert said in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_export_says_on_the_terminal_and_in_json_what_it_was_checked_against_and_from_which_version_it_holds(
+    skill: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out.yaml"
+    capsys.readouterr()
+    assert run(["export", skill, "--to", "crisp", "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "checked against utiasDSL/crisp_controllers 2b33ab7" in said
+    assert "needs crisp_controllers 1.3.0 or newer" in said
+    assert run(["export", skill, "--to", "aic_motion_update", "--out", str(out), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["checked_against"].startswith("intrinsic-dev/aic db40abc")
+    assert any("10 N" in note for note in answer["notes"])
+    assert run(["export", "--list", "--json"]) == 0
+    assert all(f["checked_against"] for f in json.loads(capsys.readouterr().out))
