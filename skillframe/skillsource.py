@@ -12,6 +12,7 @@ from typing import Any
 
 from skillframe.config import parse_setting
 from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration.together import refuse_unfit
 from skillframe.errors import InputError
 from skillframe.records import Document, LearnOptions, SkillType
 
@@ -20,7 +21,8 @@ def learned(skill: SkillType, demonstrations: Sequence[Demonstration], options: 
     """A whole skill document, learned from demonstrations.
 
     Raises:
-        InputError: this kind of skill is not learned, or its learner refuses the demonstrations.
+        InputError: this kind of skill is not learned, the demonstrations are of different tools or hold a stall, or
+            its learner refuses them.
     """
     from skillframe.skillfile import new_document
 
@@ -28,6 +30,7 @@ def learned(skill: SkillType, demonstrations: Sequence[Demonstration], options: 
         raise InputError(
             f"skill type {skill.name}", "is not learned from demonstrations", "write its skill file by hand"
         )
+    refuse_unfit(demonstrations)
     body = skill.learn(demonstrations, options or LearnOptions())
     return new_document(skill, body, demonstrations)
 

@@ -202,6 +202,7 @@ def _show(found: Audit) -> None:
         ("drift", six(found.drift) if found.drift else "not seen (it does not end in free air)"),
         ("peak", f"{found.peak_force_n:.2f} N, {counted(found.spikes, 'spike')}"),
         ("contact", _contacts(found)),
+        *([("stalls", _stalls(found))] if found.stalls else []),
     ]
     for name, text in lines:
         click.echo(f"  {name:<9}{text}")
@@ -237,7 +238,12 @@ def counted(count: int, what: str) -> str:
     return f"{count} {what}{'s' * (count != 1)}"
 
 
+def _stalls(found: Audit) -> str:
+    return ", ".join(f"{s['what']} {s['start']:.2f}-{s['stop']:.2f} s" for s in found.stalls)
+
+
 def _contacts(found: Audit) -> str:
-    spans = [f"{c[0]:.2f}-{c[1]:.2f} s (peak {c[2]:.1f} N)" for c in found.contacts[:8]]
+    late = dict.fromkeys(found.onsets_unseen, ", onset not seen")
+    spans = [f"{c[0]:.2f}-{c[1]:.2f} s (peak {c[2]:.1f} N{late.get(c[0], '')})" for c in found.contacts[:8]]
     more = f" and {len(found.contacts) - 8} more" if len(found.contacts) > 8 else ""
     return f"above {found.contact_threshold_n:.2f} N: " + (", ".join(spans) or "none") + more

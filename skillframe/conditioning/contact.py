@@ -5,8 +5,9 @@ being the typical scatter of the force vector and \(F_{99}\) its 99th percentile
 count in proportion to how hard the task presses), until it falls below half of that; intervals closer than 50 ms are
 one, shorter ones are spikes. Where the noise alone sets the bound, the force is averaged first, over as many samples as
 bring it down to the others, 50 ms at most: else a noisy sensor's contact would count as free air. The free-air level is
-the mean of the first 0.25 s, that is, a recording is taken to start in free air unless another stretch is named. All of
-this is our choice.
+the mean of the first 0.25 s, that is, a recording is taken to start in free air unless another stretch is named. A
+stall (`demonstration.stalls`) is neither: it ends a contact, and what follows it shows no onset. All of this is our
+choice.
 """
 
 from __future__ import annotations
@@ -14,8 +15,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skillframe.conditioning.noise import NoiseFigures
+from skillframe.errors import InputError
 from skillframe.frames import Float, norm
 
 SIGMAS, LEAST_FORCE, SHARE = 6.0, 1.0, 0.1
@@ -49,7 +52,9 @@ def _least(strength: Float) -> float:
     return max(LEAST_FORCE, SHARE * float(np.quantile(strength, 0.99)))
 
 
-def contact_strength(time: Float, wrench: Float, noise: NoiseFigures, level: Float) -> tuple[Float, float]:
+def contact_strength(
+    time: Float, wrench: Float, noise: NoiseFigures, level: Float, alive: NDArray[np.bool_] | None = None
+) -> tuple[Float, float]:
     """Force above the free-air level (T,), averaged where noise asks for it, and the bound of contact [N].
 
     Args:
@@ -57,8 +62,11 @@ def contact_strength(time: Float, wrench: Float, noise: NoiseFigures, level: Flo
         wrench: (T, 6) [N, Nm].
         noise: of the same recording.
         level: (6,) free-air level.
+        alive: (T,) where the sensor did not stall, elsewhere there is no force; all if not given.
     """
     force = wrench[:, :3] - level[:3]
+    if alive is not None:
+        force = np.where(alive[:, None], force, 0.0)
     strength = norm(force)
     most = max(1, round(HOLD / float(np.median(np.diff(time)))))
     width = int(np.clip(np.ceil((SIGMAS * _scatter(noise) / _least(strength)) ** 2), 1, min(most, len(time))))
@@ -78,7 +86,9 @@ def free_air_level(time: Float, wrench: Float, stretch: tuple[float, float] | No
     return result
 
 
-def contact_intervals(time: Float, wrench: Float, noise: NoiseFigures, level: Float) -> list[Contact]:
+def contact_intervals(
+    time: Float, wrench: Float, noise: NoiseFigures, level: Float, alive: NDArray[np.bool_] | None = None
+) -> list[Contact]:
     """Intervals in contact, in order.
 
     Args:
@@ -86,9 +96,11 @@ def contact_intervals(time: Float, wrench: Float, noise: NoiseFigures, level: Fl
         wrench: (T, 6) [N, Nm].
         noise: of the same recording.
         level: (6,) free-air level.
+        alive: (T,) where the sensor did not stall; all if not given.
     """
-    strength, threshold = contact_strength(time, wrench, noise, level)
-    pieces = _runs(strength > 0.5 * threshold)
+    strength, threshold = contact_strength(time, wrench, noise, level, alive)
+    touching = strength > 0.5 * threshold
+    pieces = _runs(touching if alive is None else touching & alive)
     merged: list[tuple[int, int]] = []
     for first, last in pieces:
         if merged and time[first] - time[merged[-1][1]] < HOLD:
@@ -110,7 +122,24 @@ def _runs(mask: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[tuple[int, i
     return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
 
 
-def first_free_air(time: Float, wrench: Float, noise: NoiseFigures) -> tuple[float, float]:
-    """The stretch from the start to 0.1 s before the first contact [s], to the end if there is none."""
-    contacts = contact_intervals(time, wrench, noise, free_air_level(time, wrench))
-    return float(time[0]), float(time[-1]) if not contacts else contacts[0].start - MARGIN
+def first_free_air(
+    time: Float, wrench: Float, noise: NoiseFigures, alive: NDArray[np.bool_] | None = None
+) -> tuple[float, float]:
+    """The stretch from the start to 0.1 s before the first contact [s], or to the first stall; else to the end.
+
+    Raises:
+        InputError: the recording begins with a stall, so that what follows may be contact.
+    """
+    stalled = np.zeros(0, dtype=int) if alive is None else np.flatnonzero(~alive)
+    if stalled.size and time[stalled[0]] - time[0] < LEVEL_TIME:
+        raise InputError(
+            "wrench",
+            f"repeats one value from {time[stalled[0]]:.2f} s on, and what follows may be contact already: "
+            "no free air is known",
+            "name a stretch without contact (--free-air FROM,TO), or leave the bias (--no-bias)",
+        )  # fmt: skip
+    contacts = contact_intervals(time, wrench, noise, free_air_level(time, wrench), alive)
+    ends = [float(time[-1])]
+    ends += [contacts[0].start - MARGIN] if contacts else []
+    ends += [float(time[stalled[0] - 1])] if stalled.size else []
+    return float(time[0]), min(ends)

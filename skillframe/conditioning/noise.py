@@ -12,9 +12,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skillframe.conditioning.kalman import WrenchModel, steady_gain
 from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration.stalls import alive as alive_samples
 from skillframe.errors import InputError
 from skillframe.frames import Float
 
@@ -37,30 +39,48 @@ class NoiseFigures(NamedTuple):
     quiet_start: float
 
 
-def noise_figures(time: Float, wrench: Float) -> NoiseFigures:
+def noise_figures(time: Float, wrench: Float, alive: NDArray[np.bool_] | None = None) -> NoiseFigures:
     """Noise of a recorded wrench.
 
     Args:
         time: (T,) [s].
         wrench: (T, 6) [N, Nm].
+        alive: (T,) where the sensor did not stall; windows that hold a stall say nothing of noise. All if not given.
 
     Raises:
-        InputError: fewer than ten samples.
+        InputError: fewer than ten samples, or no window without a stall.
     """
     if len(time) < LEAST_SAMPLES:
         raise InputError(
             "wrench", f"{len(time)} samples are too few for noise figures", f"give at least {LEAST_SAMPLES}"
         )
-    period = float(np.median(np.diff(time)))
-    width = int(np.clip(round(WINDOW / period), LEAST_SAMPLES, len(time)))
+    width, live = _windows(time, alive)
     count = len(time) // width
-    windows = np.asarray(wrench, dtype=float)[: count * width].reshape(count, width, 6)
-    scatter = detrended_std(windows)
+    if not len(live):
+        raise InputError(
+            "wrench", f"repeats one value in every {WINDOW:g} s, so that nothing shows its noise",
+            "check the sensor's connection, and record again",
+        )  # fmt: skip
+    scatter = detrended_std(np.asarray(wrench, dtype=float)[: count * width].reshape(count, width, 6)[live])
     rank = (scatter / np.maximum(np.median(scatter, axis=0), FLOOR)).sum(axis=1)
-    quietest = np.argsort(rank, kind="stable")[: max(1, count // 4)]
+    quietest = np.argsort(rank, kind="stable")[: max(1, len(live) // 4)]
     return NoiseFigures(
-        np.median(scatter[quietest], axis=0), np.median(scatter, axis=0), float(time[int(quietest[0]) * width])
+        np.median(scatter[quietest], axis=0), np.median(scatter, axis=0), float(time[int(live[quietest[0]]) * width])
     )
+
+
+def _windows(time: Float, alive: NDArray[np.bool_] | None) -> tuple[int, NDArray[np.intp]]:
+    """Samples in a window, and the windows that hold no stall."""
+    width = int(np.clip(round(WINDOW / float(np.median(np.diff(time)))), LEAST_SAMPLES, len(time)))
+    count = len(time) // width
+    return width, np.arange(count) if alive is None else np.flatnonzero(
+        alive[: count * width].reshape(count, width).all(axis=1)
+    )
+
+
+def has_window(time: Float, alive: NDArray[np.bool_]) -> bool:
+    """Whether a stretch that does not stall is long enough for noise figures."""
+    return bool(len(_windows(time, alive)[1]))
 
 
 def detrended_std(windows: Float) -> Float:
@@ -73,15 +93,17 @@ def detrended_std(windows: Float) -> Float:
     return result
 
 
-def estimate_model(time: Float, wrench: Float) -> WrenchModel:
+def estimate_model(time: Float, wrench: Float, alive: NDArray[np.bool_] | None = None) -> WrenchModel:
     """The wrench model that fits a recording: noise from its quiet windows, walk by the likelihood of the innovations.
 
     Args:
         time: (T,) [s], evenly spaced but for jitter.
         wrench: (T, 6) [N, Nm].
+        alive: (T,) where the sensor did not stall; all if not given.
     """
     dt = float(np.median(np.diff(time)))
-    noise = np.maximum(noise_figures(time, wrench).quiet, FLOOR)
+    noise = np.maximum(noise_figures(time, wrench, alive).quiet, FLOOR)
+    wrench = wrench if alive is None else wrench[alive]
     corners = np.geomspace(min(0.5, 0.05 / dt), 0.4 / dt, 24)
     error = _innovation_variance(corners, wrench / noise, dt)
     best = [corners[np.argmin(np.log(error[:, part] + 1e-300).sum(axis=1))] for part in (slice(0, 3), slice(3, 6))]
@@ -106,7 +128,7 @@ def _innovation_variance(corners: Float, wrench: Float, dt: float) -> Float:
 
 def model_of(demonstration: Demonstration) -> WrenchModel:
     """The wrench model of one demonstration; sensor noise stated in its metadata wins over the estimate."""
-    model = estimate_model(demonstration.time, demonstration.wrench)
+    model = estimate_model(demonstration.time, demonstration.wrench, alive_samples(demonstration))
     sensor = demonstration.meta.get("sensor")
     if not isinstance(sensor, dict):
         return model

@@ -6,12 +6,15 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skillframe.conditioning.contact import first_free_air
 from skillframe.conditioning.kalman import WrenchFilter, WrenchModel
-from skillframe.conditioning.noise import model_of, noise_figures
-from skillframe.conditioning.payload import Payload, gravity_in_tool, identify_payload
+from skillframe.conditioning.noise import LEAST_SAMPLES, model_of, noise_figures
+from skillframe.conditioning.payload import Payload, gravity_in_tool, identify_payload, refuse_absurd
 from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration.stalls import KEY as STALLS
+from skillframe.demonstration.stalls import alive, as_meta, stalls
 from skillframe.errors import InputError
 from skillframe.frames import Float, norm, rotate_spatial
 
@@ -56,7 +59,13 @@ def _with_filter(demonstration: Demonstration, model: WrenchModel | None, method
     run = design.smooth if method == "smoother" else design.filter
     said = {"method": method, "noise": model.noise.tolist(), "corner_hz": model.corner(dt).tolist()}
     wrench = run(demonstration.time, demonstration.wrench)
-    return replace(demonstration, wrench=wrench, meta=_noted(demonstration.meta, said))
+    return replace(demonstration, wrench=wrench, meta=_noted(with_stalls(demonstration), said))
+
+
+def with_stalls(demonstration: Demonstration) -> dict[str, Any]:
+    """Metadata that name the stalls: a wrench that was turned or smoothed shows them no longer."""
+    found = stalls(demonstration)
+    return {**demonstration.meta, **({STALLS: as_meta(found)} if found else {})}
 
 
 def _noted(meta: dict[str, Any], said: dict[str, Any]) -> dict[str, Any]:
@@ -75,11 +84,19 @@ def remove_bias(
         weight: whether the wrench holds the tool's weight; the metadata's word if not given.
 
     Raises:
-        InputError: the stretch is shorter than 0.2 s.
+        InputError: the stretch is shorter than 0.2 s or holds a stall, no free air is known, or what was identified
+            cannot be a tool.
     """
     d = demonstration
-    stretch = stretch or _free_air(d)
+    live = alive(d)
+    stretch = stretch or _free_air(d, live)
     inside = (d.time >= stretch[0]) & (d.time <= stretch[1])
+    if not np.all(live[inside]):
+        raise InputError(
+            d.source or "demonstration",
+            f"the wrench stalls within {stretch[0]:.3g} to {stretch[1]:.3g} s, so that it shows no free air there",
+            "name a stretch without a stall (skillframe demonstration check shows them), or leave the bias (--no-bias)",
+        )  # fmt: skip
     if stretch[1] - stretch[0] < LEAST_STRETCH or inside.sum() < 2:
         raise InputError(
             d.source or "demonstration",
@@ -89,10 +106,12 @@ def remove_bias(
     said = d.meta.get("wrench", {})
     weight = bool(said.get("includes_tool_weight")) if weight is None else weight
     payload = payload_of(d, inside)
-    if not weight:
+    if weight:
+        refuse_absurd(payload, _typical_noise(d, live), d.source or "demonstration", stretch)
+    else:
         payload = _without_mass(d, inside, payload)
     wrench = d.wrench - payload.wrench(d.pose.rotation)
-    meta = _noted(d.meta, {"free_air_s": list(stretch), "payload": payload.as_meta()})
+    meta = _noted(with_stalls(d), {"free_air_s": list(stretch), "payload": payload.as_meta()})
     if weight and not payload.mass:
         meta = {**meta, "wrench": {**said, "includes_tool_weight": True}}
     elif "includes_tool_weight" in said or weight:
@@ -113,9 +132,16 @@ def doubtful_bias(demonstration: Demonstration, removed: Removed) -> float | Non
     d, force = demonstration, float(norm(removed.payload.bias[:3]))
     if d.meta.get("contact") is False or force <= LEAST_DOUBT:
         return None
-    noise = float(np.sqrt((noise_figures(d.time, d.wrench).quiet[:3] ** 2).mean()))
+    noise = float(np.sqrt((noise_figures(d.time, d.wrench, alive(d)).quiet[:3] ** 2).mean()))
     steady = removed.payload.residual_force <= 2.0 * noise and removed.stretch[1] < d.time[-1]
     return None if steady else force
+
+
+def _typical_noise(demonstration: Demonstration, live: NDArray[np.bool_]) -> float:
+    """Scatter of the force in motion, rms per axis [N]; 0 where a recording is too short for any."""
+    if live.sum() < LEAST_SAMPLES:
+        return 0.0
+    return float(np.sqrt((noise_figures(demonstration.time, demonstration.wrench, live).typical[:3] ** 2).mean()))
 
 
 def payload_of(demonstration: Demonstration, inside: Any) -> Payload:
@@ -137,8 +163,8 @@ def _without_mass(demonstration: Demonstration, inside: Any, payload: Payload) -
     )
 
 
-def _free_air(demonstration: Demonstration) -> tuple[float, float]:
+def _free_air(demonstration: Demonstration, live: NDArray[np.bool_]) -> tuple[float, float]:
     d = demonstration
     if d.meta.get("contact") is False:
         return float(d.time[0]), float(d.time[-1])
-    return first_free_air(d.time, d.wrench, noise_figures(d.time, d.wrench))
+    return first_free_air(d.time, d.wrench, noise_figures(d.time, d.wrench, live), live)

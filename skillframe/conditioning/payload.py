@@ -23,6 +23,11 @@ from skillframe.frames import Float, norm, rotate, rotate_spatial, skew
 LARGEST_CONDITION = 15.0
 """Above it errors are magnified too much to tell weight from bias: gravity must turn by some 26 degrees. Our choice."""
 LEAST_MASS = 1e-3
+LARGEST_MASS, LONGEST_LEVER = 1000.0, 1.0
+"""What no tool on a wrist weighs [kg], and how far from its tool point none has its centre of mass [m]. Our choice."""
+LEAST_RESIDUAL, RESIDUAL_RATIO, RESIDUAL_SHARE = 1.0, 3.0, 0.1
+"""A fit may leave 1 N, three times the noise in motion, or a tenth of the weight, rms per axis. Our choice, because a
+robot's vibration leaves 0.2 to 0.65 N, while a contact in the stretch leaves its own force."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,6 +68,39 @@ class Payload:
             "condition": self.condition, "condition_torque": self.condition_torque, "turned_rad": self.turned,
             "advice": self.advice,
         }  # fmt: skip
+
+
+def refuse_absurd(payload: Payload, noise: float, where: str, stretch: tuple[float, float]) -> None:
+    """Refuse an identified tool that cannot be one.
+
+    Args:
+        payload: as identified; one without a mass is no tool.
+        noise: typical scatter of the force, rms per axis [N].
+        where: the recording's name.
+        stretch: the free air it was identified in [s].
+
+    Raises:
+        InputError: with the figure that is absurd.
+    """
+    if not payload.mass:
+        return
+    lever, left = float(norm(payload.com)), payload.residual_force
+    most = max(LEAST_RESIDUAL, RESIDUAL_RATIO * noise, RESIDUAL_SHARE * 9.81 * payload.mass)
+    tool = f"a tool of {payload.mass:.3g} kg"
+    absurd = [
+        (
+            lever > LONGEST_LEVER,
+            f"{tool} with its centre of mass {lever:.3g} m away, where {LONGEST_LEVER:g} m is the most",
+        ),
+        (payload.mass > LARGEST_MASS, f"{tool}, where {LARGEST_MASS:g} kg is the most"),
+        (left > most, f"{tool} that leaves {left:.3g} N rms unexplained, where {most:.3g} N is the most"),
+    ]
+    if said := [text for wrong, text in absurd if wrong]:
+        raise InputError(
+            where, f"from {stretch[0]:.3g} to {stretch[1]:.3g} s, taken for free air, the wrench looks like {said[0]}",
+            "there is contact in that stretch, or a unit or frame is wrong: name one without contact "
+            "(--free-air FROM,TO), or leave the weight (--no-weight)",
+        )  # fmt: skip
 
 
 class _Solution(NamedTuple):

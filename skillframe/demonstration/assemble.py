@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.demonstration import checks
+from skillframe.demonstration import checks, stalls
 from skillframe.demonstration.columns import (
     CANONICAL,
     KNOWN,
@@ -55,6 +55,7 @@ def assemble(
     rate = options.rate or _meta_rate(source, meta, columns)
     pose = _clocked(select_arm(columns, options.arm), rate, notes)
     zero = -float(pose["t"][0]) if options.zero_time else 0.0  # one shift for both files: their clocks stay together
+    meta = stalls.moved(meta, zero, source)
     pose = _checked_pose(_shifted(pose, zero), options, notes)
     if wrench is not None:
         pose = join(pose, _checked_wrench_file(wrench, options, rate, zero, notes), options, notes)
@@ -162,7 +163,18 @@ def _finish(columns: Columns, meta: dict[str, Any], options: ReadOptions, notes:
     wrench, said, more = to_standard(columns.stack(WRENCH), rotation, declared, meta, source)
     notes = list(dict.fromkeys([*meta.get(NOTES, []), *notes, *more]))
     meta = {**meta, **({"wrench": said} if said else {}), **({NOTES: notes} if notes else {})}
+    meta = _with_stalls(columns, meta)
     return Demonstration(
         time=columns["t"], position=columns.stack(POSITION), quaternion=quaternion, wrench=wrench, meta=meta,
         extra={n: v for n, v in columns.items() if n not in CANONICAL}, source=source,
     )  # fmt: skip
+
+
+def _with_stalls(columns: Columns, meta: dict[str, Any]) -> dict[str, Any]:
+    """Metadata with the stalls of the wrench as recorded: turned into base axes, or smoothed later, it hides them."""
+    pose, wrench = columns.stack((*POSITION, *QUATERNION)), columns.stack(WRENCH)
+    found = stalls.every_stall(columns["t"], pose, wrench, meta, columns.source)
+    return {
+        **{k: v for k, v in meta.items() if k != stalls.KEY},
+        **({stalls.KEY: stalls.as_meta(found)} if found else {}),
+    }

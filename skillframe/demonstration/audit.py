@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skillframe.conditioning.contact import (
     LEVEL_TIME,
@@ -19,10 +20,11 @@ from skillframe.conditioning.contact import (
     contact_strength,
     free_air_level,
 )
-from skillframe.conditioning.noise import LEAST_SAMPLES, NoiseFigures, noise_figures
+from skillframe.conditioning.noise import LEAST_SAMPLES, NoiseFigures, has_window, noise_figures
 from skillframe.demonstration.assemble import NOTES
 from skillframe.demonstration.checks import GAP, angles_between
 from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration.stalls import POSE, alive, as_meta, stalls
 from skillframe.demonstration.suspicions import AUDITS, spike_indices
 from skillframe.frames import Float, norm
 
@@ -53,6 +55,8 @@ class Audit:
         peak_force_n: largest force.
         contact_threshold_n: force above the free-air level that counts as contact.
         contacts: [start, stop, peak] of every contact [s, s, N].
+        stalls: [{what, start, stop}] of every stretch that repeats one value: the wrench, a channel, the pose [s].
+        onsets_unseen: starts of contacts that follow a stall, and so began nobody knows when [s].
         notes: what the reader did.
         warnings: sentences with evidence.
         usable: whether there is anything to learn from.
@@ -76,6 +80,8 @@ class Audit:
     peak_force_n: float
     contact_threshold_n: float
     contacts: list[list[float]]
+    stalls: list[dict[str, Any]]
+    onsets_unseen: list[float]
     notes: list[str]
     warnings: list[str]
     usable: bool
@@ -94,14 +100,21 @@ def audit(demonstration: Demonstration) -> Audit:
     d = demonstration
     step = np.diff(d.time)
     period = float(np.median(step))
-    noise = _noise(d)
-    level = free_air_level(d.time, d.wrench)
-    contacts = contact_intervals(d.time, d.wrench, noise, level)
-    drift = _drift(d, contacts)
+    found = stalls(d)
+    live = alive(d)
+    noise = _noise(d, live)
+    level = free_air_level(d.time[live], d.wrench[live]) if np.any(live) else np.zeros(6)
+    contacts = contact_intervals(d.time, d.wrench, noise, level, live)
+    unseen = [c.start for c in contacts if any(s.what != POSE and 0.0 <= c.start - s.stop < LEVEL_TIME for s in found)]
+    drift = _drift(d, contacts, level, live)
     path, turned = _travel(d)
     usable = path > LEAST_PATH or turned > LEAST_TURN
     warnings = [text for suspicion in AUDITS for text in suspicion(d)]
+    warnings += [f"stall: {stall.words()}: it counts as neither free air, contact nor noise" for stall in found]
     warnings += _wrench_warnings(d, noise, level, drift, contacts)
+    if unseen:
+        at = ", ".join(f"{start:.2f}" for start in unseen)
+        warnings.append(f"contact: from {at} s it follows a stall: when it began, nobody saw")
     if not usable:
         warnings.append(
             f"motion: the tool moves by {path * 1e3:.3f} mm and {np.rad2deg(turned):.3f} degrees: nothing to learn"
@@ -114,17 +127,18 @@ def audit(demonstration: Demonstration) -> Audit:
         bias=level.tolist(), noise=noise.quiet.tolist(), noise_typical=noise.typical.tolist(),
         drift=None if drift is None else drift.tolist(), spikes=len(spike_indices(d.wrench[:, :3])),
         peak_force_n=float(norm(d.wrench[:, :3]).max()),
-        contact_threshold_n=contact_strength(d.time, d.wrench, noise, level)[1],
-        contacts=[list(contact) for contact in contacts], notes=list(d.meta.get(NOTES, [])), warnings=warnings,
+        contact_threshold_n=contact_strength(d.time, d.wrench, noise, level, live)[1],
+        contacts=[list(contact) for contact in contacts], stalls=as_meta(found), onsets_unseen=unseen,
+        notes=list(d.meta.get(NOTES, [])), warnings=warnings,
         usable=usable,
     )  # fmt: skip
 
 
-def _noise(d: Demonstration) -> NoiseFigures:
-    """Noise figures, or zeros where a recording is too short for any."""
-    if len(d) < LEAST_SAMPLES:
+def _noise(d: Demonstration, live: NDArray[np.bool_]) -> NoiseFigures:
+    """Noise figures, or zeros where a recording, or what does not stall of it, is too short for any."""
+    if len(d) < LEAST_SAMPLES or not has_window(d.time, live):
         return NoiseFigures(np.zeros(6), np.zeros(6), float(d.time[0]))
-    return noise_figures(d.time, d.wrench)
+    return noise_figures(d.time, d.wrench, live)
 
 
 def _travel(d: Demonstration) -> tuple[float, float]:
@@ -135,13 +149,14 @@ def _travel(d: Demonstration) -> tuple[float, float]:
     return path, float(angles_between(d.pose.rotation[pick]).sum())
 
 
-def _drift(d: Demonstration, contacts: list[Contact]) -> Float | None:
-    """Change of the free-air level, if the recording ends at rest out of contact."""
+def _drift(d: Demonstration, contacts: list[Contact], level: Float, live: NDArray[np.bool_]) -> Float | None:
+    """Change of the free-air level, if the recording ends at rest out of contact, and no stall is at an end of it."""
+    if not np.all(live[(d.time <= d.time[0] + LEVEL_TIME) | (d.time >= d.time[-1] - LEVEL_TIME)]):
+        return None
     if not contacts or d.time[-1] - contacts[-1].stop < 2.0 * LEVEL_TIME or d.duration < 4.0 * LEVEL_TIME:
         return None
-    first = free_air_level(d.time, d.wrench)
     last = free_air_level(d.time, d.wrench, (float(d.time[-1]) - LEVEL_TIME, float(d.time[-1])))
-    return last - first
+    return last - level
 
 
 def _wrench_warnings(

@@ -13,9 +13,11 @@ from skillframe.demonstration.checks import GAP
 from skillframe.demonstration.columns import WRENCH
 from skillframe.demonstration.contradiction import WORK_COSINE, Turning, weight_evidence, work_cosine
 from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration.stalls import alive
 from skillframe.frames import Float, norm
 
 Suspicion = Callable[[Demonstration], Iterator[str]]
+HELD_LEAST = 10  # steps of a held pose from which its rate is told
 FARTHEST, FASTEST = 20.0, 10.0
 PAST_HALF = 0.05  # of the scalar part, 6 degrees beyond half a turn: less is no change of sign that means anything
 LARGEST_FORCE, LONGEST_LEVER = 2e4, 3.0
@@ -102,9 +104,24 @@ def channels(d: Demonstration) -> Iterator[str]:
             moves = np.any(d.wrench[:, i] != d.wrench[0, i])
             if moves and np.array_equal(d.wrench[:, i], d.wrench[:, j]):
                 yield f"{WRENCH[i]} and {WRENCH[j]} are identical: was a column pasted twice?"
-    held = float(np.mean(np.all(d.wrench[1:] == d.wrench[:-1], axis=1)))
+    live = alive(d)
+    both = live[1:] & live[:-1]
+    if not np.any(both):
+        return
+    held = float(np.mean(np.all(d.wrench[1:] == d.wrench[:-1], axis=1)[both]))
     if held > 0.5:
         yield f"wrench: {held:.0%} of the samples repeat the one before: its rate is about {d.rate * (1 - held):.3g} Hz"
+
+
+def held_pose(d: Demonstration) -> Iterator[str]:
+    """A pose that moves in steps of the same length: it was recorded slower than the rest, which a pause is not."""
+    pose = np.concatenate([d.position, d.quaternion], axis=1)
+    starts = np.flatnonzero(np.any(pose[1:] != pose[:-1], axis=1)) + 1
+    if len(starts) < HELD_LEAST:
+        return
+    runs = np.diff(starts)
+    if np.quantile(runs, 0.1) >= 2.0:
+        yield f"pose: moves every {np.median(runs):.0f} samples only: its rate is about {d.rate / runs.mean():.3g} Hz"
 
 
 def magnitudes(d: Demonstration) -> Iterator[str]:
@@ -163,4 +180,4 @@ def frame_and_sign(d: Demonstration) -> Iterator[str]:
         )
 
 
-AUDITS: Sequence[Suspicion] = (clock, quaternions, motion, channels, magnitudes, spikes, frame_and_sign)
+AUDITS: Sequence[Suspicion] = (clock, quaternions, motion, held_pose, channels, magnitudes, spikes, frame_and_sign)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -109,3 +110,41 @@ def test_orientation_and_wrench_on_their_own_microsecond_clocks_are_joined() -> 
 def test_tables_that_hold_no_demonstration_are_refused(name: str) -> None:
     with pytest.raises(InputError, match="no "):
         read_demonstration(folder("formats") / name, rate=100.0)
+
+
+def every_recording() -> dict[str, Demonstration]:
+    """All that hold a pose and a wrench, as their makers stated them."""
+    found = {
+        f"hiro {trial} {file}": hiro(trial, file) for trial in TRIALS for file in ("worldforce.dat", "R_Torques.dat")
+    }
+    for name in ("rim0", "rim1", "rim2"):
+        found[name] = read_demonstration(folder("icsc_wiping") / f"{name}.csv", columns=WIPING)
+    names = WIPING.split(",")[1:]
+    columns = ",".join([*(f"active_{n}" for n in names), *(f"passive_{n}" for n in names), "label"])
+    for arm in ("active", "passive"):
+        path = folder("icsc_peeling") / "recording2.csv"
+        found[f"peeling {arm}"] = read_demonstration(path, columns=columns, arm=arm, rate=100.0)
+    place = folder("kuka_ati")
+    for frame in ("tool", "base"):
+        found[f"kuka in {frame} axes"] = read_demonstration(
+            place / "1-baseline_orientations.csv", wrench=place / "1-baseline_wrench.csv", units="us",
+            position="0,0,0", wrench_frame="tool" if frame == "tool" else None, zero_time=True,
+        )  # fmt: skip
+    return found
+
+
+def test_no_real_recording_is_said_to_stall() -> None:
+    said = {name: audit(demo).as_json()["stalls"] for name, demo in every_recording().items()}
+    assert len(said) == 13
+    assert not any(said.values()), said
+
+
+@pytest.mark.parametrize(("start", "length"), [(0.0, 0.3), (0.0, 0.4), (0.3, 0.1), (0.55, 0.07), (0.6, 0.3)])
+def test_a_stall_planted_anywhere_in_a_real_recording_is_found(start: float, length: float) -> None:
+    for name, demo in every_recording().items():
+        first, last = (int(share * (len(demo) - 1)) for share in (start, start + length))
+        wrench = demo.wrench.copy()
+        wrench[first : last + 1] = wrench[first]
+        found = audit(replace(demo, wrench=wrench)).as_json()["stalls"]
+        expected = [("wrench", float(demo.time[first]), float(demo.time[last]))]
+        assert [(s["what"], s["start"], s["stop"]) for s in found] == expected, name

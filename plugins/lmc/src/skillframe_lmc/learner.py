@@ -24,6 +24,7 @@ import numpy as np
 
 from skillframe.config import build
 from skillframe.demonstration.record import Demonstration, resolve_point
+from skillframe.demonstration.together import common_frames
 from skillframe.errors import InputError
 from skillframe.frames import Float, norm, unit
 from skillframe.records import Document, LearnOptions
@@ -40,7 +41,6 @@ from skillframe_lmc.work import Work, work
 
 Name = Literal["translation", "rotation"]
 FEWEST_INTERVALS = 3  # fewer say nothing about an intersection
-SAME_POINT_M = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,11 +106,9 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
 
 
 def _frame(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
-    if not demonstrations:
-        raise InputError("learn", "no demonstration given", "name at least one file")
+    frames = common_frames(demonstrations)
     if options.axes not in ("base", "phase_start"):
         raise InputError("--axes", f"{options.axes!r} is neither base nor phase_start", "choose one of the two")
-    frames = _common_frames(demonstrations)
     at = resolve_point(options.at, frames)
     hand = _hand(demonstrations[0], options, frames)
     point = at.tolist()
@@ -131,21 +129,6 @@ def _hand(demonstration: Demonstration, options: LearnOptions, frames: dict[str,
     if isinstance(own, str):
         return resolve_point(own, frames, f"{demonstration.source or 'demonstration'}: hand")
     return None if own is None else np.array(own, dtype=float).reshape(3)
-
-
-def _common_frames(demonstrations: Sequence[Demonstration]) -> dict[str, list[float]]:
-    """Named points of the tool, which all demonstrations must share."""
-    frames: dict[str, list[float]] = {}
-    for demonstration in demonstrations:
-        for name, point in demonstration.meta.get("frames", {}).items():
-            values = np.array(point, dtype=float).reshape(3)
-            if norm(values - frames.setdefault(name, values.tolist())) > SAME_POINT_M:
-                raise InputError(
-                    demonstration.source or "demonstration",
-                    f"has its point {name!r} at {values.tolist()}, another demonstration at {frames[name]}",
-                    "learn from demonstrations of one tool",
-                )
-    return frames
 
 
 def _learn_part(

@@ -10,6 +10,7 @@ import numpy as np
 
 from skillframe.config import build
 from skillframe.demonstration.record import Demonstration, resolve_point
+from skillframe.demonstration.together import common_frames
 from skillframe.errors import InputError
 from skillframe.frames import Float, norm
 from skillframe.records import Document, LearnOptions
@@ -93,11 +94,9 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions, kind: 
 
 def _frame(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
     """The points of the contract; a search takes no work anywhere, so that `work_at` is for the record only."""
-    if not demonstrations:
-        raise InputError("learn", "no demonstration given", "name at least one file")
+    frames = common_frames(demonstrations)
     if options.axes not in AXES:
         raise InputError("--axes", f"{options.axes!r} is neither base nor phase_start", "choose one of the two")
-    frames = demonstrations[0].meta.get("frames", {})
     at = resolve_point(options.at, frames).tolist()
     hand = options.hand or demonstrations[0].meta.get("hand")
     return {

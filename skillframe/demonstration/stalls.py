@@ -1,0 +1,225 @@
+r"""Stalls: stretches in which a sensor or a pose repeats one value bit for bit although the world went on.
+
+A live sensor has noise, so that all six channels cannot repeat for long. What may repeat, and is no stall:
+
+- a recorder faster than its sensor: runs of a typical length. A stall is ten times longer than nine in ten runs of the
+  same file, and at least 0.25 s: the stretch that free air and noise are judged over;
+- a simulation without noise, or a closed form: where the rest of the file has no white noise (1 mN), nothing tells a
+  held value from a constant force, and nothing is said;
+- exactly zero in every channel: what a simulation or a sensor with a dead zone reads in free air;
+- a sensor that resolves less than its noise (resolution q, the least difference of two values). A held value within
+  2 q of the levels before and after it says nothing false. Where q exceeds 0.3 of the noise of the rest, which may be
+  ten times that at rest, one of the two levels is enough, and a hold at an end of the file is believed;
+- a recording said to be without contact (`contact = false`).
+
+A single channel stalls if it does so for 1 s while others change, for a reader may well turn one off. A pose may stand
+still as long as it likes: a stall ends in a jump, five times the step that 95 % stay below, and at least 0.5 mm or 0.2
+degrees. A stall that the metadata name (`stalls`) is kept, because a smoothed wrench no longer shows it. All of these
+numbers are our choice; on the recordings of four rigs at hand the longest honest run is 0.05 s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.demonstration.columns import WRENCH
+from skillframe.demonstration.record import Demonstration
+from skillframe.errors import InputError
+from skillframe.frames import Float, matrix_from_quaternion, norm, rotation_vector
+
+KEY = "stalls"
+"""Metadata key of stalls found when the recording was first read: [{what, start, stop}] [s]."""
+POSE = "pose"
+LEAST_TIME, LEAST_TIME_CHANNEL, TYPICAL_RUNS, RUN_QUANTILE = 0.25, 1.0, 10.0, 0.9
+LEAST_NOISE, LEAST_LIVE, LEVEL_TIME = 1e-3, 20, 0.25
+STEPS, COARSE = 2.0, 0.3
+JUMP_RATIO, JUMP_QUANTILE, LEAST_JUMP, LEAST_JUMP_TURN = 5.0, 0.95, 5e-4, np.deg2rad(0.2)
+
+
+class Stall(NamedTuple):
+    """One stretch that repeats a value.
+
+    Attributes:
+        what: "wrench", one of its channels (fx ... tz), or "pose".
+        start, stop: first and last sample that repeat it [s].
+    """
+
+    what: str
+    start: float
+    stop: float
+
+    def words(self) -> str:
+        """As a sentence says it."""
+        return f"the {self.what} repeats one value bit for bit from {self.start:.2f} to {self.stop:.2f} s"
+
+
+def stalls(demonstration: Demonstration) -> list[Stall]:
+    """Every stall of a demonstration, by start: those that its metadata name, and those that its samples show."""
+    d = demonstration
+    return every_stall(d.time, np.concatenate([d.position, d.quaternion], axis=1), d.wrench, d.meta, d.source)
+
+
+def every_stall(time: Float, pose: Float, wrench: Float, meta: Mapping[str, Any], source: str = "") -> list[Stall]:
+    """Stalls that metadata name and stalls that samples show; arguments as `find`."""
+    known = kept_stalls(meta, source)
+    shown = find(time, pose, wrench, meta)
+    known += [s for s in shown if not any(k.what == s.what and k.start <= s.stop and s.start <= k.stop for k in known)]
+    return sorted((s for s in known if s.stop > time[0] and s.start < time[-1]), key=lambda s: (s.start, s.what))
+
+
+def kept_stalls(meta: Mapping[str, Any], source: str = "") -> list[Stall]:
+    """The stalls that metadata name.
+
+    Raises:
+        InputError: they are not a list of {what, start, stop}.
+    """
+    try:
+        result = [Stall(str(s["what"]), float(s["start"]), float(s["stop"])) for s in meta.get(KEY, [])]
+    except (TypeError, KeyError, ValueError):
+        raise InputError(
+            f"{source or 'metadata'}: {KEY}", f"is no list of stalls: {meta[KEY]!r}",
+            "give [{what, start, stop}] with what = wrench, a channel or pose, and times in seconds",
+        ) from None  # fmt: skip
+    for stall in result:
+        if stall.what not in ("wrench", POSE, *WRENCH) or not stall.start <= stall.stop:
+            raise InputError(f"{source or 'metadata'}: {KEY}", f"holds {stall}", "give what, start <= stop")
+    return result
+
+
+def moved(meta: Mapping[str, Any], seconds: float, source: str = "") -> dict[str, Any]:
+    """Metadata whose stalls are moved with the clock."""
+    found = [Stall(s.what, s.start + seconds, s.stop + seconds) for s in kept_stalls(meta, source)]
+    return {**meta, KEY: as_meta(found)} if found else dict(meta)
+
+
+def as_meta(found: Sequence[Stall]) -> list[dict[str, Any]]:
+    """Plain values for metadata and `--json`."""
+    return [stall._asdict() for stall in found]
+
+
+def alive(demonstration: Demonstration) -> NDArray[np.bool_]:
+    """Mask (T,) of samples whose wrench is no stall's."""
+    time = demonstration.time
+    mask = np.ones(len(time), dtype=bool)
+    for stall in stalls(demonstration):
+        if stall.what != POSE:
+            mask &= (time < stall.start) | (time > stall.stop)
+    return mask
+
+
+def find(time: Float, pose: Float, wrench: Float, meta: Mapping[str, Any]) -> list[Stall]:
+    """Stalls that samples show.
+
+    Args:
+        time: (T,) [s].
+        pose: (T, 7) position and quaternion.
+        wrench: (T, 6) as the sensor gave it: a constant wrench in tool axes is none in base axes.
+        meta: `contact`, and channels that nobody measured.
+    """
+    result = [Stall(POSE, *_span(time, run)) for run in _long(time, pose, LEAST_TIME) if _jumps(pose, run)]
+    if meta.get("contact") is False:
+        return result
+    whole = _held(time, wrench, LEAST_TIME)
+    result += [Stall("wrench", *_span(time, run)) for run in whole]
+    free = np.ones(len(time), dtype=bool)
+    for first, last in whole:
+        free[first : last + 1] = False
+    for i, name in enumerate(WRENCH):
+        runs = _held(time, wrench[:, i : i + 1], LEAST_TIME_CHANNEL)
+        result += [Stall(name, *_span(time, (a, b))) for a, b in runs if free[a : b + 1].all()]
+    return sorted(result, key=lambda s: (s.start, s.what))
+
+
+def _span(time: Float, run: tuple[int, int]) -> tuple[float, float]:
+    return float(time[run[0]]), float(time[run[1]])
+
+
+def _starts(values: Float) -> NDArray[np.intp]:
+    """Where a new value begins, the first sample included."""
+    changes = np.any(values[1:] != values[:-1], axis=1)
+    return np.concatenate([[0], np.flatnonzero(changes) + 1])
+
+
+def _long(time: Float, values: Float, least: float) -> list[tuple[int, int]]:
+    """First and last sample of every run that is long for the file."""
+    starts = _starts(values)
+    if len(starts) < LEAST_LIVE:
+        return []
+    ends = np.append(starts[1:], len(time)) - 1
+    period = float(np.median(np.diff(time)))
+    held = time[ends] - time[starts]
+    limit = max(least, TYPICAL_RUNS * (float(np.quantile(held, RUN_QUANTILE)) + period))
+    return [(int(starts[k]), int(ends[k])) for k in np.flatnonzero(held >= limit)]
+
+
+def _held(time: Float, values: Float, least: float) -> list[tuple[int, int]]:
+    """Long runs of a sensor's values (T, n) that neither a simulation nor its resolution explains."""
+    runs = [run for run in _long(time, values, least) if np.any(values[run[0]])]
+    if not runs:
+        return []
+    fresh = values[_starts(values)]
+    second = fresh[2:] - 2.0 * fresh[1:-1] + fresh[:-2]
+    noise = np.median(np.abs(second), axis=0) / (0.6745 * np.sqrt(6.0))
+    if not np.any(noise > LEAST_NOISE):
+        return []
+    step = np.array([_resolution(column) for column in fresh.T])
+    return [run for run in runs if not _resolved(time, values, run, step, noise)]
+
+
+def _resolution(values: Float) -> float:
+    """The least difference of two values; infinite where there is one only."""
+    apart = np.diff(np.unique(values))
+    return float(apart.min()) if apart.size else np.inf
+
+
+def _resolved(time: Float, values: Float, run: tuple[int, int], step: Float, noise: Float) -> bool:
+    """Whether the sensor's resolution explains a run."""
+    first, last = run
+    before = values[(time >= time[first] - LEVEL_TIME) & (time < time[first])]
+    after = values[(time > time[last]) & (time <= time[last] + LEVEL_TIME)]
+    near = [np.abs(np.median(side, axis=0) - values[first]) <= STEPS * step for side in (before, after) if len(side)]
+    coarse = step >= COARSE * noise
+    every, some = np.all(near, axis=0), np.any(near, axis=0) | (len(near) < 2)
+    return bool(np.all(every | (coarse & some)))
+
+
+def _jumps(pose: Float, run: tuple[int, int]) -> bool:
+    """Whether a pose that stood still jumps at the end of it."""
+    fresh = pose[_starts(pose)]
+    if run[1] + 1 >= len(pose):
+        return False
+    moved, turned = _steps(fresh)
+    (leap,), (turn,) = _steps(pose[run[1] : run[1] + 2])
+    most = JUMP_RATIO * np.quantile(moved, JUMP_QUANTILE), JUMP_RATIO * np.quantile(turned, JUMP_QUANTILE)
+    return bool(leap > max(LEAST_JUMP, most[0]) or turn > max(LEAST_JUMP_TURN, most[1]))
+
+
+def _steps(pose: Float) -> tuple[Float, Float]:
+    """Distance [m] and angle [rad] from each sample (T, 7) to the next."""
+    rotation = matrix_from_quaternion(pose[:, 3:])
+    return norm(np.diff(pose[:, :3], axis=0)), norm(rotation_vector(np.swapaxes(rotation[:-1], -1, -2) @ rotation[1:]))
+
+
+def refuse_stalls(demonstration: Demonstration) -> None:
+    """Refuse to learn from a demonstration that stalls, with the line that cuts the stall off.
+
+    Raises:
+        InputError: with the stall's times, and the longer part beside it.
+    """
+    found = stalls(demonstration)
+    if not found:
+        return
+    d, first = demonstration, found[0]
+    before, after = first.start - float(d.time[0]), float(d.time[-1]) - first.stop
+    step = 1.0 / d.rate  # one sample beyond the stall
+    part = f"--to {first.start - step:.3f}" if before > after else f"--from {first.stop + step:.3f}"
+    name = d.source or "demonstration"
+    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+    raise InputError(
+        name, f"{first.words()}{more}: what happened then was not recorded, so nothing can be learned from it",
+        f"cut it off (skillframe demonstration convert {name} {part} --out cut.npz), or record it again",
+    )  # fmt: skip
