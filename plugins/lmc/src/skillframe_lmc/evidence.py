@@ -24,6 +24,7 @@ OPEN_HALF_WIDTH = radians(20.0)
 ONE_SIDED = 0.8  # |sum| / sum of |.| of the sideways means: 1 if all lean the same way, 0 if they balance
 LEANING = 0.15  # a sideways mean below this is wandering
 MOST_DRAWN = 30
+ONE_WAY, CONTRADICTS = radians(10.0), radians(20.0)  # mean ways this near each other; a push this far from them all
 
 
 def of(part: Learned, settings: Settings) -> dict[str, Any]:
@@ -69,8 +70,19 @@ def _message(part: Learned, settings: Settings, open_direction: bool) -> str:
     return _direction_message(part, settings, open_direction)
 
 
+def _press_message(part: Learned) -> str:
+    """That the standing force decided, and not the way to it."""
+    force, seconds = np.median([p.force for p in part.pressed]), np.median([p.seconds for p in part.pressed])
+    return (
+        f"the way there gives no direction: the push is that of the {force:.0f} N under which the tool stood for "
+        f"{seconds:.1f} s"
+    )
+
+
 def _direction_message(part: Learned, settings: Settings, open_direction: bool) -> str:
     choice = part.choice
+    if part.pressed:
+        return _press_message(part)
     if choice is None:
         return "too few intervals in which the teacher did the work to find a direction"
     if choice.direction is None:
@@ -82,7 +94,21 @@ def _direction_message(part: Learned, settings: Settings, open_direction: bool) 
             f"{degrees(choice.half_width):.0f} degrees to either side, explains what was seen; record another "
             "demonstration from the other side"
         )
-    return ""
+    return _contradiction(part, choice.direction)
+
+
+def _contradiction(part: Learned, direction: Float) -> str:
+    """A doubt where two or more demonstrations all went one way and the push is another."""
+    ways = unit(part.means)
+    mean = unit(ways.mean(axis=0))
+    apart, off = (np.arccos(np.clip(x, -1.0, 1.0)) for x in ((ways @ mean).min(), float(direction @ mean)))
+    if len(ways) < 2 or apart > ONE_WAY or off < CONTRADICTS:
+        return ""
+    return (
+        f"doubtful: all demonstrations went one way, within {degrees(apart):.0f} degrees, and the {_push(part)} is "
+        f"{degrees(off):.0f} degrees off it; look whether the wrench holds a force in the air (skillframe "
+        "demonstration check), or record a demonstration from the other side"
+    )
 
 
 def _no_direction_message(part: Learned, choice: Choice, settings: Settings) -> str:

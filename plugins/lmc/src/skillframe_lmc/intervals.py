@@ -210,7 +210,7 @@ def _motion(
 ) -> Motion:  # fmt: skip
     between = 0.5 * (load[1:] + load[:-1])
     elapsed = np.diff(blocks.time)
-    moving = _moving(fine, elapsed)
+    moving = moving_blocks(fine, elapsed)
     mean = _mean_between(between, moving, knots)
     work = _sum_between((between * fine).sum(-1, keepdims=True), knots)[:, 0]
     samples = max(float(np.median(_sum_between(blocks.samples[1:, None], knots))), 1.0) if len(knots) > 1 else 1.0
@@ -224,7 +224,7 @@ def _motion(
     return Motion(whole, mean, work, load_min, float(distance.max()), path, duration)
 
 
-def _moving(fine: Float, elapsed: Float) -> Float:
+def moving_blocks(fine: Float, elapsed: Float) -> Float:
     """1 where the tool moves, 0 where it stands still: its speed over 0.1 s against that of half of the path."""
     place = np.concatenate([np.zeros((1, 3)), np.cumsum(fine, axis=0)])
     clock = np.concatenate([[0.0], np.cumsum(elapsed)])

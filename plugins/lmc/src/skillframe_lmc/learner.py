@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from math import radians
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -35,6 +35,7 @@ from skillframe_lmc.gains import gains
 from skillframe_lmc.heading import heading
 from skillframe_lmc.intervals import Motion, Track
 from skillframe_lmc.phase import Stop
+from skillframe_lmc.press import Press, presses
 from skillframe_lmc.sectors import Sectors, sectors
 from skillframe_lmc.settings import Settings
 from skillframe_lmc.work import Work, work
@@ -57,6 +58,7 @@ class Learned:
         axes: compliant axes; None if held or fully compliant.
         means: (n, 3) mean directions, a row for each that moved.
         speed: mean demonstrated speed, without the pauses [m/s or rad/s].
+        pressed: the standing force of each demonstration, where it decided; empty where the motion did.
     """
 
     name: Name
@@ -68,6 +70,7 @@ class Learned:
     axes: CompliantAxes | None
     means: Float
     speed: float
+    pressed: Sequence[Press] = ()
 
     @property
     def held(self) -> bool:
@@ -146,13 +149,56 @@ def _learn_part(
         given = [sectors(m, teacher_driven_only=name == "rotation") for m in moving]
         if all(len(g.contact) >= min(FEWEST_INTERVALS, len(m.work)) for g, m in zip(given, moving, strict=True)):
             choice = choose(given, settings, heading(moving))
+    stood = _standing(name, tracks, motions, moving, settings) if choice is None or choice.direction is None else None
+    if stood is not None:
+        done, given, choice = stood.work, [p.sectors for p in stood.presses], stood.choice
+    if done is not None and not done.environment_drove:
         direction = None if choice is None else choice.direction
-        axes = compliant_axes(means, direction, _straightness(name, moving, means, choice, settings))
+        rows = means if stood is None else stood.means(least)
+        axes = compliant_axes(rows, direction, _straightness(name, moving, means, choice, settings))
     path, time = sum(m.path for m in moving), sum(m.duration for m in moving)
     return Learned(
         name=name, motions=motions, moving=moving, given=given, work=done, choice=choice, axes=axes, means=means,
-        speed=path / time if time > 0.0 else 0.0,
+        speed=path / time if time > 0.0 else 0.0, pressed=() if stood is None else stood.presses,
     )  # fmt: skip
+
+
+class _Standing(NamedTuple):
+    """What was decided by standing force: see `press`."""
+
+    presses: list[Press]
+    work: Work
+    choice: Choice
+
+    def means(self, least: float) -> Float:
+        """Mean directions (n, 3) of the motions in contact that are long enough to be motions [m]."""
+        touched = [p.motion.displacement for p in self.presses]
+        return np.array([unit(d).mean(axis=0) for d in touched if norm(d).sum() >= least]).reshape(-1, 3)
+
+
+def _standing(
+    name: Name, tracks: Sequence[Track], motions: Sequence[Motion], moving: Sequence[Motion], settings: Settings
+) -> _Standing | None:
+    """What the standing force says where the motion alone gives no direction; None unless all were pressed.
+
+    Raises:
+        InputError: they were pressed along their way, and no push explains it: what is left is a skill that gives way
+            along the one motion there was.
+    """
+    if name == "rotation" or len(moving) != len(motions) or (found := presses(tracks, motions)) is None:
+        return None
+    done = work([p.motion for p in found])
+    if done.environment_drove:
+        return None
+    choice = choose([p.sectors for p in found], settings, heading(moving))
+    if choice.direction is None:
+        force = np.median([p.force for p in found])
+        raise InputError(
+            "learn", f"the tool was pressed with {force:.0f} N where it stood, along the way it had come, and no one "
+            f"push explains it (the hand would have had to waver by {np.degrees(choice.pyramid_angle):.0f} degrees)",
+            "cut the recordings into phases (skillframe segment), or demonstrate the press the same way each time",
+        )  # fmt: skip
+    return _Standing(found, done, choice)
 
 
 def _straightness(
@@ -198,6 +244,8 @@ def _speeds(translation: Learned, rotation: Learned, pitch: float | None, settin
 
 def _lead(part: Learned, least: float) -> float:
     """Largest push: what the teacher needed (90th percentile in contact), if that is more than the default."""
+    if part.pressed:
+        least = max(least, float(np.median([p.force for p in part.pressed])))
     loads = np.concatenate([norm(m.load)[norm(m.load) >= m.load_min] for m in part.motions])
     return max(least, float(np.percentile(loads, 90))) if part.direction is not None and len(loads) else least
 

@@ -1,0 +1,87 @@
+r"""Standing force: what a tool that stands while it is pushed says of the push.
+
+Intervals are cut by path, so that a press - a way through the air, then a force on a surface that does not give way -
+has no interval in contact, and the way alone would decide. The sector between the motion v and the push -F of an
+interval (`sectors`) has an equation at v -> 0 too: nothing moves for any push within the friction cone about the
+normal, and what the teacher exerted is -F itself. A standing stretch therefore votes with the sector of no width,
+
+    v := -F / |F|,        angle(D, v) <= alpha + beta,
+
+once for each 0.1 s. A demonstration was pressed if, beyond half of its excursion, the tool stood for 0.5 s in all under
+a force of twice what it met on its way (and at least what counts as contact), within 45 degrees of the way's chord.
+Its motion then votes only where it met as much, and half of the standing force: what a wrench reads in the air -
+inertia, what is left of the weight, a teacher's grip - is no contact and says nothing of a sector. Nor did the
+environment turn the tool aside where it did not touch, so that compliant axes come from the motion in contact, if it is
+long enough to be a motion. All of these figures are our choice.
+
+Standing force is asked only where the motion alone gives no direction, and only if every demonstration was pressed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import cos, radians
+from typing import NamedTuple
+
+import numpy as np
+
+from skillframe.frames import Float, norm, unit
+from skillframe_lmc.intervals import BLOCK_S, Motion, Track, moving_blocks, touching
+from skillframe_lmc.sectors import Sectors, sectors
+
+LEAST_STANDING, VOTE_S = 0.5, 0.1  # s
+HARDER, IN_CONTACT = 2.0, 0.5  # against the way's median force; share of the standing force
+ALONG = cos(radians(45.0))
+
+
+class Press(NamedTuple):
+    """One demonstration's standing force.
+
+    Attributes:
+        votes: (K, 3) unit directions of the teacher's push, one for each 0.1 s.
+        force: median strength [N].
+        seconds: how long the tool stood under it.
+        motion: the demonstration's motion, its intervals in contact only.
+    """
+
+    votes: Float
+    force: float
+    seconds: float
+    motion: Motion
+
+    @property
+    def sectors(self) -> Sectors:
+        """The sectors of the motion in contact, and those of the standing force, which have no width."""
+        moved = sectors(self.motion)
+        none = np.zeros(len(self.votes))
+        return Sectors(
+            np.concatenate([moved.motion, self.votes]), np.concatenate([moved.push, 0.0 * self.votes]),
+            np.concatenate([moved.contact, none > 0.0]),
+        )  # fmt: skip
+
+
+def presses(tracks: Sequence[Track], motions: Sequence[Motion]) -> list[Press] | None:
+    """The standing force of every demonstration, or None if one was not pressed."""
+    found = [press(track, motion) for track, motion in zip(tracks, motions, strict=True)]
+    return [p for p in found if p is not None] if found and all(p is not None for p in found) else None
+
+
+def press(track: Track, motion: Motion) -> Press | None:
+    """The standing force of one demonstration; None if it was not pressed."""
+    away = norm(track.position - track.position[0])
+    moves = np.append(moving_blocks(np.diff(track.position, axis=0), np.diff(track.time)), 0.0) > 0.0
+    strength = norm(track.force)
+    way = strength[moves]
+    least = max(motion.load_min, HARDER * float(np.median(way))) if len(way) else np.inf
+    standing = np.flatnonzero(~moves & (away > 0.5 * motion.excursion) & (strength >= least))
+    size = round(VOTE_S / BLOCK_S)
+    count = len(standing) // size
+    if count * VOTE_S < LEAST_STANDING:
+        return None
+    votes = -unit(track.force[standing[: count * size]].reshape(count, size, 3).mean(axis=1))
+    chord = unit(track.position[standing[0]] - track.position[0])
+    if unit(votes.mean(axis=0)) @ chord < ALONG:
+        return None
+    force = float(np.median(strength[standing]))
+    contact = touching(motion._replace(load_min=max(least, IN_CONTACT * force)))
+    return Press(votes, force, count * VOTE_S, contact)

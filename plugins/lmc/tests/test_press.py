@@ -1,0 +1,146 @@
+"""A press - a way through the air, then a force on a surface that does not give way - is learned as a push."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from skillframe_lmc.describe import describe
+from skillframe_lmc.learner import learn
+from synthetic import valley
+
+from skillframe.cli.main import run
+from skillframe.demonstration.files import write_demonstration
+from skillframe.demonstration.record import Demonstration
+from skillframe.errors import InputError
+from skillframe.frames import Float, cross, unit
+from skillframe.records import Document, LearnOptions
+
+RATE, SPEED = 200.0, 0.08
+
+
+def wander(rng: np.random.Generator, sigma: float, tau: float, count: int, width: int) -> Float:
+    """Ornstein-Uhlenbeck noise (count, width)."""
+    step, result = 1.0 / RATE, np.zeros((count, width))
+    result[0] = sigma * rng.normal(size=width)
+    for k in range(1, count):
+        result[k] = result[k - 1] * (1.0 - step / tau) + sigma * np.sqrt(2.0 * step / tau) * rng.normal(size=width)
+    return result
+
+
+def press(
+    seed: int, direction: Sequence[float] = (0.0, 0.0, -1.0), *, force: float = 40.0, length: float = 0.24,
+    aim: float = 7.0, residual: float = 2.0, hold: float = 4.0, turn: float = 0.0,
+) -> Demonstration:  # fmt: skip
+    """A person's press: a way whose aim wanders [degrees], then a force within 5 degrees of the direction.
+
+    In the air the wrench reads a residual [N per axis] that wanders over 0.3 s, as gravity and inertia leave one.
+    `turn` lets the standing force turn to and fro by that angle [degrees].
+    """
+    rng = np.random.default_rng([31, seed])
+    d = unit(np.array(direction, dtype=float))
+    a = unit(cross(d, np.array([1.0, 0.0, 0.3])))
+    b = cross(d, a)
+    count, stand = int(length / SPEED * RATE), int(hold * RATE)
+    off = wander(rng, np.radians(aim), 0.5, count, 2)
+    heading = unit(d + off[:, :1] * a + off[:, 1:] * b)
+    profile = np.sin(np.pi * (np.arange(count) + 0.5) / count) * np.pi / 2.0
+    way = np.cumsum(heading * (SPEED / RATE * profile)[:, None], axis=0)
+    position = np.concatenate([way, np.repeat(way[-1:], stand, axis=0)]) + np.array([0.4, 0.1, 0.5])
+    ramp = np.clip((np.arange(count + stand) - count) / (0.2 * RATE), 0.0, 1.0)[:, None]
+    tilt = np.radians(5.0) * rng.normal(size=2)
+    swing = np.radians(turn) * np.sin(np.pi * np.arange(count + stand) / RATE)[:, None]
+    pushed = unit(d + (tilt[0] + swing) * a + tilt[1] * b)
+    wrench = np.zeros((count + stand, 6))
+    wrench[:, :3] = wander(rng, residual, 0.3, count + stand, 3) * (1.0 - 0.5 * ramp) - force * ramp * pushed
+    wrench += rng.normal(size=wrench.shape) * np.repeat([0.1, 0.005], 3)
+    position = position + 4e-4 * ramp * d + 1e-5 * rng.normal(size=position.shape)
+    quaternion = np.tile([1.0, 0.0, 0.0, 0.0], (len(position), 1))
+    return Demonstration(time=np.arange(len(position)) / RATE, position=position, quaternion=quaternion, wrench=wrench)
+
+
+def translation(documents: Document) -> Document:
+    part: Document = documents["phases"][0]["translation"]
+    return part
+
+
+def off(part: Document, direction: Sequence[float]) -> float:
+    """Between the learned and the true direction [degrees]."""
+    return float(np.degrees(np.arccos(np.clip(unit(np.array(direction)) @ np.array(part["desired_direction"]), -1, 1))))
+
+
+CASES = {
+    "down": {}, "sideways": {"direction": (1.0, 0.2, 0.0)}, "aslant": {"direction": (0.3, 0.0, -1.0)},
+    "up": {"direction": (0.0, 0.1, 1.0)}, "15 N": {"force": 15.0}, "100 N": {"force": 100.0},
+    "a shaky hand": {"aim": 12.0}, "a short way": {"length": 0.06}, "1 s": {"hold": 1.0},
+    "little in the air": {"residual": 0.3},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("count", [1, 3])
+@pytest.mark.parametrize("case", CASES)
+def test_a_press_is_a_push_and_no_limpness_along_it(case: str, count: int) -> None:
+    true = CASES[case].get("direction", (0.0, 0.0, -1.0))
+    for seed in range(4):
+        document = learn([press(10 * seed + i, **CASES[case]) for i in range(count)], LearnOptions())  # type: ignore[arg-type]
+        part = translation(document)
+        assert part["desired_direction"] is not None, describe(document)
+        # where the way alone decides, one wandering way is all there is; past 45 degrees it would slide, not press
+        assert off(part, true) < 45.0
+        along = [abs(np.array(axis) @ unit(np.array(true))) for axis in part["compliant_axes"]]
+        assert not part["fully_compliant"]
+        assert max(along, default=0.0) < np.sin(np.radians(45.0))
+
+
+def undecided(count: int, **made: float) -> list[list[Demonstration]]:
+    """Groups of presses of which the way alone gives no direction: by the sensor's word in the air it is free."""
+    groups = [[press(100 * s + i, aim=14.0, residual=3.0, **made) for i in range(count)] for s in range(8)]  # type: ignore[arg-type]
+    said = [learn(group, LearnOptions()) for group in groups]
+    return [g for g, d in zip(groups, said, strict=True) if "stood for" in translation(d)["evidence"]["message"]]
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_where_the_way_gives_no_direction_the_standing_force_does_and_says_so(count: int) -> None:
+    groups = undecided(count)
+    assert len(groups) >= 3
+    for group in groups:
+        document = learn(group, LearnOptions())
+        # each force is within 5 degrees per axis of the press: the worst of a few lies within 15
+        assert off(translation(document), (0.0, 0.0, -1.0)) < 15.0
+        assert re.search(r"N under which the tool stood for 3\.[789] s", " ".join(describe(document)))
+        assert document["phases"][0]["stop"]["lead_force_n"] == pytest.approx(40.0, abs=3.0)  # what the teacher exerted
+        assert translation(document)["compliant_axes"] == []
+
+
+def test_a_standing_force_that_no_one_push_explains_is_refused_and_not_learned_as_limpness() -> None:
+    group = [press(s, aim=20.0, residual=3.0, turn=70.0, length=0.1) for s in range(3)]
+    with pytest.raises(InputError, match=r"was pressed with \d+ N where it stood.* no one push explains it"):
+        learn(group, LearnOptions())
+
+
+def test_a_valley_does_not_ask_the_standing_force() -> None:
+    assert "stood" not in translation(learn(valley(45.0, 0.2), LearnOptions()))["evidence"]["message"]
+
+
+def slanted(seed: int) -> Demonstration:
+    """Straight down, and in the air the wrench reads the teacher's grip: 6 N from the side, without any contact."""
+    d = press(seed, aim=1.0, residual=0.0, hold=0.0, length=0.2)
+    wrench = d.wrench + np.array([5.0, 0.0, 1.5, 0.0, 0.0, 0.0])
+    return Demonstration(time=d.time, position=d.position, quaternion=d.quaternion, wrench=wrench)
+
+
+def test_a_direction_that_no_motion_took_gets_a_doubt_in_words(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    paths = [str(tmp_path / f"{seed}.npz") for seed in range(5)]
+    for seed, path in enumerate(paths):
+        write_demonstration(slanted(seed), Path(path))
+    assert run(["learn", *paths, "--out", str(tmp_path / "a.skill.json")]) == 0
+    document = learn([slanted(seed) for seed in range(5)], LearnOptions())
+    assert off(translation(document), (0.0, 0.0, -1.0)) > 20.0
+    said = translation(document)["evidence"]["message"]
+    assert "doubtful: all demonstrations went one way" in said or "demonstrations from one side leave" in said
+    assert "doubtful" not in translation(learn(valley(45.0, 0.2), LearnOptions()))["evidence"]["message"]
