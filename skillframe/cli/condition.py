@@ -55,8 +55,11 @@ def command(
     """
     from skillframe.conditioning.offline import filter_wrench, remove_bias, smooth
     from skillframe.demonstration.files import read_demonstration, write_demonstration
+    from skillframe.demonstration.stalls import stalls
 
     demonstration = read_demonstration(file)
+    for stall in stalls(demonstration):
+        click.echo(f"warning: {stall.words()}: what happened then is not known, whatever is written", err=True)
     removed = None
     if bias or weight:
         removed = remove_bias(demonstration, _pair("--free-air", free_air), weight)

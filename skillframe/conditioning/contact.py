@@ -123,7 +123,7 @@ def _runs(mask: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[tuple[int, i
 
 
 def first_free_air(
-    time: Float, wrench: Float, noise: NoiseFigures, alive: NDArray[np.bool_] | None = None
+    time: Float, wrench: Float, noise: NoiseFigures, alive: NDArray[np.bool_] | None = None, where: str = "recording"
 ) -> tuple[float, float]:
     """The stretch from the start to 0.1 s before the first contact [s], or to the first stall; else to the end.
 
@@ -133,8 +133,8 @@ def first_free_air(
     stalled = np.zeros(0, dtype=int) if alive is None else np.flatnonzero(~alive)
     if stalled.size and time[stalled[0]] - time[0] < LEVEL_TIME:
         raise InputError(
-            "wrench",
-            f"repeats one value from {time[stalled[0]]:.2f} s on, and what follows may be contact already: "
+            where,
+            f"the wrench repeats one value from {time[stalled[0]]:.2f} s on, and what follows may be contact already: "
             "no free air is known",
             "name a stretch without contact (--free-air FROM,TO), or leave the bias (--no-bias)",
         )  # fmt: skip

@@ -167,4 +167,5 @@ def _free_air(demonstration: Demonstration, live: NDArray[np.bool_]) -> tuple[fl
     d = demonstration
     if d.meta.get("contact") is False:
         return float(d.time[0]), float(d.time[-1])
-    return first_free_air(d.time, d.wrench, noise_figures(d.time, d.wrench, live), live)
+    noise = noise_figures(d.time, d.wrench, live)
+    return first_free_air(d.time, d.wrench, noise, live, d.source or "demonstration")

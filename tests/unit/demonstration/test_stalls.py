@@ -259,6 +259,7 @@ def test_condition_refuses_a_recording_whose_free_air_is_a_stall(
     assert "no free air is known" in capsys.readouterr().err
     assert not out.exists()
     assert run(["condition", path, "--no-bias", "--out", str(out)]) == 0
+    assert "warning: the wrench repeats one value bit for bit from 0.00 to 7.50 s" in capsys.readouterr().err
 
 
 @pytest.mark.needs_plugins
