@@ -13,7 +13,7 @@ leans on the friction cone explains both. Our choice; the papers join phases by 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import groupby, pairwise
 from math import cos, inf, radians
 from typing import Any
@@ -163,9 +163,21 @@ def _joined(
     for (one, two), parts in candidates:
         if found["phase_model"].get("round") in (one, two):
             continue
-        if _part(kind.learn(parts, options), "translation").get("desired_direction") is not None:
+        if _one_direction(kind.learn, parts, options):
             return _joined(relabelled(found, one, two), demonstrations, skill, options, stand_ins=stand_ins)
     return found
+
+
+def _one_direction(
+    learn_phase: Callable[[Sequence[Demonstration], LearnOptions], Document], parts: Sequence[Demonstration],
+    options: LearnOptions,
+) -> bool:  # fmt: skip
+    """Whether one direction explains all of them; none does if the learner refuses them together (a press, say)."""
+    try:
+        body = learn_phase(parts, options)
+    except InputError:
+        return False
+    return _part(body, "translation").get("desired_direction") is not None
 
 
 def neighbours(rows: Sequence[Mapping[str, Any]]) -> list[tuple[int, int]]:
