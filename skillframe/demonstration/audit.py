@@ -101,7 +101,7 @@ def audit(demonstration: Demonstration) -> Audit:
     step = np.diff(d.time)
     period = float(np.median(step))
     found = stalls(d)
-    live = alive(d)
+    live = alive(d, found)
     noise = _noise(d, live)
     level = free_air_level(d.time[live], d.wrench[live]) if np.any(live) else np.zeros(6)
     contacts = contact_intervals(d.time, d.wrench, noise, level, live)

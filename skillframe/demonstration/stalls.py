@@ -101,11 +101,11 @@ def as_meta(found: Sequence[Stall]) -> list[dict[str, Any]]:
     return [stall._asdict() for stall in found]
 
 
-def alive(demonstration: Demonstration) -> NDArray[np.bool_]:
-    """Mask (T,) of samples whose wrench is no stall's."""
+def alive(demonstration: Demonstration, found: Sequence[Stall] | None = None) -> NDArray[np.bool_]:
+    """Mask (T,) of samples whose wrench is no stall's; the stalls are looked for if they are not given."""
     time = demonstration.time
     mask = np.ones(len(time), dtype=bool)
-    for stall in stalls(demonstration):
+    for stall in stalls(demonstration) if found is None else found:
         if stall.what != POSE:
             mask &= (time < stall.start) | (time > stall.stop)
     return mask
