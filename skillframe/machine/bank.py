@@ -11,9 +11,9 @@ from skillframe.actuation.actuator import Actuators, ActuatorSpec
 from skillframe.actuation.opening import open_actuators
 from skillframe.errors import InputError
 from skillframe.frames import Float
+from skillframe.robot.figures import CYLINDER, completed
 from skillframe.robot.spec import RobotSpec
 
-CYLINDER = "hydraulic_cylinder"
 _KEPT: dict[tuple[Any, ...], Actuators] = {}
 KEPT_AT_MOST = 2
 
@@ -27,9 +27,7 @@ def banks(spec: RobotSpec, trials: int) -> Actuators:
         InputError, UnknownName, MissingDependency, InstanceFailed: an actuator cannot be opened.
     """
     specs = [
-        ActuatorSpec(
-            fmu=a.fmu, parameters=dict(a.parameters), inputs=dict(a.inputs), outputs=dict(a.outputs), name=a.joint
-        )
+        ActuatorSpec(fmu=a.fmu, parameters=completed(a), inputs=dict(a.inputs), outputs=dict(a.outputs), name=a.joint)
         for a in spec.actuation
     ]
     key = (str(spec.folder), repr(specs), trials)
@@ -46,7 +44,7 @@ def instance_parameters(spec: RobotSpec, draws: Mapping[str, Float], hold: Float
     for trial, forces in enumerate(hold):
         for actuation, force in zip(spec.actuation, forces, strict=True):
             held = actuation.initial_force or ("initial_force" if actuation.fmu == CYLINDER else "")
-            result.append(_drawn(actuation.parameters, draws, trial) | ({held: float(force)} if held else {}))
+            result.append(_drawn(completed(actuation), draws, trial) | ({held: float(force)} if held else {}))
     return result
 
 

@@ -37,6 +37,9 @@ NOT_NEGATIVE = frozenset({
 })  # fmt: skip
 BELOW = {"air_fraction": 0.5, "deadband": 1.0}
 LEAST_SUBSTEP = 1e-6  # s
+BREAKAWAY = 1.0
+"""Static over Coulomb friction where `static_friction` is not given: our choice, as of the crane that ships. The FMU's
+own default, 4000 N, is that crane's and no other's: a digger of 1.5 kN of Coulomb friction stuck with it."""
 FLAG = "rated_drop_is_per_edge"
 
 
@@ -63,6 +66,20 @@ def require_figures(spec: RobotSpec) -> None:
     for actuation in spec.actuation:
         for unfit in unfit_figures(actuation):
             raise InputError(spec.folder / "robot.toml", unfit.problem, unfit.fix)
+
+
+def completed(actuation: Actuation) -> dict[str, Any]:
+    """Parameters that an actuator's FMU is given: robot.toml's, and what follows from them where they say nothing."""
+    given = actuation.parameters
+    if not lacks_static_friction(actuation):
+        return dict(given)
+    return {**given, "static_friction": BREAKAWAY * float(given["coulomb_friction"])}
+
+
+def lacks_static_friction(actuation: Actuation) -> bool:
+    """Whether the break-away friction of a `hydraulic_cylinder` goes by its Coulomb friction."""
+    given = actuation.parameters
+    return actuation.fmu == CYLINDER and "static_friction" not in given and "coulomb_friction" in given
 
 
 def _missing(actuation: Actuation) -> Iterator[Unfit]:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from skillframe.errors import InputError, SkillframeError
 from skillframe.robot.feasibility import problems
-from skillframe.robot.figures import unfit_figures
+from skillframe.robot.figures import lacks_static_friction, unfit_figures
 from skillframe.robot.loops import ClosedChain
 from skillframe.robot.machine_spec import fast_filters
 from skillframe.robot.model import RobotModel
@@ -18,12 +18,15 @@ from skillframe.robot.spec import Limits
 
 
 def machine_warnings(robot: RobotModel) -> Iterator[Problem]:
-    """Figures that no cylinder has, loops that do not close, a home where it cannot stand, limits made for arms."""
+    """Figures that no cylinder has, or that are not given; loops that do not close, home, and limits made for arms."""
     slips = [_warning("cannot_run", *slip) for one in robot.spec.actuation for slip in unfit_figures(one)]
     yield from slips
     spec = robot.spec
     for problem, fix in fast_filters(spec.sensors, spec.gains, spec.control.rate_hz) if spec.actuation else ():
         yield _warning("cannot_run", problem, fix)
+    if tied := [a.joint for a in spec.actuation if lacks_static_friction(a)]:
+        text = f"no static_friction is given for {', '.join(tied)}: taken as equal to coulomb_friction"
+        yield _warning("static_friction", text, "add it to parameters if the pistons stick harder than they slide")
     if not (robot.spec.loop and robot.spec.actuation):
         return
     try:

@@ -12,6 +12,7 @@ import pytest
 from skillframe.cli.main import run
 from skillframe.control.vdc_actuator import cylinders
 from skillframe.errors import InputError
+from skillframe.machine import bank
 from skillframe.prepare import load_robot_model
 from skillframe.robot.audit import audit
 from skillframe.robot.describe import as_json, describe
@@ -47,6 +48,21 @@ def warnings(robot):
 
 def test_nothing_is_wrong_with_the_shipped_crane(changed):
     assert warnings(changed()) == {}
+
+
+def test_static_friction_that_is_not_given_is_the_coulomb_friction_and_check_says_so(changed, monkeypatch):
+    """As the FMUs are opened and each trial's are set; the FMU's own default is 4000 N, the shipped crane's."""
+    monkeypatch.setattr(bank, "open_actuators", lambda specs, trials, folder: specs)
+    monkeypatch.setattr(bank, "_KEPT", {})
+    robot = changed(("coulomb_friction = 4000.0", "coulomb_friction = 1500.0"), ("static_friction = 4000.0, ", ""))
+    text = warnings(robot)["static_friction"]
+    assert text.startswith("no static_friction is given for lift_piston, tilt_piston, extension")
+    for scale in (1.0, 0.7):
+        draws = {} if scale == 1.0 else {"actuator.friction_scale": np.array([scale])}
+        rows = bank.instance_parameters(robot.spec, draws, np.zeros((1, 3)))
+        own = [{**one.parameters, **row} for one, row in zip(bank.banks(robot.spec, 1), rows, strict=True)]
+        assert own[0]["coulomb_friction"] == pytest.approx(1500.0 * scale)
+        assert [row.get("static_friction", 4000.0) for row in own] == [row["coulomb_friction"] for row in own]
 
 
 def test_loops_that_leave_more_freedoms_than_actuators_are_named(changed):
