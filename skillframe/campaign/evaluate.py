@@ -107,7 +107,7 @@ def _check_quantity(robot: RobotModel, name: str, value: Value) -> None:
     """Refuse a value that no trial of this robot could run with."""
     if name in QUANTITIES:
         check_quantities({name: np.array([value], dtype=float)}, robot)
-    if name == "robot.payload":
+    if name in ("robot.payload", "robot.nominal_payload"):
         with_payload(robot.spec, float(value))
 
 

@@ -89,7 +89,7 @@ class ValveIdentification:
 
     Attributes:
         overlap, overlap_deviation: (N, k) found, share of the travel. lag: (N, k) [s].
-        supply, supply_deviation: (N, k) found [Pa].
+        supply, supply_deviation: (N, k) found [Pa], within `reach`; supply_found: (N, k) wherever it is.
     """
 
     def __init__(self, cylinders: Cylinders, count: int, dt: float, settings: ValveSettings | None = None) -> None:
@@ -109,6 +109,7 @@ class ValveIdentification:
         self._pressed: Float = np.zeros((3, *self._shape))
         self._before: tuple[Float, Float] | None = None
         self.overlap, self.supply = (np.tile(x, (self._shape[0], 1)) for x in (c.deadband, c.supply_pressure))
+        self.supply_found: Float = self.supply
         self.overlap_deviation: Float = np.full(self._shape, s.overlap)
         self.supply_deviation: Float = np.full(self._shape, s.supply)
         self.lag: Float = np.zeros(self._shape)
@@ -164,6 +165,7 @@ class ValveIdentification:
         spread = np.maximum(square / rows - (off / rows) ** 2, 1e8)
         weight = n / (s.alike * spread)
         mean = weight * off / rows / (weight + 1.0 / s.supply**2)
+        self.supply_found = nominal + mean
         self.supply = nominal * np.clip(1.0 + mean / nominal, 1.0 - s.reach, 1.0 + s.reach)
         self.supply_deviation = 1.0 / np.sqrt(weight + 1.0 / s.supply**2)
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from skillframe.conditioning.rates import RateFilter
 from skillframe.control.doubt import pursued
-from skillframe.control.vdc import Bodies, bodies, net_forces, parameters, piston_forces
+from skillframe.control.vdc import Bodies, Reduced, bodies, net_forces, parameters, piston_forces, reduced
 from skillframe.control.vdc_actuator import (
     ContactFriction,
     CylinderGains,
@@ -113,7 +113,7 @@ class HydraulicGains:
         body: K_A, the same for all bodies [N s/m, N m s/rad]. Published: 5, which damps nothing. Ours: a tool that
             lands on something hard is stopped in less time than k_x and k_f need, and this damps it; with twice as
             much and a valve that is 20 ms late the crane rings on 1e6 N/m.
-        adaptation: rho of the inertial parameters; 0 switches it off. share: bounds, +- of each parameter.
+        adaptation: rho of the inertial parameters; 0 switches it off. share: bounds, +- of each parameter as told.
         friction: rho_f of the cylinders' Coulomb [N/m] and viscous friction [N s/m^2 per m/s]; 0 switches it off.
             Published: 1e5 of both.
         friction_share: bounds, +- of each.
@@ -168,28 +168,33 @@ def plane_task(chain: ClosedChain) -> Task:
     return Task(chain, plane_axes(chain), chain.independent[2:])
 
 
-def terms(chain: ClosedChain, z: Float, rate: Float) -> Terms:
-    """The model's terms at minimal coordinates and rates (N, n)."""
-    axes = list(plane_axes(chain))
-    rows = [_terms(chain, axes, a, b) for a, b in zip(z, rate, strict=True)]
+def terms(chain: ClosedChain, z: Float, rate: Float, theta: Float | None = None) -> Terms:
+    """The model's terms at minimal coordinates and rates (N, n), with its own inertias or theta (N, B, 10)."""
+    axes, given = list(plane_axes(chain)), [None] * len(z) if theta is None else theta
+    rows = [_terms(chain, axes, *row) for row in zip(z, rate, given, strict=True)]
     return Terms(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-def _terms(chain: ClosedChain, axes: list[int], z: Float, rate: Float) -> Terms:
+def _terms(chain: ClosedChain, axes: list[int], z: Float, rate: Float, theta: Float | None) -> Terms:
     state, frame = chain.at(z, rate), chain.robot.tool_frames[0]
     jacobian = state.jacobian(frame)[axes]
     tip = np.array(state.data.oMf[frame].translation)[axes]
+    mass, gravity = _reduced(state, theta)
     return Terms(
-        state.mass, _kinetic_gradient(chain, z, rate), state.gravity, jacobian, state.arms, *state.piston,
+        mass, _kinetic_gradient(chain, z, rate, theta), gravity, jacobian, state.arms, *state.piston,
         tip, jacobian @ rate,
     )  # fmt: skip
 
 
-def _kinetic_gradient(chain: ClosedChain, z: Float, rate: Float, h: float = 1e-5) -> Float:
+def _reduced(state: ChainState, theta: Float | None) -> Reduced:
+    return Reduced(state.mass, state.gravity) if theta is None else reduced(state, theta)
+
+
+def _kinetic_gradient(chain: ClosedChain, z: Float, rate: Float, theta: Float | None, h: float = 1e-5) -> Float:
     """C_z^T zd = d(1/2 zd^T M_z zd)/dz (n,), by central differences: Lagrange's equations say so."""
 
     def kinetic(at: Float) -> float:
-        return 0.5 * float(rate @ chain.at(at, rate).mass @ rate)
+        return 0.5 * float(rate @ _reduced(chain.at(at, rate), theta).mass @ rate)
 
     steps = h * np.eye(len(z))
     return np.array([(kinetic(z + s) - kinetic(z - s)) / (2 * h) for s in steps])
@@ -205,7 +210,8 @@ class HydraulicLaw:
         dt: sample time [s].
 
     Attributes:
-        theta: (N, B, 10) estimated inertial parameters of every moving body.
+        told: (N, B, 10) inertial parameters of every moving body, as `tell` said; the model's own to begin with.
+        theta: (N, B, 10) the same as estimated.
         friction: (N, 2, k) estimated Coulomb [N] and viscous friction [N s/m]; may be set to what is found otherwise.
         deadband, supply: (N, k) of the valves, share of their travel, and the pressure before them [Pa]; likewise.
     """
@@ -213,9 +219,7 @@ class HydraulicLaw:
     def __init__(self, chain: ClosedChain, cylinders: Cylinders, gains: HydraulicGains, count: int, dt: float) -> None:
         self.chain, self.cylinders, self.gains, self._dt = chain, cylinders, gains, dt
         self._task = plane_task(chain)
-        nominal = parameters(chain.model)
-        self.theta: Float = np.tile(nominal, (count, 1, 1))
-        self._bounds = relative_bounds(nominal, gains.share)
+        self.tell(np.tile(parameters(chain.model), (count, 1, 1)))
         rub = friction_parameters(cylinders)
         self.friction: Float = np.tile(rub, (count, 1, 1))
         self._friction_bounds = relative_bounds(rub, gains.friction_share)
@@ -232,13 +236,19 @@ class HydraulicLaw:
         self._fresh = True
         self._bristle[:] = 0.0
 
+    def tell(self, theta: Float) -> None:
+        """Say what inertial parameters (N, B, 10) the machines have: terms, estimate and its bounds start from them."""
+        self.told: Float = theta.copy()
+        self.theta: Float = theta.copy()
+        self._bounds = relative_bounds(theta, self.gains.share)
+
     def adapt(self, on: bool) -> None:
         """Learn, as at first, or hold what was learned: in contact with stiff things learning rings (our trials)."""
         self.learning = on
 
     def terms(self, measured: Measured) -> Terms:
         """The model's terms where the machine is measured to be."""
-        return terms(self.chain, measured.z, measured.rate)
+        return terms(self.chain, measured.z, measured.rate, self.told)
 
     def step(self, measured: Measured, reference: Reference, ids: NDArray[np.int64]) -> Demand:
         """A sample for the trials in `ids`; the other rows mean nothing."""
@@ -286,7 +296,8 @@ class HydraulicLaw:
     def _learn(self, i: int, motion: Bodies) -> None:
         if self.learning and self.gains.adaptation > 0.0:
             drive = np.einsum("bij,bi->bj", motion.regressor, motion.error)
-            self.theta[i] = adapt(self.theta[i], drive, self.gains.adaptation, self._bounds, self._dt)
+            low, high = self._bounds
+            self.theta[i] = adapt(self.theta[i], drive, self.gains.adaptation, (low[i], high[i]), self._dt)
 
     def _slide(self, rate_r: Float, force: Float, ids: NDArray[np.int64]) -> Float:
         """Y_f (N, 2, k) at required velocities (N, k)."""

@@ -18,7 +18,7 @@ from skillframe.control.vdc_adaptation import relative_bounds
 from skillframe.frames import Float
 from skillframe.robot.loops import ClosedChain
 
-_SHARED = tuple(range(19, 27))  # inputs of the law that are one for all trials: bounds, cylinders, gains, scalars
+_SHARED = tuple(range(21, 27))  # inputs of the law that are one for all: bounds of friction, cylinders, gains, scalars
 
 
 class CompiledLaw:
@@ -33,7 +33,8 @@ class CompiledLaw:
         use_compiler: False runs the same expressions in casadi's interpreter.
 
     Attributes:
-        theta: (N, B, 10) estimated inertial parameters of every moving body.
+        told: (N, B, 10) inertial parameters of every moving body, as `tell` said; the model's own to begin with.
+        theta: (N, B, 10) the same as estimated.
         friction: (N, 2, k) estimated Coulomb [N] and viscous friction [N s/m]; write into it what is found otherwise.
         deadband, supply: (N, k) of the valves, share of their travel, and the pressure before them [Pa]; likewise.
         notes: a sentence where there is no compiler.
@@ -51,7 +52,8 @@ class CompiledLaw:
             zeros((count, 2)), zeros((count, 2)), zeros((count, 2, 2)), zeros((count, 2, 2)), zeros((count, 2)),
             zeros((count, n - 2)), zeros((count, n - 2)), zeros((count, n)),
         )  # fmt: skip
-        self.theta, self._learned = (np.tile(nominal, (count, 1, 1)) for _ in range(2))
+        self.told, self.theta, self._learned = (np.tile(nominal, (count, 1, 1)) for _ in range(3))
+        self._bounds = relative_bounds(self.told, gains.share)
         self.friction, self._rubbed = (np.tile(friction_parameters(cylinders), (count, 1, 1)) for _ in range(2))
         self._memory, self._next = zeros((count, 3, k)), zeros((count, 3, k))
         self.deadband: Float = np.tile(cylinders.deadband, (count, 1))
@@ -60,16 +62,16 @@ class CompiledLaw:
         self._scalars = np.array(
             [gains.body, gains.adaptation, *gains.friction, gains.joint, gains.force_corner, *contact, dt, 1.0]
         )  # fmt: skip
-        self._bind(nominal, count, use_compiler)
+        self._bind(count, use_compiler)
 
-    def _bind(self, nominal: Float, count: int, use_compiler: bool) -> None:
+    def _bind(self, count: int, use_compiler: bool) -> None:
         n, k = self._measured.z.shape[1], self._measured.pressure_a.shape[1]
         self._demand = [Demand(*(np.zeros((count, k)) for _ in range(3))) for _ in range(2)]
         shapes = ((n, n), (n,), (n,), (2, n), (k, n), (k,), (k,), (2,), (2,))
         self._terms = [Terms(*(np.zeros((count, *shape)) for shape in shapes)) for _ in range(2)]
         axes, gains = plane_axes(self.chain), self.gains
         knowledge = (
-            *relative_bounds(nominal, gains.share),
+            *self._bounds,
             *relative_bounds(friction_parameters(self.cylinders), gains.friction_share),
             cylinder_table(self.cylinders), np.array(gains.velocity), np.array(gains.force), self._scalars,
         )  # fmt: skip
@@ -81,8 +83,8 @@ class CompiledLaw:
             Batch(law, inputs, [*out, self._learned, self._rubbed, self._next], _SHARED, use_compiler=use_compiler)
             for out in self._demand
         ]
-        seen = [self._measured.z, self._measured.rate, nominal]
-        self._describe = [Batch(terms, seen, list(out), (2,), use_compiler=use_compiler) for out in self._terms]
+        seen = [self._measured.z, self._measured.rate, self.told]
+        self._describe = [Batch(terms, seen, list(out), use_compiler=use_compiler) for out in self._terms]
         self.notes = self._steps[0].notes
         self._states = (
             (self.theta, self._learned), (self.friction, self._rubbed), (self._memory, self._next)
@@ -93,6 +95,12 @@ class CompiledLaw:
     def start(self) -> None:
         """Forget the past; the required force's filter begins at the first required force."""
         self._scalars[-1] = 1.0
+
+    def tell(self, theta: Float) -> None:
+        """Say what inertial parameters (N, B, 10) the machines have: terms, estimate and its bounds start from them."""
+        self.told[:] = self.theta[:] = theta
+        for own, bound in zip(self._bounds, relative_bounds(theta, self.gains.share), strict=True):
+            own[:] = bound
 
     def adapt(self, on: bool) -> None:
         """Learn, as at first, or hold what was learned: in contact with stiff things learning rings (our trials)."""

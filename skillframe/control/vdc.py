@@ -28,6 +28,13 @@ from skillframe.robot.loops import ChainState, ClosedChain
 PUBLISHED_BODY_GAIN = 5.0  # K = 5 times the unit matrix, N s/m and N m s/rad
 
 
+class Reduced(NamedTuple):
+    """Of a chain in minimal coordinates: M_z (n, n) and gravity's generalised forces g_z (n,)."""
+
+    mass: Float
+    gravity: Float
+
+
 class Bodies(NamedTuple):
     """All moving bodies (B of them, Pinocchio's joint order), in body axes at the body's frame, linear part first.
 
@@ -71,6 +78,19 @@ def bodies(state: ChainState, rate: Float, acceleration: Float) -> Bodies:
     gravity = np.array([data.oMi[j].rotation.T @ model.gravity.linear for j in ids])
     y = regressor(v_rate, required, velocity, gravity)
     return Bodies(jacobian, velocity, required, v_rate, y, gravity, v_r)
+
+
+def reduced(state: ChainState, theta: Float) -> Reduced:
+    """Mass matrix and gravity of a chain whose bodies have inertial parameters theta (B, 10), whatever its model says.
+
+    M_z = sum_b G^T J_b^T M_b J_b G,    g_z = -sum_b G^T J_b^T M_b (g_b; 0)
+    """
+    model, data, local = state.chain.model, state.data, pin.ReferenceFrame.LOCAL
+    ids, inertia = range(1, model.njoints), mass_matrix(theta)
+    jacobian = np.array([pin.getJointJacobian(model, data, j, local) for j in ids]) @ state.embedding
+    pull = np.array([[*(data.oMi[j].rotation.T @ model.gravity.linear), 0.0, 0.0, 0.0] for j in ids])
+    mass = np.einsum("bia,bij,bjc->ac", jacobian, inertia, jacobian)
+    return Reduced(mass, -np.einsum("bia,bij,bj->a", jacobian, inertia, pull))
 
 
 def net_forces(motion: Bodies, theta: Float, gain: Float) -> Float:

@@ -11,10 +11,10 @@ import numpy as np
 from skillframe.conditioning.identification import Identification
 from skillframe.control.hydraulic import HydraulicLaw
 from skillframe.control.hydraulic_compiled import CompiledLaw
-from skillframe.control.vdc import parameters
 from skillframe.control.vdc_actuator import friction_parameters
 from skillframe.control.vdc_adaptation import relative_bounds
 from skillframe.frames import Float
+from skillframe.machine.load import carrier, inertias
 
 CALIBRATION_S, SETTLE_S, SWING_M = 6.0, 1.0, (0.10, 0.10, 0.05)
 """Two or three reversals of every cylinder, and a moment to come to rest."""
@@ -42,17 +42,24 @@ def _displacement(time: float) -> Float:
 def hold_what_was_found(law: HydraulicLaw | CompiledLaw, found: Identification) -> None:
     """Let a law compensate the friction and the payload that were found, and learn no more.
 
-    What its adaptation has come to by then is dropped: it makes the swing follow, and goes on wandering with the
-    friction of pistons that stand, by a tenth of the load's mass.
+    The load may be any within the rating, and what carries it heavier or lighter by `share`. What the law's adaptation
+    has come to by then is dropped: it makes the swing follow, and goes on wandering with the friction of pistons that
+    stand, by a tenth of the load's mass.
     """
     nominal = friction_parameters(law.cylinders)
     lower, upper = relative_bounds(nominal, law.gains.friction_share)
     errors = np.stack([found.coulomb, found.viscous], axis=1)
     law.adapt(False)
     law.friction[:] = np.clip(nominal + errors, lower, upper)
-    model, share = law.chain.model, law.gains.share
-    theta, payload = parameters(model), law.chain.robot.spec.payload
+    row, (least, most) = carrier(law.chain), carried_bounds(law)
+    mass = law.told[:, row, 0]
+    law.theta[:] = law.told
+    law.theta[:, row] *= (np.clip(mass + found.payload, least, most) / mass)[:, None]
+
+
+def carried_bounds(law: HydraulicLaw | CompiledLaw) -> tuple[float, float]:
+    """Least and largest mass of the body that carries the load, load included [kg]."""
+    payload, share = law.chain.robot.spec.payload, law.gains.share
     assert payload is not None  # else the estimate has refused the robot
-    load = model.frames[model.getFrameId(payload.link)].parentJoint - 1
-    law.theta[:] = theta
-    law.theta[:, load] *= 1.0 + np.clip(found.payload / theta[load, 0], -share, share)[:, None]
+    empty, full = inertias(law.chain, np.array([0.0, payload.rating]))[:, carrier(law.chain), 0]
+    return (1.0 - share) * float(empty), (1.0 + share) * float(full)

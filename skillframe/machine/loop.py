@@ -34,6 +34,8 @@ from skillframe.frames import Float, Pose
 from skillframe.machine.bank import banks, instance_parameters
 from skillframe.machine.calibration import CALIBRATION_S, SETTLE_S, hold_what_was_found, swing
 from skillframe.machine.columns import EnergyBill, columns, supply_pressures
+from skillframe.machine.findings import findings
+from skillframe.machine.load import BelievedLoad
 from skillframe.recorder import Recorder
 from skillframe.robot.feasibility import require_feasible
 from skillframe.robot.holding import require_held
@@ -113,6 +115,7 @@ class MachineLoop(Loop):
         self._z = [int(self.plant.model.joint(name).qposadr[0]) for name in self.chain.independent]
         late = np.asarray(draws.get("actuator.delay", np.zeros(self.count)))
         self._delay = CommandDelay(np.round(late / self.dt).astype(np.int64), len(known.area_a))
+        self.findings: list[list[str]] = [[] for _ in rngs]
         self._start(draws)
 
     def _configurations(self, draws: Draws) -> Float:
@@ -153,6 +156,7 @@ class MachineLoop(Loop):
             raise InputError(f"robot {spec.name}", problem, fix)
         self.gauges.start(z, *self._true_pressures())
         self.law.start()
+        self.load = BelievedLoad(self.law, draws, self.count)
         self.home = self.plant.tool_pose().position[:, self.task.axes].copy()
         self.joint = z[:, 2:].copy()
         nothing = np.zeros((self.count, 2))
@@ -200,7 +204,10 @@ class MachineLoop(Loop):
             position, velocity, joint, joint_rate = swing(tick * self.dt)
             stiff = LEAST_DAMPING * np.broadcast_to(np.eye(2), (self.count, 2, 2))
             zero = np.zeros((self.count, 2))
-            self._sense(force_counts=False)
+            self._sample()
+            if tick == 0:
+                self._weigh()
+            self._estimate(force_counts=False)
             self._look_at_valves(tick)
             self._valve(
                 Reference(
@@ -215,6 +222,7 @@ class MachineLoop(Loop):
         self._end_wild(stopped / (tick + 1))
         self.estimator.calibrate(False)
         hold_what_was_found(self.law, self.estimator.identification)
+        self.findings = findings(self.law, self.load, self.estimator.identification, self.valves)
         self.bill.start()
 
     def _end_wild(self, share: Float) -> None:
@@ -230,11 +238,19 @@ class MachineLoop(Loop):
             self.valves.solve()
             self.law.deadband[:], self.law.supply[:] = self.valves.compensated, self.valves.supply
 
-    def _sense(self, force_counts: bool = True) -> None:
-        """Sample the sensors, and estimate the force from them; in the air it is known to be zero."""
+    def _sample(self) -> None:
+        """Read the sensors, and the model's terms where the machine then is."""
         self.gauges.sample(self._true_z(), *self._true_pressures())
         self._seen = self._measured()
         self.terms = self.law.terms(self._seen)
+
+    def _weigh(self) -> None:
+        """At rest, before the swing: go by the load that the pressures hold if it cannot be what was told."""
+        if self.load.weigh(self._seen, self.terms):
+            self.terms = self.law.terms(self._seen)
+
+    def _estimate(self, force_counts: bool = True) -> None:
+        """The force from what was sampled; in the air it is known to be zero."""
         estimate = self.estimator.step(self._seen, self.terms)
         nothing = np.zeros_like(estimate.force)
         self.estimate = (
@@ -247,7 +263,8 @@ class MachineLoop(Loop):
 
     def _tick(self, tick: int) -> None:
         time = tick * self.dt
-        self._sense()
+        self._sample()
+        self._estimate()
         observation = self._observe(time)
         command = self._ask(tick, observation)
         reference, law = self._reference(command, observation, min(1.0, time / RAMP_S))
@@ -345,7 +362,7 @@ class MachineLoop(Loop):
         }  # fmt: skip
 
     def _meta(self, i: int, success: bool, failure: str) -> dict[str, Any]:
-        notes = [*self.law.notes, *self.bank.notes]
+        notes = [*self.law.notes, *self.bank.notes, *self.findings[i]]
         return {**super()._meta(i, success, failure), "actuators": list(self.chain.actuated), "notes": notes}
 
     def _kinematics(self) -> Kinematics:

@@ -36,6 +36,7 @@ def with_payload(spec: RobotSpec, mass: float) -> RobotSpec:
     if not 0.0 <= mass <= spec.payload.rating:
         text = f"{mass:g} kg is not within 0 and the rating of {spec.payload.rating:g} kg"
         raise InputError(where, text, "carry less")
+    mass = float(mass)  # numpy's own is written into the URDF by a name that no parser reads
     link, published = spec.payload.link, published_inertia(spec)
     left = published.mass - spec.payload.mass
     if left < 0.0:

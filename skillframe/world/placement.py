@@ -24,7 +24,7 @@ _SENSOR = [f"sensor.{k}_bias_{a}" for k in ("force", "torque") for a in "xyz"]
 _ACTUATOR = [f"actuator.{k}" for k in ("supply_pressure", "deadband", "friction_scale", "delay")]
 QUANTITIES = frozenset(
     [*_VECTORS, *_SENSOR, "sensor.force_noise", "sensor.torque_noise", "robot.mass_scale", "robot.joint_friction",
-     "robot.payload", *_ACTUATOR, "world.friction"]
+     "robot.payload", "robot.nominal_payload", *_ACTUATOR, "world.friction"]
 )  # fmt: skip
 """What can differ between the trials of one batch; other `world.*` parameters need a scene of their own."""
 NOT_NEGATIVE = frozenset({"sensor.force_noise", "sensor.torque_noise", "robot.joint_friction", "world.friction"})
@@ -64,7 +64,7 @@ def check_quantities(draws: Mapping[str, Float], robot: RobotModel | None = None
 def _lacking(key: str, robot: RobotModel) -> str:
     """Why a quantity would do nothing on this robot; "" if it does something."""
     if not robot.spec.actuation:
-        return "has no actuators of its own" if key in _ACTUATOR else ""
+        return "has no actuators of its own" if key in (*_ACTUATOR, "robot.nominal_payload") else ""
     if key.startswith("sensor."):
         return "has no wrench sensor: its contact force is estimated from pressures"
     return "moves in a plane, and does not turn its tool to a start" if key.startswith("start.tilt_") else ""

@@ -67,6 +67,25 @@ def test_the_generated_law_is_the_readable_law_sample_after_sample(use_compiler)
     close(*(law.step(*draw(np.random.default_rng(4), count), everyone) for law in reversed(laws)))
 
 
+def test_both_laws_go_by_the_inertias_that_they_are_told():
+    """Terms, net forces, and the bounds of what is learned: with a drive that no bound would stop, they stop there."""
+    measured, reference = draw(np.random.default_rng(11), 2)
+    laws = [HydraulicLaw(*machine(), 2, DT), CompiledLaw(*machine(), 2, DT)]
+    told = laws[0].theta * np.array([0.4, 1.2])[:, None, None]
+    before = laws[0].terms(measured)
+    for law in laws:
+        law.tell(told)
+    readable, generated = (law.terms(measured) for law in laws)
+    for name, own, other in zip(readable._fields, generated, readable, strict=True):
+        bar = 1e-8 if name == "drift" else SAME  # a central difference
+        np.testing.assert_allclose(own, other, rtol=0, atol=bar * np.abs(other).max(), err_msg=name)
+    np.testing.assert_allclose(readable.mass, np.array([0.4, 1.2])[:, None, None] * before.mass, rtol=1e-9)
+    for _ in range(200):
+        close(*(law.step(measured, reference, np.arange(2)) for law in laws))
+    close([laws[1].theta], [laws[0].theta])
+    assert np.all(np.abs(laws[0].theta - told) <= 0.3 * np.abs(told) * (1.0 + 1e-12))
+
+
 def test_the_generated_terms_are_those_of_the_loop_embedding_model():
     """Coriolis' part to 1e-8: the readable one is a central difference of step 1e-5 (rounding 1e-16/1e-5)."""
     measured, _ = draw(np.random.default_rng(5), 4)
