@@ -36,7 +36,7 @@ def check_fmu(path: Path) -> dict[str, Any]:
     return {
         "fmi_version": facts.fmi_version, "kinds": list(facts.kinds), "platforms": list(facts.platforms),
         "has_sources": facts.has_sources, "inputs": facts.names("input"), "outputs": facts.names("output"),
-        "state_capability": state, "confinement": confinement, "problems": problems,
+        "state_capability": state, "problems": problems, "confinement": confinement,
     }  # fmt: skip
 
 

@@ -50,7 +50,7 @@ def threshold(each: Mapping[str, Any]) -> str:
     if not each["bar"]:
         return "none: reported only"
     weak = each.get("weak")
-    return each["bar"] + (f". Reaching it is no pass: {weak}" if weak else "")
+    return str(each["bar"]) + (f". Reaching it is no pass: {weak}" if weak else "")
 
 
 def _count(entries: Sequence[Mapping[str, Any]], verdict: str) -> int:

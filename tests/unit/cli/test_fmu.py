@@ -43,6 +43,7 @@ def test_check_has_the_keys_of_the_contract_and_finds_nothing(built, capsys, ver
     assert code == 0
     assert list(found) == [
         "fmi_version", "kinds", "platforms", "has_sources", "inputs", "outputs", "state_capability", "problems",
+            "confinement",
     ]  # fmt: skip
     assert found["fmi_version"] == version and found["problems"] == [] and found["state_capability"] == "exact"
     assert found["kinds"] == ["co_simulation", "model_exchange"]
