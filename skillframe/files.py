@@ -50,12 +50,17 @@ def writing_whole(path: Path) -> Iterator[Path]:
         yield temporary
         _sync(temporary)
         os.replace(temporary, path)
-        with suppress(OSError):  # some file systems sync no folder
-            _sync(path.parent)
+        sync_folder(path.parent)
     except OSError as error:
         raise not_written(path, error) from None
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def sync_folder(folder: Path) -> None:
+    """Make the names in a folder last over a power cut; a file system that cannot is left as it is."""
+    with suppress(OSError):
+        _sync(folder)
 
 
 def not_written(path: Path, error: OSError) -> InputError:
