@@ -1,63 +1,59 @@
 """Gets every trial's row out of workers that may die: halve what fails, and never blame the innocent.
 
-A chunk whose worker died is halved. A single trial whose worker died is only a suspect, for a scheduler blames every
-task that was queued on the dead worker; suspects are run again at the end, one by one with nothing else in flight, and
-one that dies then is recorded as the reason. A trial that raises is known for certain and recorded at once.
+A chunk whose worker died is halved. A single trial whose worker died is only a suspect, for whatever killed the worker
+may have come from outside; suspects are run again at the end, one by one with nothing else in flight, and one that dies
+then is recorded as the reason. A trial that raises is known for certain and recorded at once, unless what it raised is
+trouble of the environment (`trouble`): then nothing is recorded, and the campaign stops.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
+from skillframe.campaign.provenance import environment
 from skillframe.campaign.pulse import heard
 from skillframe.campaign.rows import ChunkJob, Row
-from skillframe.errors import SkillframeError
+from skillframe.campaign.trouble import CampaignError, Evaluate, Raised, attempt
+
+__all__ = ["Answer", "CampaignError", "Died", "Driver", "Evaluate", "InProcess", "Pool", "Raised", "chunk_size"]
 
 HOPELESS = 20
 """Chunks lost in a row from the very start after which a campaign gives up: the set-up is broken, not a trial."""
-Evaluate = Callable[[ChunkJob], list[Row]]
+WHY = {"killed": "was killed", "time limit": "made no progress for too long", "memory": "went over its memory limit"}
 
 
 class Died(NamedTuple):
-    """The worker went away under the job; cause is "killed", "time limit" or "memory"."""
+    """The worker went away under the job; cause is "killed", "time limit" (it made no progress) or "memory"."""
 
     cause: str
-
-
-class Raised(NamedTuple):
-    """The job raised."""
-
-    error: Exception
 
 
 Answer = list[Row] | Died | Raised
 
 
 class Pool(Protocol):
-    """Where jobs run.
+    """Where jobs run."""
 
-    Attributes:
-        size: how many jobs may be in flight.
-    """
+    @property
+    def size(self) -> int:
+        """How many jobs may be in flight."""
 
-    size: int
+    @property
+    def ran_on(self) -> Mapping[str, str]:
+        """Environment of the process that gave the last answer."""
 
     def submit(self, job: ChunkJob) -> None:
         """Start a job."""
 
     def next(self) -> tuple[ChunkJob, Answer]:
-        """The next job to end, and how."""
+        """The next job to end, and how; trouble of the environment only where no other worker is left to try."""
 
     def close(self) -> None:
         """End everything, including what is in flight."""
-
-
-class CampaignError(SkillframeError):
-    """Nothing works: every chunk was lost from the start."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -69,12 +65,18 @@ class Driver:
         keep: what to do with the rows of a chunk that ended.
         lost: the row of a trial that left none, from its job and the reason.
         enough: asked before each chunk; True starts no more.
+        words: a job in words, for sentences.
+        tell: told when a worker was replaced, and why.
+        fix: what to type once trouble of the environment is over.
     """
 
     pool: Pool
     keep: Callable[[list[Row]], None]
     lost: Callable[[ChunkJob, str], Row]
     enough: Callable[[], bool]
+    words: Callable[[ChunkJob], str]
+    tell: Callable[[str], None]
+    fix: str
     _good: bool = False
     _losses: int = 0
 
@@ -82,7 +84,7 @@ class Driver:
         """Run all jobs.
 
         Raises:
-            CampaignError: nothing but losses from the start.
+            CampaignError: nothing but losses from the start, or trouble of the environment.
         """
         queue, suspects, flying = deque(jobs), list[ChunkJob](), 0
         while flying or (queue and not self.enough()):
@@ -101,8 +103,14 @@ class Driver:
         if isinstance(answer, list):
             self._store(answer)
             return
+        several = len(job.trials) > 1
+        if isinstance(answer, Died):
+            again = "they run again, in halves" if several else "it runs again at the end, alone"
+            self.tell(f"a worker was replaced: it {WHY[answer.cause]} while on {self.words(job)}; {again}")
+        elif answer.trouble and not (answer.memory and several):
+            raise self._stopped(job, answer)
         self._count_loss(answer)
-        if len(job.trials) > 1:
+        if several:
             queue.extendleft(reversed(halves(job)))
         elif isinstance(answer, Died):
             suspects.append(job)
@@ -113,26 +121,32 @@ class Driver:
         """The last word on a suspect that ran alone."""
         if isinstance(answer, list):
             self._store(answer)
-        else:
-            self.keep([self.lost(job, reason_of(answer))])
+            return
+        if isinstance(answer, Raised) and answer.trouble:
+            raise self._stopped(job, answer)
+        reason = reason_of(answer)
+        self.tell(f"{self.words(job)} ran again alone, and this is its row now: {reason}")
+        self.keep([self.lost(job, reason)])
 
     def _store(self, rows: list[Row]) -> None:
         self._good = True
         self.keep(rows)
 
+    def _stopped(self, job: ChunkJob, answer: Raised) -> CampaignError:
+        return CampaignError(
+            f"stopped, while on {self.words(job)}: {answer.text}; this says nothing about the skill, so no row was "
+            f"written; put it right, then {self.fix}"
+        )
+
     def _count_loss(self, answer: Died | Raised) -> None:
         self._losses += 1
         if not self._good and self._losses >= HOPELESS:
-            error = answer.error if isinstance(answer, Raised) else None
-            raise CampaignError(f"no trial ran, {self._losses} chunks were lost: {reason_of(answer)}") from error
+            raise CampaignError(f"no trial ran, {self._losses} chunks were lost: {reason_of(answer)}")
 
 
 def reason_of(answer: Died | Raised) -> str:
     """What a row says about a trial that left no outcome."""
-    if isinstance(answer, Died):
-        return f"worker died ({answer.cause})"
-    kind = "" if isinstance(answer.error, SkillframeError) else f"{type(answer.error).__name__}: "
-    return f"error: {kind}{answer.error}"
+    return f"worker died ({answer.cause})" if isinstance(answer, Died) else f"error: {answer.text}"
 
 
 def halves(job: ChunkJob) -> list[ChunkJob]:
@@ -160,6 +174,7 @@ class InProcess:
     def __init__(self, evaluate: Evaluate, tell: Callable[[float], None]) -> None:
         self._evaluate, self._tell = evaluate, tell
         self._jobs: deque[ChunkJob] = deque()
+        self.ran_on: Mapping[str, str] = environment()
 
     def submit(self, job: ChunkJob) -> None:
         """Queue a job."""
@@ -168,11 +183,8 @@ class InProcess:
     def next(self) -> tuple[ChunkJob, Answer]:
         """Run the next job now."""
         job = self._jobs.popleft()
-        try:
-            with heard(lambda share: self._tell(share * len(job.trials))):
-                return job, self._evaluate(job)
-        except Exception as error:  # whatever a skill or world raises is that trial's outcome
-            return job, Raised(error)
+        with heard(lambda share: self._tell(share * len(job.trials))):
+            return job, attempt(self._evaluate, job)
 
     def close(self) -> None:
         """Nothing to end."""

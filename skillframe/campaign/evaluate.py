@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,8 +21,10 @@ from skillframe.campaign.pulse import beat
 from skillframe.campaign.rows import EXTRA, OUTCOME, TRACE, ChunkJob, Row, plain_value, rows_of
 from skillframe.campaign.sampling import draws, trial_rngs
 from skillframe.campaign.spec import CampaignSpec
+from skillframe.campaign.trouble import needed
 from skillframe.executor import QUANTITIES, simulate
 from skillframe.prepare import load_robot_model, load_world, prepare
+from skillframe.registry import registry
 from skillframe.robot.model import RobotModel
 from skillframe.robot.payload import with_payload
 from skillframe.skillsource import load_skill
@@ -38,7 +41,8 @@ def evaluate(job: ChunkJob) -> list[Row]:
     """Simulate a chunk; rows in the order of its trials.
 
     Raises:
-        SkillframeError: a skill, robot, world or draw that cannot be used.
+        Unusable: the skill, the robot or the world cannot be loaded here.
+        SkillframeError: a draw that cannot be used.
     """
     spec = CampaignSpec.from_plain(job.spec, Path(job.folder))
     drawn = draws(spec, job.trials)
@@ -126,9 +130,15 @@ def _simulate(
     progress: Callable[[float], None],
 ) -> list[Row]:  # fmt: skip
     """Rows of trials that share a scene."""
-    robot = load_robot_model(str(spec.folder / spec.robot))
-    _, document = load_skill(spec.skills[job.skill], spec.folder)
-    skill, setup = prepare(robot, _scene(spec, scene), document, spec.coc)
+    with needed("the robot"):
+        robot = load_robot_model(str(spec.folder / spec.robot))
+    with needed(f"the skill {spec.labels[job.skill]}"):
+        _, document = load_skill(spec.skills[job.skill], spec.folder)
+    with needed(f"the world {spec.world}"):
+        registry().world(spec.world)
+    # a drawn scene may be one that the world or the skill refuses; the nominal one was accepted before the campaign
+    with nullcontext() if scene else needed("the scene or the skill"):
+        skill, setup = prepare(robot, _scene(spec, scene), document, spec.coc)
     constant = {n: np.full(len(trials), v) for n, v in spec.fixed.items() if not n.startswith("world.")}
     varied = {name: values for name, values in draws(spec, trials).items() if name not in scene}
     result = simulate(

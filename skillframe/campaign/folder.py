@@ -16,6 +16,7 @@ import json
 import os
 import re
 import shutil
+import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -27,6 +28,7 @@ from skillframe.campaign.provenance import combined_hash, file_hashes
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.config import build, read_toml
 from skillframe.errors import InputError, UnknownName
+from skillframe.files import sync_folder, write_whole
 from skillframe.paths import data_dirs
 
 CAMPAIGN, SCENE = "campaign.toml", "scene.json"
@@ -50,23 +52,42 @@ def prepare(spec: CampaignSpec, out: Path, describe: Describe, params: type) -> 
         InputError: the folder holds something, a robot or skill cannot be found, or `describe` refuses.
     """
     _refuse_full(out)
-    temporary = out.absolute().with_name(f"{out.absolute().name}.tmp-{os.getpid()}")
-    shutil.rmtree(temporary, ignore_errors=True)
+    out.absolute().parent.mkdir(parents=True, exist_ok=True)
+    temporary = Path(tempfile.mkdtemp(dir=out.absolute().parent, prefix=f".{out.absolute().name}."))
     try:
-        temporary.mkdir(parents=True)
+        temporary.chmod(0o777 & ~_umask())
         ready = replace(
             spec, folder=temporary, skills=_copy_skills(spec, temporary), robot=_copy_robot(spec, temporary),
             fixed=_all_fixed(spec, params),
         )  # fmt: skip
-        (temporary / CAMPAIGN).write_text(to_toml(ready), encoding="utf-8")
-        (temporary / SCENE).write_text(json.dumps(describe(ready), sort_keys=True), encoding="utf-8")
+        write_whole(temporary / CAMPAIGN, to_toml(ready).encode())
+        write_whole(temporary / SCENE, json.dumps(describe(ready), sort_keys=True).encode())
+        for folder, _, _ in os.walk(temporary):
+            sync_folder(Path(folder))
         os.replace(temporary, out)
+        sync_folder(out.absolute().parent)
     except InputError as error:  # the copies are of no use to whoever reads it
         where = error.where.replace(f"{temporary}/skills", str(spec.folder)).replace(f"{temporary}/", "")
         raise InputError(where, error.problem, error.fix) from None
+    except OSError as error:
+        named = str(error.filename2 or error.filename or temporary).replace(str(temporary), str(out))
+        raise InputError(named, f"cannot be written ({error.strerror or error})", "nothing was kept") from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
     return CampaignSpec.from_toml(out / CAMPAIGN, params)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def sweep(folder: Path) -> None:
+    """Remove what killed sessions left half written; only under the folder's lock."""
+    for place in (folder, folder / "traces"):
+        for path in place.glob(".*.tmp"):
+            path.unlink(missing_ok=True)
 
 
 def load(folder: Path, params: type | None = None) -> CampaignSpec:

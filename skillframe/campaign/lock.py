@@ -7,6 +7,7 @@ system) nobody can tell, so it is refused with the sentence that says what to do
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import json
 import os
@@ -46,7 +47,7 @@ class FolderLock:
 
     def _acquire(self) -> int:
         while True:
-            descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o644)
+            descriptor = self._open()
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 self._refuse_other_host(descriptor)
@@ -61,6 +62,15 @@ class FolderLock:
             if self._is_current(descriptor):
                 return descriptor
             os.close(descriptor)  # its owner removed it between our opening and locking it
+
+    def _open(self) -> int:
+        """The file, made if need be, and never through a link."""
+        try:
+            return os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+        except OSError as error:
+            if error.errno == errno.ELOOP:
+                raise InputError(self._path, "is a link, and no lock of a campaign", "delete it") from None
+            raise
 
     def _is_current(self, descriptor: int) -> bool:
         with suppress(FileNotFoundError):

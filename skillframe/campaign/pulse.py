@@ -1,4 +1,8 @@
-"""How far the chunk is that this process simulates: said by whoever evaluates it, heard by whoever listens here."""
+"""How far the chunk is that this process simulates: said by whoever evaluates it, heard by whoever listens here.
+
+What is said is the share of the simulated time, so it stands still where the simulation does; the watchdog of a worker
+(`worker`) goes by that.
+"""
 
 from __future__ import annotations
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from skillframe.campaign.driver import Evaluate
 from skillframe.campaign.folder import campaign_hash, load
 from skillframe.campaign.provenance import environment, environment_differences
-from skillframe.campaign.rows import TRACE, ChunkJob, Row, differences
-from skillframe.campaign.store import read_rows
+from skillframe.campaign.rows import TRACE, ChunkJob, Row, dead_row, differences
+from skillframe.campaign.store import Content, read_content
+from skillframe.campaign.trouble import CampaignError, Evaluate, Raised, attempt
 from skillframe.errors import InputError, UnknownName
 
 
@@ -21,7 +21,7 @@ class Replayed(NamedTuple):
         then: the campaign's row.
         now: the row of the trial run alone.
         changed: columns that are not bit-identical, with both values; two NaN are the same.
-        environment: one line per version or processor that is not what the campaign last ran on.
+        environment: one line per version or processor that is not what the trial ran on.
         trace: content of the trace file.
     """
 
@@ -45,12 +45,14 @@ def replay_trial(
         params: the world's parameter dataclass; None looks it up.
 
     Raises:
-        InputError: no such folder, or the trial has no row (yet).
+        InputError: no such folder, rows that are not this campaign's, or the trial has no row (yet).
         UnknownName: no such skill.
+        CampaignError: it cannot run here.
     """
     spec = load(folder, params)
     label = pick_label(spec.labels, skill)
-    done, sessions = read_rows(folder, campaign_hash(spec))
+    found = read_content(folder, campaign_hash(spec), spec)
+    done = found.done
     if (trial, label) not in done:
         numbers = sorted(t for t, name in done if name == label)
         have = f"it has {len(numbers)} trials" + (f", {numbers[0]} to {numbers[-1]}" if numbers else "")
@@ -58,12 +60,24 @@ def replay_trial(
     job = ChunkJob(
         spec=spec.plain(), folder=str(folder.resolve()), skill=spec.labels.index(label), trials=(trial,), traces=True
     )
-    now = evaluate(job)[0]
+    answer = attempt(evaluate, job)
+    if isinstance(answer, Raised) and answer.trouble:
+        raise CampaignError(f"trial {trial} of {label} cannot run here: {answer.text}")
+    now = dead_row(spec, job.skill, trial, f"error: {answer.text}") if isinstance(answer, Raised) else answer[0]
     trace = now.pop(TRACE, None)
-    ran_on = [session["environment"] for session in sessions if "environment" in session]
-    changes = environment_differences(ran_on[-1], environment()) if ran_on else []
+    ran_on = _ran_on(found, trial, label)
+    changes = environment_differences(ran_on, environment()) if ran_on else []
     then = done[trial, label]
     return Replayed(then, now, differences(then, now), changes, trace)
+
+
+def _ran_on(found: Content, trial: int, label: str) -> Mapping[str, str]:
+    """Where a trial's row ran; of a row that does not say, where the campaign last ran."""
+    (number,) = (x.ran_on for x in found.lines if (x.row["trial"], x.row["skill"]) == (trial, label))
+    if number is not None and number < len(found.environments):
+        return found.environments[number]
+    ran_on = [session["environment"] for session in found.sessions if "environment" in session]
+    return ran_on[-1] if ran_on else {}
 
 
 def pick_label(labels: Sequence[str], skill: str | None) -> str:

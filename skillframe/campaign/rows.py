@@ -16,17 +16,11 @@ import numpy as np
 from skillframe.campaign.sampling import draws
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.documents import shown
-from skillframe.errors import InputError
 
 Row = dict[str, Any]
 MEASURES = ("duration_s", "peak_force_n", "final_error_m", "final_error_rad")
 OUTCOME = ("success", "failure", *MEASURES)
 EXTRA = ("status", "reason")
-STORED: dict[str, Any] = {
-    "trial": int, "skill": str, "seed": int, "success": bool, "failure": str, **dict.fromkeys(MEASURES, (int, float)),
-}  # fmt: skip
-NOT_FINITE = ("nan", "inf", "-inf")
-"""What `encode` writes for numbers that JSON does not know."""
 TRACE = "trace"
 """Key of a row's trace as the bytes of a trace file, taken out before the row is stored."""
 
@@ -48,6 +42,13 @@ class ChunkJob:
     skill: int
     trials: tuple[int, ...]
     traces: bool = False
+
+
+def trials_of(job: ChunkJob, spec: CampaignSpec) -> str:
+    """The job in words: "trials 0 to 15 of peg.skill.json"."""
+    first, last = job.trials[0], job.trials[-1]
+    numbers = f"trial {first}" if first == last else f"trials {first} to {last}"
+    return f"{numbers} of {spec.labels[job.skill]}"
 
 
 def columns(spec: CampaignSpec) -> list[str]:
@@ -93,20 +94,6 @@ def encode(value: Any) -> Any:
 def decode(row: Row) -> Row:
     """A row as it was before `encode`."""
     return {key: float(v) if key in MEASURES and isinstance(v, str) else v for key, v in row.items()}
-
-
-def check_row(where: str, row: Row) -> None:
-    """Refuse a stored row that lacks a key or holds another kind of value than was written.
-
-    Raises:
-        InputError: names the line and the key.
-    """
-    for key, kind in STORED.items():
-        value = row.get(key)
-        sound = isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
-        if not sound and not (key in MEASURES and value in NOT_FINITE):
-            problem = f"is {value!r:.60}" if key in row else "is missing"
-            raise InputError(f"{where}: {key}", problem, "delete that line, its trial will run again")
 
 
 def cell(value: Any) -> str:

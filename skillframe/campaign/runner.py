@@ -1,30 +1,34 @@
 """Runs a prepared campaign to its end, from wherever it stands: the first run and a resume are the same thing.
 
 Rows are stored the moment a chunk ends; a kill loses the chunks in flight and nothing else. However it ends - done,
-early, interrupted, failed - results.csv and summary.json are written from the rows that are there. Last, the first
-trials and the first failures of each skill run once more to leave their traces; because a trial's row does not depend
-on what runs beside it, that costs a few trials instead of traces of all.
+early, interrupted, stopped by trouble of the environment (`trouble`) - results.csv and summary.json are written from
+the rows that are there. Last, the first trials and the first failures of each skill run once more to leave their
+traces; because a trial's row does not depend on what runs beside it, that costs a few trials instead of traces of all.
 """
 
 from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Iterator
-from contextlib import closing
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from skillframe.campaign.driver import Driver, Evaluate, InProcess, Pool, chunk_size
-from skillframe.campaign.folder import COPIES, campaign_hash, load
+from skillframe.campaign.driver import CampaignError, Driver, Evaluate, InProcess, Pool, chunk_size
+from skillframe.campaign.folder import CAMPAIGN, COPIES, campaign_hash, load, sweep
+from skillframe.campaign.identity import identity, needed_plugins
 from skillframe.campaign.lock import FolderLock
 from skillframe.campaign.provenance import environment, file_hash, file_hashes
-from skillframe.campaign.rows import TRACE, ChunkJob, Row, dead_row, differences
+from skillframe.campaign.remarks import remarks
+from skillframe.campaign.rows import TRACE, ChunkJob, Row, dead_row, differences, trials_of
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.stopping import StopRule
-from skillframe.campaign.store import RESULTS, RowLog, ordered, write_bytes, write_results
+from skillframe.campaign.store import RESULTS, RowLog, ordered, write_results
 from skillframe.campaign.summary import summarize, write_summary
+from skillframe.files import write_whole
 
 CHUNK = 64
 """Largest number of trials per job: batching has paid off by then, and a kill loses little."""
@@ -32,6 +36,10 @@ TRACES = 8
 SAMPLE = 2
 WATCH = "watch"
 """Folder in a campaign's folder for the files of the workers that run now."""
+STILL_S = 120.0
+"""Wall time without progress after which a worker is taken for hung; our choice. Version 0.1 allowed a single trial 60
+s besides 0.25 s per simulated second, several times what any world was measured to take. Progress is told every ten
+milliseconds of simulated time, so what takes longest without it is to learn a skill on the spot: twice those 60 s."""
 
 
 class Progress(NamedTuple):
@@ -41,7 +49,8 @@ class Progress(NamedTuple):
         done: rows stored.
         total: rows planned.
         note: a sentence if there is something to say.
-        under_way: how many rows' worth of the chunks in flight is done.
+        under_way: how many rows' worth of the chunks in flight is done; `done + under_way` never falls, so after a
+            chunk was lost it stands still until the same is done again.
     """
 
     done: int
@@ -58,8 +67,7 @@ class Options:
         workers: local processes; None runs in this one.
         scheduler: address of a Dask scheduler to use instead.
         chunk: largest number of trials per job.
-        time_limit_s: wall time a job may take; None is a minute plus a quarter second per simulated second and trial,
-            several times what any world was measured to take.
+        time_limit_s: wall time that a job may take without simulated time going on; a slow one may take for ever.
         memory_bytes: limit per local worker; None shares the machine's.
         traces: how many trials per skill leave a trace: the first `SAMPLE`, then the first failures.
     """
@@ -67,7 +75,7 @@ class Options:
     workers: int | None = None
     scheduler: str | None = None
     chunk: int = CHUNK
-    time_limit_s: float | None = None
+    time_limit_s: float = STILL_S
     memory_bytes: int | None = None
     traces: int = TRACES
 
@@ -90,12 +98,19 @@ def run_campaign(
 
     Raises:
         InputError: not a campaign's folder, one that another process is writing, or rows of another campaign.
-        CampaignError: nothing ran at all.
+        CampaignError: nothing ran at all, or trouble of the environment stopped it.
         KeyboardInterrupt: after the rows so far were written out.
     """
     spec = load(folder, params)
-    with FolderLock(folder), RowLog(folder, campaign_hash(spec)) as log:
-        return _Session(spec, log, options or Options(), notify or (lambda progress: None)).run(evaluate)
+    try:
+        with FolderLock(folder), RowLog(folder, campaign_hash(spec), spec) as log:
+            sweep(folder)
+            return _Session(spec, log, options or Options(), notify or (lambda progress: None)).run(evaluate)
+    except OSError as error:  # of our own files: a trial's was judged where it was raised
+        raise CampaignError(
+            f"{error.filename or folder}: {error.strerror or error}; finished rows are kept, put it right, then "
+            f"{_resume(folder)}"
+        ) from error
 
 
 class _Session:
@@ -106,28 +121,50 @@ class _Session:
         self.rule = StopRule(spec)
         self.rule.add(log.done.values())
         self.total = spec.trials * len(spec.skills)
+        self.furthest = 0.0
 
     def run(self, evaluate: Evaluate) -> dict[str, Any]:
         """Run, store, and write the tables whatever happens."""
         start = time.perf_counter()
         self._tell()
+        for text in self._remarks() if self.log.unchecked else ():
+            self._tell(text)
         try:
             if not self._complete() or self._untraced():
                 with closing(self._pool(evaluate)) as pool:
                     self.log.note({"environment": environment(), "workers": pool.size, "started": time.time()})
-                    self._driver(pool, self._keep).run(self._jobs(pool.size))
+                    self._driver(pool, lambda rows: self._keep(rows, pool.ran_on)).run(self._jobs(pool.size))
                     self._again(pool)
-        finally:
-            self.log.note({"wall_s": time.perf_counter() - start})
-            summary = self._write()
-        return summary
+        except BaseException:
+            with suppress(OSError):  # what stopped it is worth more words than what cannot be written now
+                self._conclude(start)
+            raise
+        return self._conclude(start)
+
+    def _remarks(self) -> list[str]:
+        rows, log = list(self.log.done.values()), self.log
+        return remarks(self.spec.folder, rows, unchecked=log.unchecked, environments=log.environments, summary=None)
+
+    def _conclude(self, start: float) -> dict[str, Any]:
+        """Note the time and write the tables; into no folder that is not there any more."""
+        self._check_in_place()
+        self.log.note({"wall_s": time.perf_counter() - start})
+        return self._write()
+
+    def _check_in_place(self) -> None:
+        folder = self.spec.folder
+        if not (folder / CAMPAIGN).is_file() or not self.log.in_place():
+            raise CampaignError(
+                f"{folder}: the campaign's folder was moved or deleted while it ran; finished rows are in it where it "
+                f"is now, go on there with skillframe campaign resume"
+            )
 
     def _again(self, pool: Pool) -> None:
         """Run once more what is to leave a trace."""
         jobs = self._untraced()
         if jobs:
             self._tell(f"{sum(len(job.trials) for job in jobs)} of them run again, to leave traces")
-        self._driver(pool, self._keep_traces).run(jobs)
+        self._driver(pool, self._keep_traces, traces=True).run(jobs)
 
     def _pool(self, evaluate: Evaluate) -> Pool:
         if self.options.workers is None and self.options.scheduler is None:
@@ -135,16 +172,17 @@ class _Session:
         from skillframe.campaign.cluster import ClusterPool
 
         return ClusterPool(
-            evaluate, self._seconds, workers=self.options.workers or 1, scheduler=self.options.scheduler,
+            evaluate, self.options.time_limit_s, workers=self.options.workers or 1, scheduler=self.options.scheduler,
             memory_bytes=self.options.memory_bytes, watch=self.spec.folder.resolve() / WATCH, tell=self._tell_share,
+            ours=(ours := identity(plugins=self.options.scheduler is not None)),
+            needed=needed_plugins(self.spec, ours), note=self._tell,
         )  # fmt: skip
 
-    def _seconds(self, job: ChunkJob) -> float:
-        return self.options.time_limit_s or 60.0 + 0.25 * self.spec.duration_s * len(job.trials)
-
-    def _driver(self, pool: Pool, keep: Callable[[list[Row]], None]) -> Driver:
-        traces = keep == self._keep_traces
-        return Driver(pool=pool, keep=keep, lost=self._lost, enough=lambda: not traces and self.rule.after is not None)
+    def _driver(self, pool: Pool, keep: Callable[[list[Row]], None], traces: bool = False) -> Driver:
+        return Driver(
+            pool=pool, keep=keep, lost=self._lost, enough=lambda: not traces and self.rule.after is not None,
+            words=lambda job: trials_of(job, self.spec), tell=self._tell, fix=_resume(self.spec.folder),
+        )  # fmt: skip
 
     def _lost(self, job: ChunkJob, reason: str) -> Row:
         return dead_row(self.spec, job.skill, job.trials[0], reason)
@@ -163,17 +201,20 @@ class _Session:
         folder = str(self.spec.folder.resolve())
         return ChunkJob(spec=self.spec.plain(), folder=folder, skill=skill, trials=trials, traces=traces)
 
-    def _keep(self, rows: list[Row]) -> None:
-        self.rule.add(self.log.append(rows))
+    def _keep(self, rows: list[Row], environment: Mapping[str, str]) -> None:
+        self.rule.add(self.log.append(rows, environment))
+        self._check_in_place()
         self._tell()
 
-    def _tell(self, note: str = "") -> None:
-        self.notify(Progress(len(self.log.done), self.total, note))
+    def _tell(self, note: str = "", under_way: float = 0.0) -> None:
+        done = len(self.log.done)
+        self.furthest = min(max(self.furthest, done + under_way), self.total)
+        self.notify(Progress(done, self.total, note, self.furthest - done))
 
     def _tell_share(self, under_way: float) -> None:
         """Between chunks; the traces at the end are no rows."""
         if len(self.log.done) < self.total:
-            self.notify(Progress(len(self.log.done), self.total, under_way=under_way))
+            self._tell(under_way=under_way)
 
     def _complete(self) -> bool:
         return self.rule.after is not None or len(self.log.done) == self.total
@@ -195,13 +236,19 @@ class _Session:
         for row in rows:
             content = row.pop(TRACE, None)
             if content is not None:
-                write_bytes(trace_path(self.spec.folder, row["trial"], row["skill"]), content)
+                write_whole(trace_path(self.spec.folder, row["trial"], row["skill"]), content)
             changed = differences(self.log.done[row["trial"], row["skill"]], row)
             if changed:
                 self._tell(f"trial {row['trial']} of {row['skill']} came out differently when run again: {changed}")
 
     def _rows(self) -> list[Row]:
         return ordered(self.spec, self.log.done.values(), self.rule.after)
+
+    def _environments(self, rows: list[Row]) -> list[dict[str, Any]]:
+        """Where rows ran, and how many; those of skillframe 0.1 do not say."""
+        counts = Counter(self.log.ran_on.get((row["trial"], row["skill"])) for row in rows)
+        noted = enumerate(self.log.environments)
+        return [{"rows": counts[n], "versions": dict(environment)} for n, environment in noted if counts[n]]
 
     def _write(self) -> dict[str, Any]:
         folder, rows = self.spec.folder, self._rows()
@@ -214,8 +261,13 @@ class _Session:
         summary = summarize(
             self.spec, rows, self.log.sessions, complete=self._complete(), stop_after=self.rule.after, hashes=hashes
         )
+        summary["environments"] = self._environments(rows)
         write_summary(folder, summary)
         return summary
+
+
+def _resume(folder: Path) -> str:
+    return f"type: skillframe campaign resume {folder}"
 
 
 def trace_path(folder: Path, trial: int, label: str) -> Path:

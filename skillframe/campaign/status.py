@@ -7,9 +7,10 @@ from typing import Any
 
 from skillframe.campaign.folder import campaign_hash, load
 from skillframe.campaign.lock import holder
+from skillframe.campaign.remarks import remarks
 from skillframe.campaign.stopping import StopRule
-from skillframe.campaign.store import ordered, read_rows
-from skillframe.campaign.summary import comparisons, rates
+from skillframe.campaign.store import ordered, read_content
+from skillframe.campaign.summary import SUMMARY, comparisons, rates, read_summary
 
 
 def status_of(folder: Path, params: type | None = None) -> dict[str, Any]:
@@ -21,13 +22,14 @@ def status_of(folder: Path, params: type | None = None) -> dict[str, Any]:
 
     Returns:
         `name`, `rows`, `planned_rows`, `complete`, `stopped_after_trial`, `running` (null, or `pid` and `host` of the
-        process that is writing), `skills` and `comparisons` as in summary.json.
+        process that is writing), `skills` and `comparisons` as in summary.json, `remarks`: sentences to be read first.
 
     Raises:
-        InputError: not a campaign's folder, or rows of another campaign.
+        InputError: not a campaign's folder, or rows of another campaign or changed ones.
     """
     spec = load(folder, params)
-    done, _ = read_rows(folder, campaign_hash(spec))
+    found = read_content(folder, campaign_hash(spec), spec)
+    done = found.done
     rule = StopRule(spec)
     rule.add(done.values())
     planned = spec.trials * len(spec.skills)
@@ -42,4 +44,8 @@ def status_of(folder: Path, params: type | None = None) -> dict[str, Any]:
         "running": {"pid": owner[0], "host": owner[1]} if owner else None,
         "skills": rates(spec, rows, complete),
         "comparisons": comparisons(spec, rows, complete),
-    }
+        "remarks": remarks(
+            folder, rows, unchecked=found.unchecked, environments=found.environments,
+            summary=read_summary(folder) if (folder / SUMMARY).is_file() and not owner else None,
+        ),
+    }  # fmt: skip

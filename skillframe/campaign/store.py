@@ -1,9 +1,10 @@
 """The rows of a campaign, kept so that a kill at any moment loses at most the trials then running.
 
-`rows.jsonl` is written by one process, a line per row, flushed at once (a killed process loses nothing that was
-flushed) and synced to disk per chunk (nor does a power cut lose more than that chunk). Its first line names the
-campaign by its hash. A torn last line is cut off when the file is opened. `results.csv` is written from it, sorted by
-trial and skill, so it does not depend on the order in which chunks end; whole or not at all.
+`rows.jsonl` is written by one process, a line per row; the rows of a chunk go to the disk in one write and are synced
+(a power cut loses no more than that chunk). Its first line names the campaign by its hash, and every line ends with the
+CRC-32 of what stands before it, which catches damage and careless edits, not a forger. A torn last line is cut off
+when the file is opened. `results.csv` is written from it, sorted by trial and skill, so it does not depend on the order
+in which chunks end; whole or not at all.
 """
 
 from __future__ import annotations
@@ -12,19 +13,54 @@ import csv
 import io
 import json
 import os
+import re
+import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
-from skillframe.campaign.rows import Row, cell, check_row, columns, decode, encode
+from skillframe.campaign.rows import Row, cell, columns, decode, encode
 from skillframe.campaign.spec import CampaignSpec
+from skillframe.campaign.verify import FIX, KEYS, KINDS, Line, check_rows, check_shape
 from skillframe.documents import parse_json
 from skillframe.errors import InputError
+from skillframe.files import write_whole
 
 ROWS, RESULTS = "rows.jsonl", "results.csv"
 FORMAT, VERSION = "skillframe.campaign", 1
+ROWS_VERSION = 2
+"""1 had no checksums; its files are read, and said to be so."""
+RAN_ON = "ran_on"
+"""Key of a line that says in which of the noted environments its row ran."""
 Done = dict[tuple[int, str], Row]
+Environment = Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Content:
+    """What `rows.jsonl` holds.
+
+    Attributes:
+        lines: the stored rows.
+        sessions: what was noted about each process that wrote here.
+        unchecked: how many lines carry no checksum, as in files of skillframe 0.1.
+    """
+
+    lines: tuple[Line, ...] = ()
+    sessions: tuple[dict[str, Any], ...] = ()
+    unchecked: int = 0
+
+    @property
+    def done(self) -> Done:
+        """The stored rows by (trial, skill)."""
+        return {(line.row["trial"], line.row["skill"]): line.row for line in self.lines}
+
+    @property
+    def environments(self) -> list[Environment]:
+        """Where rows ran, by the number that their lines give."""
+        return [session[RAN_ON] for session in self.sessions if RAN_ON in session]
 
 
 class RowLog:
@@ -32,46 +68,81 @@ class RowLog:
 
     Attributes:
         done: the stored rows by (trial, skill).
+        ran_on: the number of the environment in which a row ran, as far as it is known.
         sessions: what was noted about each process that wrote here.
+        unchecked: lines without a checksum that were read.
 
     Raises:
-        InputError: on construction, if the file is of another campaign.
+        InputError: on construction, if the file is of another campaign, or its rows are not what `spec` draws.
     """
 
-    def __init__(self, folder: Path, campaign: str) -> None:
-        path = folder / ROWS
-        repair_tail(path)
-        self.done, self.sessions = read_rows(folder, campaign)
-        self._file: BinaryIO = path.open("ab")
-        if self._file.tell() == 0:
-            self._write({"format": FORMAT, "version": VERSION, "campaign": campaign})
-            self._sync()
+    def __init__(self, folder: Path, campaign: str, spec: CampaignSpec | None = None) -> None:
+        self._path = folder / ROWS
+        repair_tail(self._path)
+        found = read_content(folder, campaign, spec)
+        self.done, self.sessions, self.unchecked = found.done, list(found.sessions), found.unchecked
+        self.ran_on = {(x.row["trial"], x.row["skill"]): x.ran_on for x in found.lines if x.ran_on is not None}
+        self.environments = found.environments
+        self._descriptor = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+        if os.fstat(self._descriptor).st_size == 0:
+            self._write([{"format": FORMAT, "version": ROWS_VERSION, "campaign": campaign}])
 
-    def append(self, rows: Iterable[Row]) -> list[Row]:
-        """Store rows; returns those that are new (a trial that is stored already keeps its first row)."""
+    def append(self, rows: Iterable[Row], environment: Environment | None = None) -> list[Row]:
+        """Store rows, and where they ran; returns those that are new (a stored trial keeps its first row)."""
         fresh = [row for row in rows if (row["trial"], row["skill"]) not in self.done]
-        for row in fresh:
-            self._write({key: encode(value) for key, value in row.items()})
-            self.done[row["trial"], row["skill"]] = row
+        where = {} if environment is None or not fresh else {RAN_ON: self._number(environment)}
+        self._write([{key: encode(value) for key, value in row.items()} | where for row in fresh])
+        self.done |= {(row["trial"], row["skill"]): row for row in fresh}  # before the sync, where Ctrl-C may come
+        if where:
+            self.ran_on |= {(row["trial"], row["skill"]): where[RAN_ON] for row in fresh}
         self._sync()
         return fresh
 
+    def _number(self, environment: Environment) -> int:
+        """The number under which an environment is noted; noted now if it is new."""
+        if environment not in self.environments:
+            self.note({RAN_ON: dict(environment)})
+            self.environments.append(environment)
+        return self.environments.index(environment)
+
     def note(self, session: Mapping[str, Any]) -> None:
         """Store a note about this session (environment, workers, wall time)."""
-        self._write({"session": session})
+        self._write([{"session": session}])
         self.sessions.append(dict(session))
         self._sync()
 
-    def _write(self, record: Mapping[str, Any]) -> None:
-        self._file.write(json.dumps(record, allow_nan=False, ensure_ascii=False).encode() + b"\n")
-        self._file.flush()
+    def _write(self, records: Sequence[Mapping[str, Any]]) -> None:
+        """Append lines; where that fails, the file is as it was.
+
+        Raises:
+            OSError: `filename` is the file.
+        """
+        content = b"".join(map(_line, records))
+        size = os.fstat(self._descriptor).st_size
+        try:
+            written = 0
+            while written < len(content):
+                written += os.write(self._descriptor, content[written:])
+        except OSError as error:
+            with suppress(OSError):
+                os.ftruncate(self._descriptor, size)
+            raise type(error)(error.errno, error.strerror, str(self._path)) from None
 
     def _sync(self) -> None:
-        os.fsync(self._file.fileno())
+        try:
+            os.fsync(self._descriptor)
+        except OSError as error:
+            raise type(error)(error.errno, error.strerror, str(self._path)) from None
+
+    def in_place(self) -> bool:
+        """Whether the file that is written is still the one under its name: the folder was not moved or deleted."""
+        with suppress(OSError):
+            return os.path.samestat(os.fstat(self._descriptor), self._path.stat())
+        return False
 
     def close(self) -> None:
         """Close the file."""
-        self._file.close()
+        os.close(self._descriptor)
 
     def __enter__(self) -> RowLog:
         return self
@@ -89,31 +160,60 @@ def repair_tail(path: Path) -> None:
             file.truncate(whole)
 
 
-def read_rows(folder: Path, campaign: str | None = None) -> tuple[Done, list[dict[str, Any]]]:
-    """Stored rows by (trial, skill), and the sessions' notes; a torn last line is left out.
+def read_rows(
+    folder: Path, campaign: str | None = None, spec: CampaignSpec | None = None
+) -> tuple[Done, list[dict[str, Any]]]:
+    """Stored rows by (trial, skill), and the sessions' notes; as `read_content`."""
+    found = read_content(folder, campaign, spec)
+    return found.done, list(found.sessions)
+
+
+def read_content(folder: Path, campaign: str | None = None, spec: CampaignSpec | None = None) -> Content:
+    """What `rows.jsonl` holds; a torn last line is left out.
 
     Args:
         folder: the campaign's folder.
         campaign: the hash that the file must carry; None to take any.
+        spec: the campaign that the rows are held against; None trusts them.
 
     Raises:
-        InputError: not a campaign's rows, of another campaign, or damaged before the last line.
+        InputError: not a campaign's rows, of another campaign, or damaged or changed before the last line.
     """
     path = folder / ROWS
     try:
         content = path.read_bytes()
     except FileNotFoundError:
-        return {}, []
-    lines = content[: content.rfind(b"\n") + 1].splitlines()
-    records = [_record(path, number, line) for number, line in enumerate(lines, start=1)]
-    if records:
-        _check_header(path, records[0], campaign)
-    done: Done = {}
-    for number, row in enumerate(records[1:], start=2):
-        if "session" not in row:
-            check_row(f"{path}: line {number}", row)
-            done.setdefault((row["trial"], row["skill"]), decode(row))
-    return done, [r["session"] for r in records if isinstance(r.get("session"), dict)]
+        return Content()
+    texts = content.split(b"\n")[:-1]
+    records = [_record(path, number, text) for number, text in enumerate(texts, start=1)]
+    if not records:
+        return Content()
+    unchecked = sum(_checked(text) is None for text in texts)
+    if _check_header(path, records[0], campaign) >= ROWS_VERSION and unchecked:
+        number = 1 + next(i for i, text in enumerate(texts) if _checked(text) is None)
+        raise InputError(f"{path}: line {number}", "has lost its checksum", FIX)
+    lines = tuple(
+        _row(path, n, record, spec) for n, record in enumerate(records[1:], start=2) if "session" not in record
+    )
+    _check_twice(path, lines)
+    if spec is not None:
+        check_rows(path, spec, lines)
+    return Content(
+        lines=lines, sessions=tuple(_session(path, n, r) for n, r in enumerate(records, 1) if "session" in r),
+        unchecked=unchecked,
+    )  # fmt: skip
+
+
+def _line(record: Mapping[str, Any]) -> bytes:
+    """A record as a line that ends with the checksum of what stands before it."""
+    text = json.dumps(record, allow_nan=False, ensure_ascii=False).encode()[:-1]
+    return b'%s, "crc32": "%08x"}\n' % (text, zlib.crc32(text))
+
+
+def _checked(line: bytes) -> bool | None:
+    """Whether a line is as it was written; None if it carries no checksum."""
+    found = re.search(rb', "crc32": "([0-9a-f]{8})"\}$', line)
+    return None if found is None else zlib.crc32(line[: found.start()]) == int(found[1], 16)
 
 
 def _record(path: Path, number: int, line: bytes) -> Row:
@@ -124,36 +224,60 @@ def _record(path: Path, number: int, line: bytes) -> Row:
         raise InputError(where, f"is damaged ({error.problem})", again) from None
     if not isinstance(record, dict):
         raise InputError(where, "is damaged", again)
+    if _checked(line) is False:
+        raise InputError(where, "was changed after it was written (its checksum does not fit)", FIX)
+    record.pop("crc32", None)
     return record
 
 
-def _check_header(path: Path, header: Row, campaign: str | None) -> None:
-    if header.get("format") != FORMAT:
+def _row(path: Path, number: int, record: Row, spec: CampaignSpec | None) -> Line:
+    ran_on = record.pop(RAN_ON, None)
+    where = f"{path}: line {number}"
+    try:
+        row = decode(record)
+    except ValueError as error:
+        raise InputError(where, str(error), FIX) from None
+    check_shape(where, row, KINDS if spec is not None else KEYS)
+    return Line(number, row, ran_on if isinstance(ran_on, int) else None)
+
+
+def _check_twice(path: Path, lines: Sequence[Line]) -> None:
+    seen: dict[tuple[int, str], int] = {}
+    for line in lines:
+        first = seen.setdefault((line.row["trial"], line.row["skill"]), line.number)
+        if first != line.number:
+            problem = f"is a second row of trial {line.row['trial']} of {line.row['skill']} (the first is line {first})"
+            raise InputError(f"{path}: line {line.number}", problem, FIX)
+
+
+def _session(path: Path, number: int, record: Row) -> dict[str, Any]:
+    session = record["session"]
+    kinds: tuple[tuple[str, Any, Any], ...] = (
+        ("environment", dict, {}), (RAN_ON, dict, {}), ("wall_s", (int, float), 0.0),
+    )  # fmt: skip
+    if not isinstance(session, dict) or not all(isinstance(session.get(k, absent), t) for k, t, absent in kinds):
+        raise InputError(f"{path}: line {number}", "is no note of a session", "delete that line")
+    return session
+
+
+def _check_header(path: Path, header: Row, campaign: str | None) -> int:
+    """The file's version."""
+    version = header.get("version", 0)
+    if header.get("format") != FORMAT or not isinstance(version, int):
         raise InputError(f"{path}: line 1", "is not the head of a campaign's rows", "start again in a new folder")
-    version = header.get("version")
-    if not isinstance(version, int) or version > VERSION:
-        raise InputError(f"{path}: line 1", f"version {version!r:.40} is newer than {VERSION}", "update skillframe")
+    if version > ROWS_VERSION:
+        raise InputError(f"{path}: line 1", f"version {version} is newer than {ROWS_VERSION}", "update skillframe")
     if campaign is not None and header.get("campaign") != campaign:
         raise InputError(
             path, f"its rows are of campaign {str(header.get('campaign'))[:12]}, but the files beside it now make "
             f"{campaign[:12]}", "put campaign.toml, skills and robot back as they were, or start again with --out",
         )  # fmt: skip
+    return version
 
 
 def write_text(path: Path, text: str) -> None:
     """Write a file whole or not at all."""
-    write_bytes(path, text.encode())
-
-
-def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(path.name + ".tmp")
-    with temporary.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(temporary, path)
+    write_whole(path, text.encode())
 
 
 def ordered(spec: CampaignSpec, rows: Iterable[Row], stop_after: int | None = None) -> list[Row]:

@@ -1,5 +1,9 @@
 """What runs inside a worker process: a job under a watchdog, a file that says how far it is, no ear for Ctrl-C.
 
+A slow job is not a hung one: the watchdog is wound again whenever the job says that it has come further, so it ends
+what makes no progress, however long the whole takes. It is `faulthandler`'s C thread, which a job that holds the
+interpreter's lock cannot stop.
+
 A terminal sends Ctrl-C to all processes at once; it is the client that answers it, by ending the workers. Dask imports
 this module in every worker it starts (`preload`) and calls `dask_setup`.
 """
@@ -11,10 +15,11 @@ import signal
 import time
 from contextlib import suppress
 from pathlib import Path
+from typing import TextIO
 
-from skillframe.campaign.driver import Evaluate
 from skillframe.campaign.pulse import Listener, heard
 from skillframe.campaign.rows import ChunkJob, Row
+from skillframe.campaign.trouble import Evaluate, Raised, attempt
 
 PULSE_S = 0.5
 
@@ -24,25 +29,30 @@ def dask_setup(worker: object) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def guarded(evaluate: Evaluate, job: ChunkJob, seconds: float, watch: str) -> list[Row]:
-    """Run a job; after some seconds the process is ended and what it was doing is written to a file.
+def guarded(evaluate: Evaluate, job: ChunkJob, seconds: float, watch: str) -> list[Row] | Raised:
+    """Run a job; once it makes no progress any more, the process is ended and what it was doing is written to a file.
 
     Args:
         evaluate: the work.
         job: its argument.
-        seconds: wall time after which the worker ends itself.
+        seconds: wall time without progress after which the worker ends itself.
         watch: path of the file, removed if the job ends in time.
     """
     path, share = Path(watch), share_file(Path(watch))
-    with path.open("w", encoding="utf-8") as file:
+    try:
+        file = path.open("x", encoding="utf-8")
+    except OSError as error:
+        return Raised(f"the worker cannot write into the campaign's folder ({error})", trouble=True)
+    with file:
         faulthandler.dump_traceback_later(seconds, exit=True, file=file)
         try:
-            with heard(_pulse(share)):
-                return evaluate(job)
+            with heard(_pulse(share, seconds, file)):
+                return attempt(evaluate, job)
         finally:
             faulthandler.cancel_dump_traceback_later()
-            path.unlink(missing_ok=True)
-            share.unlink(missing_ok=True)
+            with suppress(OSError):
+                path.unlink(missing_ok=True)
+                share.unlink(missing_ok=True)
 
 
 def share_file(watch: Path) -> Path:
@@ -50,16 +60,18 @@ def share_file(watch: Path) -> Path:
     return watch.with_suffix(".share")
 
 
-def _pulse(path: Path) -> Listener:
-    """Writes how far the job is, now and then; that it cannot is no reason to stop."""
-    due = time.monotonic() + PULSE_S
+def _pulse(path: Path, seconds: float, file: TextIO) -> Listener:
+    """Winds the watchdog and writes how far the job is, now and then; that it cannot write is no reason to stop."""
+    every = min(PULSE_S, seconds / 4.0)
+    due, furthest = time.monotonic() + every, 0.0
 
-    def write(share: float) -> None:
-        nonlocal due
+    def beat(share: float) -> None:
+        nonlocal due, furthest
         now = time.monotonic()
-        if now >= due:
-            due = now + PULSE_S
+        if now >= due and share > furthest:
+            due, furthest = now + every, share
+            faulthandler.dump_traceback_later(seconds, exit=True, file=file)
             with suppress(OSError):
                 path.write_text(f"{share:.4f}", encoding="utf-8")
 
-    return write
+    return beat

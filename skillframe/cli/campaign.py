@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from skillframe.campaign.spec import CampaignSpec
 
 _FOLDER = click.Path(path_type=Path)
-INTERRUPTED = 130
+INTERRUPTED, TERMINATED = 130, 143
+"""128 and the signal's number, as shells have it."""
 
 
 @click.group(name="campaign")
@@ -41,7 +42,7 @@ def _running(function: Callable[..., int]) -> Callable[..., int]:
         click.option("--chunk", type=COUNT, help="Largest number of trials per job [64]."),
         click.option(
             "--time-limit", "time_limit_s", type=POSITIVE, metavar="SECONDS",
-            help="Wall time after which a worker is taken for hung [60 s + 0.25 s per simulated second and trial].",
+            help="Wall time without progress after which a worker is taken for hung [120]; a slow one is not.",
         ),
         click.option("--traces", type=NATURAL, help="Trials per skill that leave a trace [8]."),
     ]  # fmt: skip
@@ -57,8 +58,9 @@ def _running(function: Callable[..., int]) -> Callable[..., int]:
 def run(file: Path, out: Path, **settings: Any) -> int:
     """Run the campaign that FILE (campaign.toml) declares.
 
-    Exit code 0; 1 if a success rate is below `[expect] rate`; 2 if something given cannot be used; 130 after Ctrl-C,
-    with everything that was finished kept.
+    Exit code 0; 1 if a success rate is below `[expect] rate`; 2 if something given cannot be used, or if files, memory,
+    plug-ins or workers stop it; 130 after Ctrl-C and 143 after SIGTERM. Everything that was finished is kept, and
+    `campaign resume` goes on.
 
     \b
     Example:
@@ -71,7 +73,12 @@ def run(file: Path, out: Path, **settings: Any) -> int:
     from skillframe.registry import registry
 
     spec = CampaignSpec.from_toml(file)
-    prepare(spec, out, evaluate.describe, registry().world(spec.world).params)
+    with _terminable() as code:
+        try:
+            prepare(spec, out, evaluate.describe, registry().world(spec.world).params)
+        except KeyboardInterrupt:
+            click.echo("interrupted before the first trial; nothing is left", err=True)
+            return code()
     return _go_on(out, options)
 
 
@@ -112,6 +119,8 @@ def status(folder: Path, as_json: bool) -> int:
         state = f"running, process {now['running']['pid']} on {now['running']['host']}"
     click.echo(f"{now['name']}: {now['rows']} of {now['planned_rows']} runs, {state}")
     _show_rates(now["skills"])
+    for text in now["remarks"]:
+        click.echo(f"note: {text}")
     if state == "unfinished":
         click.echo(f"to go on: skillframe campaign resume {folder}")
     return 0
@@ -171,13 +180,37 @@ def _go_on(folder: Path, options: Options) -> int:
         from skillframe.campaign.validity import validity_of
 
         click.echo(f"there will be {validity_of(spec.plan, complete=True).interval_method}", err=True)
-    try:
-        with _progress() as notify:
-            summary = run_campaign(folder, evaluate.evaluate, options, notify)
-    except KeyboardInterrupt:
-        click.echo(f"interrupted; finished rows are kept, to go on: skillframe campaign resume {folder}", err=True)
-        return INTERRUPTED
+    with _terminable() as code:
+        try:
+            with _progress() as notify:
+                summary = run_campaign(folder, evaluate.evaluate, options, notify)
+        except KeyboardInterrupt:
+            click.echo(f"interrupted; finished rows are kept, to go on: skillframe campaign resume {folder}", err=True)
+            return code()
     return _conclude(folder, spec, summary)
+
+
+@contextmanager
+def _terminable() -> Iterator[Callable[[], int]]:
+    """Within this, SIGTERM (of Slurm, systemd, a shutdown) interrupts as Ctrl-C does; gives the exit code due."""
+    import signal
+    import threading
+
+    codes = [INTERRUPTED]
+
+    def answer(number: int, frame: object) -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # the tables are being written
+        codes.append(TERMINATED)
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():  # Python answers signals in the main thread only
+        yield lambda: codes[-1]
+        return
+    before = signal.signal(signal.SIGTERM, answer)
+    try:
+        yield lambda: codes[-1]
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any]) -> int:

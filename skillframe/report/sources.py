@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 from skillframe.campaign.axes import parse_axis
 from skillframe.campaign.spec import flatten
 from skillframe.campaign.validity import Plan, plan_of
+from skillframe.campaign.verify import edited_results
 from skillframe.config import read_toml
 from skillframe.demonstration.record import Demonstration
 from skillframe.documents import read_json, read_text
@@ -125,6 +126,7 @@ def read_folder(folder: Path) -> Chapter:
         chapter.notes += chapter.results.notes
         _remember(chapter, folder / "results.csv", "results.csv")
     chapter.summary = _json_if_there(chapter, folder / "summary.json")
+    chapter.notes += [text for text in [edited_results(folder, chapter.summary)] if text]
     chapter.scene = _json_if_there(chapter, folder / "scene.json")
     for path in sorted({*folder.glob("*.skill.json"), *folder.glob("skills/*.json")}):
         chapter.skills[path.name] = _json_if_there(chapter, path)

@@ -1,11 +1,13 @@
 """A campaign without a simulator: success inside a closed-form region, and trials that kill, hang, hoard and raise."""
 
 import ctypes
+import json
 import math
 import os
 import signal
 import sys
 import time
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,10 +15,11 @@ import numpy as np
 
 from skillframe.campaign.folder import prepare
 from skillframe.campaign.pulse import beat
-from skillframe.campaign.rows import TRACE, rows_of
+from skillframe.campaign.rows import EXTRA, OUTCOME, TRACE, rows_of
 from skillframe.campaign.runner import Options, run_campaign
 from skillframe.campaign.sampling import draws, trial_rngs
 from skillframe.campaign.spec import CampaignSpec
+from skillframe.errors import UnknownName
 
 GUILTY = 37
 
@@ -102,6 +105,25 @@ def tells(job):
     return good(job)
 
 
+def edit_rows(folder, change, old=False):
+    """Rewrite rows.jsonl through a function of its list of records, with checksums that fit, or as skillframe 0.1 did.
+
+    A line ends with `, "crc32": "%08x"}`, the CRC-32 of all that stands before it; 0.1's version was 1 and had none.
+    """
+    path = folder / "rows.jsonl"
+    records = [json.loads(line) for line in path.read_text().splitlines()]
+    signed = [record.pop("crc32", None) is not None for record in records]
+    if old:
+        records[0]["version"] = 1
+        for record in records:
+            record.pop("ran_on", None)
+    content = b""
+    for record in change(records):
+        text = json.dumps(record, ensure_ascii=False).encode()[:-1]
+        content += text + (b"}\n" if old or not any(signed) else b', "crc32": "%08x"}\n' % zlib.crc32(text))
+    path.write_bytes(content)
+
+
 def _guilty(job):
     return GUILTY in job.trials and job.skill == 0 and not job.traces
 
@@ -137,6 +159,65 @@ def raises(job):
     if _guilty(job):
         raise ValueError("the skill tripped")
     return slow(job)
+
+
+def stalls(job):
+    """Says again and again that it is as far as before."""
+    while _guilty(job):
+        beat(0.3)
+        time.sleep(0.05)
+    return slow(job)
+
+
+def creeps(job):
+    """Three seconds of slow progress."""
+    for step in range(30 if _guilty(job) else 0):
+        beat(step / 30)
+        time.sleep(0.1)
+    return good(job)
+
+
+def tells_and_kills(job):
+    """Half done, and then its worker is killed."""
+    for _ in range(6):
+        beat(0.5 + 0.001 * _)
+        time.sleep(0.1)
+    return kills(job)
+
+
+def leaves(job):
+    if _guilty(job):
+        sys.exit(7)
+    return good(job)
+
+
+def needs_a_file(job):
+    """As a skill with a model in a file beside the campaign."""
+    (Path(job.folder) / "material").read_text()
+    return good(job)
+
+
+def needs_luck(job):
+    """The process that comes first lacks a plug-in for as long as it lives."""
+    marker = Path(job.folder) / "first"
+    try:
+        with marker.open("x") as file:
+            file.write(str(os.getpid()))
+    except FileExistsError:
+        pass
+    if marker.read_text() == str(os.getpid()):
+        raise UnknownName("skill", "lmc", [])
+    return slow(job)
+
+
+def half_a_pair(job):
+    """Words with half of a surrogate pair, as a skill may take from a damaged file name."""
+    rows = good(job)
+    return rows_of(CampaignSpec.from_plain(job.spec), job.skill, job.trials, {
+        name: [f"bad \udcff {row['trial']}" if name == "reason" or (name == "failure" and row[name]) else row[name]
+               for row in rows]
+        for name in rows[0] if name in (*OUTCOME, *EXTRA)
+    })  # fmt: skip
 
 
 def always_raises(job):

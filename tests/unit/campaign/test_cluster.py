@@ -50,7 +50,8 @@ def test_workers_give_the_table_of_one_process_listen_on_the_local_host_only_and
 
     def look(progress):
         for process in [psutil.Process(), *psutil.Process().children(recursive=True)]:
-            listening.update(c.laddr for c in process.net_connections() if c.status == psutil.CONN_LISTEN)
+            with suppress(psutil.NoSuchProcess):  # what a worker starts while it imports may be gone by now
+                listening.update(c.laddr for c in process.net_connections() if c.status == psutil.CONN_LISTEN)
 
     with socket.socket() as someone:  # who has Dask's usual port already: no warning, which would be an error here
         with suppress(OSError):

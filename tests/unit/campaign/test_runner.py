@@ -12,6 +12,7 @@ from campaign_fakes import (
     TEXT,
     FakeParams,
     always_raises,
+    edit_rows,
     good,
     raises,
     run,
@@ -23,6 +24,7 @@ from campaign_fakes import (
 from skillframe.campaign.driver import CampaignError, chunk_size
 from skillframe.campaign.replay import replay_trial
 from skillframe.campaign.status import status_of
+from skillframe.campaign.store import read_rows
 from skillframe.campaign.summary import below_bar, read_summary
 from skillframe.errors import InputError, UnknownName
 
@@ -76,12 +78,19 @@ def test_replaying_a_trial_alone_gives_its_row(out, trial):
 
 def test_a_replay_that_differs_says_in_what_and_on_which_machine(out):
     run(out)
-    text = (out / "rows.jsonl").read_text().replace('"numpy": "', '"numpy": "0.')
-    lines = text.splitlines()
-    lines[2] = lines[2].replace('"success": true', '"success": false')
-    (out / "rows.jsonl").write_text("\n".join(lines) + "\n")
+
+    def change(records):
+        row = next(r for r in records if r.get("trial") == 0 and r["skill"] == "a.skill.json")
+        row |= {"success": not row["success"], "failure": "" if row["failure"] else "stuck"}
+        for session in (r["session"] for r in records if "session" in r):
+            for versions in (session, session.get("environment", {}), session.get("ran_on", {})):
+                versions |= {"numpy": "0.1"} if "numpy" in versions else {}
+        return records
+
+    then = read_rows(out)[0][0, "a.skill.json"]["success"]
+    edit_rows(out, change)
     found = replay_trial(out, 0, good, None, FakeParams)
-    assert found.changed == {"success": (False, True)}
+    assert found.changed["success"] == (not then, then)
     assert [line.split(":")[0] for line in found.environment] == ["numpy"]
 
 
@@ -284,9 +293,13 @@ def interruptible(tmp_path, options, prelude=""):
 
 
 def check_interrupted(process, out):
-    """Exit code 130, one sentence, and every finished row kept: how many those are."""
+    return check_ended(process, out, 130)
+
+
+def check_ended(process, out, code):
+    """The exit code, one sentence, and every finished row kept: how many those are."""
     _, errors = process.communicate(timeout=60)
-    assert process.returncode == 130
+    assert process.returncode == code
     assert f"skillframe campaign resume {out}" in errors
     assert "Traceback" not in errors
     stored = (out / "rows.jsonl").read_bytes().count(b'"trial"')
