@@ -91,6 +91,11 @@ def slow(job):
     return good(job)
 
 
+def crawls(job):
+    time.sleep(0.1 * len(job.trials))
+    return good(job)
+
+
 def tells_quickly(job):
     """Says that it is half done."""
     beat(0.5)

@@ -3,6 +3,7 @@ import socket
 import subprocess
 import sys
 import time
+import warnings
 from contextlib import suppress
 from pathlib import Path
 
@@ -80,6 +81,81 @@ def test_exactly_the_guilty_trial_is_named(out, reference, misbehave, cause):
     assert line.startswith(b"37,a.skill.json,")
     assert line.endswith(b",0," + cause + b",nan,nan,nan,nan")
     assert summary["complete"]
+
+
+def test_a_slow_trial_that_advances_is_let_go_on_far_beyond_the_time_without_progress(out, reference):
+    told = []
+    fakes.run(out, fakes.creeps, told.append, workers=1, chunk=64, time_limit_s=1.0, traces=0)  # it takes three seconds
+    assert changed(out, reference) == []
+    assert [p.note for p in told if p.note] == []
+
+
+@pytest.mark.slow
+def test_a_trial_that_says_the_same_again_and_again_is_hung_and_the_replacement_is_told(out, reference):
+    told = []
+    fakes.run(out, fakes.stalls, told.append, **{**LIMITS, "chunk": 2, "time_limit_s": 1.0})
+    (line,) = changed(out, reference)
+    assert line.startswith(b"37,a.skill.json,")
+    assert b"worker died (time limit)" in line
+    notes = [p.note for p in told if p.note]
+    where = "while on trials 36 to 37 of a.skill.json; they run again, in halves"
+    assert f"a worker was replaced: it made no progress for too long {where}" in notes
+    assert notes[-1].startswith("trial 37 of a.skill.json ran again alone, and this is its row now: worker died (time")
+
+
+def test_progress_never_runs_backwards_when_chunks_are_lost(campaign, tmp_path):
+    out, told = fakes.start(campaign(trials=48), tmp_path / "out"), []
+    fakes.run(out, fakes.tells_and_kills, told.append, workers=2, chunk=12, traces=0)
+    shares = [p.done + p.under_way for p in told]
+    assert shares == sorted(shares)
+    assert shares[-1] == told[-1].total
+    assert any("a worker was replaced: it was killed while on trials 36 to 47" in p.note for p in told)
+
+
+def test_nobody_without_the_key_can_connect_to_the_local_scheduler(campaign, tmp_path):
+    out, refused = fakes.start(campaign(trials=8), tmp_path / "out"), []
+
+    def knock(progress):
+        mine = (c.laddr.port for c in psutil.Process().net_connections() if c.status == psutil.CONN_LISTEN)
+        for port in [] if refused else mine:
+            refused.append(not can_run_code(port))
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Dask's, of connections that were refused
+        fakes.run(out, fakes.tells, knock, workers=1, chunk=4, traces=0)
+    assert len(refused) >= 2  # the scheduler and the nanny, at least
+    assert all(refused)
+
+
+def can_run_code(port):
+    """Whether a client without a key, with and without encryption, has a scheduler at a port run a function."""
+    code = (
+        "import sys; from distributed import Client; from distributed.security import Security\n"
+        "strange = {'tcp': None, 'tls': Security.temporary()}[sys.argv[1]]\n"
+        "client = Client(f'{sys.argv[1]}://127.0.0.1:{sys.argv[2]}', timeout=4, security=strange)\n"
+        "print('ran', client.run_on_scheduler(lambda: 6 * 7))"
+    )
+    attempts = [
+        subprocess.run([sys.executable, "-c", code, kind, str(port)], capture_output=True, text=True)
+        for kind in ("tcp", "tls")
+    ]
+    return any("ran 42" in done.stdout for done in attempts)
+
+
+KILLED_AT_START = """
+import os, sys
+if "--multiprocessing-fork" in sys.argv and os.environ.get("DASK_PARENT") != "1":
+    os.kill(os.getpid(), 9)
+"""
+
+
+def test_workers_that_are_killed_at_their_start_end_in_one_sentence(out, tmp_path, monkeypatch):
+    (tmp_path / "sitecustomize.py").write_text(KILLED_AT_START)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    with pytest.raises(SchedulerError, match="the 2 workers could not be started"):
+        fakes.run(out, fakes.good, workers=2)
+    monkeypatch.delenv("PYTHONPATH")
+    assert fakes.run(out)["complete"]
 
 
 @pytest.mark.slow
