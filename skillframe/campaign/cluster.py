@@ -93,6 +93,7 @@ class ClusterPool:
         memory_bytes: int | None = None,
     ) -> None:  # fmt: skip
         import dask
+        import distributed  # noqa: F401  its defaults must be there before one of them is set, and set back
 
         self._evaluate, self._seconds, self._watch, self._tell = evaluate, seconds, watch, tell
         self.ran_on: Mapping[str, str] = ours.environment
