@@ -152,7 +152,7 @@ def heard(connection):
 
 KILLED_AT_START = """
 import os, sys
-if "--multiprocessing-fork" in sys.argv and os.environ.get("DASK_PARENT") != "1":
+if "--multiprocessing-fork" in sys.argv:
     os.kill(os.getpid(), 9)
 """
 
