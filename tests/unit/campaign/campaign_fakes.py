@@ -92,7 +92,7 @@ def slow(job):
 
 
 def crawls(job):
-    time.sleep(0.1 * len(job.trials))
+    time.sleep(0.2 * len(job.trials))
     return good(job)
 
 
