@@ -13,9 +13,11 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.control.endings import Broken, Ended
 from skillframe.errors import SkillframeError
 from skillframe.executor import Loop, Result, Setup
-from skillframe.frames import Float, Pose, rotation_vector
+from skillframe.frames import Float, Pose, norm, rotation_vector
+from skillframe.handover import ShapeCheck
 from skillframe.recorder import Recorder
 from skillframe.skill import Command, Impedance, Observation, Skill
 from skillframe.trace import Trace
@@ -92,11 +94,12 @@ class FirstArm(Skill):
         count, arms = observation.time.shape
         self._rest = np.zeros((count, arms, 6))
         self._gains = [np.array(np.broadcast_to(gain, (count, arms, 6, 6))) for gain in STILL if gain is not None]
+        self._checked = ShapeCheck(self._skill, (count,))
         self._skill.start(_first(observation), rngs)
 
     def step(self, observation: Observation) -> Command:
         """The skill's command for the first arm, standing still for the others."""
-        wanted = self._skill.step(_first(observation))
+        wanted = self._checked(self._skill.step(_first(observation)))
         stiffness, damping = self._gains
         stiffness[:, 0] = wanted.impedance.stiffness
         if wanted.impedance.damping is not None:
@@ -212,21 +215,33 @@ class _ArmsLoop(Loop):
             self.path[self.active, arm] += np.abs(velocity[:, view.dofs])[self.active] * self.dt
         self.plant.step(whole, self.active)
 
-    def _violations(self, position: Float, twist: Float, wrench: Float, law: Float) -> list[tuple[int, str]]:
+    def _violations(self, position: Float, twist: Float, wrench: Float, law: Float) -> list[Broken]:
         rows = (self.active[:, None] * self.arms + np.arange(self.arms)).ravel()
-        first: dict[int, str] = {}
-        for row, cause in self.guard.violations(position, twist, wrench, law, rows):
-            first.setdefault(row // self.arms, f"arm {self.names[row % self.arms]!r}: {cause}")
-        return list(first.items())
+        found = self.guard.violations(position, twist, wrench, law, rows)
+        return [
+            Broken(row // self.arms, code, f"arm {self.names[row % self.arms]!r}: {why}") for row, code, why in found
+        ]
+
+    def _dofs(self) -> list[NDArray[np.int64]]:
+        return [view.dofs for view in self.views]
+
+    def _joint_positions(self) -> Float:
+        positions = self.plant.joint_positions
+        return self._as_rows([positions[:, view.dofs] for view in self.views])
+
+    def _true_torque(self) -> Float:
+        of_arms = [norm(v.contact_wrench(p)[:, 3:]) for v, p in zip(self.views, self.points, strict=True)]
+        largest: Float = np.max(of_arms, axis=0)
+        return largest
 
     def _energy(self, rows: NDArray[np.int64]) -> Float:
         energy: Float = self.guard.energy.reshape(self.count, self.arms).sum(-1)[rows]
         return energy
 
-    def _end(self, rows: NDArray[np.int64], time: float, reason: str, limit: bool) -> None:
+    def _end(self, rows: NDArray[np.int64], time: float, reason: str, limit: bool, code: Ended = Ended.MACHINE) -> None:
         now = self._by_arm([view.tool_pose().rotation for view in self.views])
         self.turned[rows] = rotation_vector(now @ np.swapaxes(self.start_rotation, -1, -2))[rows]
-        super()._end(rows, time, reason, limit)
+        super()._end(rows, time, reason, limit, code)
 
     def arms_result(self) -> ArmsResult:
         """The outcome of every trial, with what each arm did."""

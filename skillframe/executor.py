@@ -17,14 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.conditioning.kalman import WrenchFilter
+from skillframe.control.contact import TrueContact, over
 from skillframe.control.controller import ImpedanceController, Reading
+from skillframe.control.endings import Broken, Ended
 from skillframe.control.limits import LimitGuard
-from skillframe.frames import Float, Pose
+from skillframe.control.motors import Motors, joint_limits
+from skillframe.frames import Float, Pose, norm
+from skillframe.handover import SLOW_TICKS, CommandCheck, Fault, asked, shown, unknown_end
 from skillframe.recorder import Recorder
+from skillframe.result import Result
 from skillframe.robot.model import RobotModel
 from skillframe.robot.spec import Limits
-from skillframe.skill import Command, Impedance, Observation, Reasons, Skill, Status, no_reasons
-from skillframe.trace import Trace
+from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 from skillframe.world.convert import held
 from skillframe.world.intrusion import LinkIntrusion
 from skillframe.world.placement import QUANTITIES, check_quantities, fixture_poses, start_configurations
@@ -37,7 +41,6 @@ __all__ = ["QUANTITIES", "Result", "Setup", "simulate"]
 
 HOLD = Impedance(np.diag([2000.0] * 3 + [100.0] * 3))
 RAMP_S = 0.05
-SLOW_TICKS = 10  # goals are looked at every 10 ms
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,36 +62,6 @@ class Setup:
     sensors: SensorSettings = field(default_factory=SensorSettings)
     filter_wrench: bool = True
     stop_when: Callable[[State], NDArray[np.bool_]] | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Result:
-    """What became of N trials; every array has N rows.
-
-    Attributes:
-        success: the scene's goal was reached and no limit was broken.
-        failure: why not, in words; "" for a success.
-        status: of the skill at its end (`Status`).
-        reason: why the trial ended, in words.
-        duration_s: simulated seconds.
-        peak_force_n: largest true contact force.
-        final_error_m, final_error_rad: distance to the goal at the end.
-        energy_j: work of the controller on the tool.
-        traces: one per trial if asked for.
-        interrupted: Ctrl-C came before the end; what was running is closed as it stood.
-    """
-
-    success: NDArray[np.bool_]
-    failure: Reasons
-    status: NDArray[np.int64]
-    reason: Reasons
-    duration_s: Float
-    peak_force_n: Float
-    final_error_m: Float
-    final_error_rad: Float
-    energy_j: Float
-    traces: list[Trace] | None = None
-    interrupted: bool = False
 
 
 def simulate(
@@ -167,11 +140,15 @@ class Loop:
         self.sensors = self._sensors([pair[0] for pair in children], draws)
         self.filter = WrenchFilter(dt=self.dt).steady()
         self.controller = ImpedanceController(self.rows)
-        self.guard = LimitGuard(_joint_limits(robot), self.rows, self.dt)
+        self.motors = self._motors()
+        self.guard = LimitGuard(_joint_limits(robot), self.rows, self.dt, self.motors)
+        self.contact = TrueContact(robot.spec.limits, count, self.dt, SLOW_TICKS)
+        self.faults: list[Fault] = []
         self.active = np.arange(count)
         self.reason, self.status = no_reasons(count), np.zeros(count, dtype=np.int64)
         self.limited = np.zeros(count, dtype=bool)
-        self.duration, self.peak = np.zeros(count), np.zeros(count)
+        self.duration, self.ended_by = np.zeros(count), no_reasons(count)
+        self.filtered, self.torque_share, self.speed_share = (np.full(count, np.nan) for _ in range(3))
         self.goal, self.errors, self.energy = np.zeros(count, dtype=bool), np.zeros((count, 2)), np.zeros(count)
         self.recorder = None if trace_hz is None else self._recorder(ratio(rate, trace_hz, "control", "the trace"))
         self.interrupted = False
@@ -184,6 +161,20 @@ class Loop:
 
     def _sensors(self, rngs: Sequence[np.random.Generator], draws: Draws) -> Sensors:
         return Sensors(self.setup.sensors, self.plant, rngs, draws)
+
+    def _motors(self) -> Motors | None:
+        """Of the joints; cylinders have a law of their own, and a free-flying tool has none."""
+        robot, arms = self.setup.robot, self._dofs()
+        if robot.spec.actuation or not (limits := joint_limits(robot, self.plant.model, arms)):
+            return None
+        return Motors(limits, _joint_limits(robot).torque_rate_nm_s, self.rows, self.dt)
+
+    def _dofs(self) -> list[NDArray[np.int64]] | None:
+        """Generalised velocities of each arm's rows; None where a row has them all."""
+        return None
+
+    def _joint_positions(self) -> Float:
+        return self.plant.joint_positions
 
     def _recorder(self, every: int) -> Recorder:
         return Recorder(self.plant, every, self.coc)
@@ -216,9 +207,11 @@ class Loop:
                     progress(tick * self.dt)
         except KeyboardInterrupt:
             self.interrupted = True
-            self._end(self.active, tick * self.dt, "interrupted", True)
+            self._end(self.active, tick * self.dt, "interrupted", True, Ended.INTERRUPTED)
         if len(self.active):
-            self._end(self.active, ticks * self.dt, f"time limit: {duration_s:g} s of simulated time are over", False)
+            self._end_broken(self.contact.look(self.active), ticks * self.dt)
+            text = f"time limit: {duration_s:g} s of simulated time are over"
+            self._end(self.active, ticks * self.dt, text, False, Ended.TIME)
 
     def _tick(self, tick: int) -> None:
         time = tick * self.dt
@@ -229,7 +222,7 @@ class Loop:
         observation = Observation(np.full(self.rows, time), self.dt, reading.pose, reading.twist, wrench)
         command = self._ask(tick, observation)
         torque, law = self._torque(command, reading, min(1.0, time / RAMP_S))
-        np.maximum(self.peak, self.plant.contact_force(), out=self.peak)  # of ended trials it no longer changes
+        self._feel(wrench)
         if self.recorder is not None:
             self.recorder.record(tick, time, observation, command, law)
         self._stop_where_due(tick, time, observation, command, tool.position, law)
@@ -237,9 +230,21 @@ class Loop:
             self._drive(torque)
 
     def _ask(self, tick: int, observation: Observation) -> Command:
+        seen = shown(observation)
         if tick == 0:
-            self.skill.start(observation, self.skill_rngs)
-        return self.skill.step(observation)
+            self.check = CommandCheck(self.skill, observation.time.shape)
+            asked(self.skill, self.skill.start, seen, self.skill_rngs)
+        command = asked(self.skill, self.skill.step, seen)
+        self.faults = self.check.faults(command, tick)
+        return command
+
+    def _feel(self, wrench: Float) -> None:
+        """Take in the true contact of a tick, and the filtered wrench (N, 6) beside it."""
+        torque = self._true_torque() if self.contact.wants_torque else None
+        self.contact.step(self.plant.contact_force(), wrench, torque)
+
+    def _true_torque(self) -> Float:
+        return norm(self.plant.contact_wrench(self.coc)[:, 3:])
 
     def _drive(self, torque: Float) -> None:
         self.plant.step(torque, self.active)
@@ -265,37 +270,61 @@ class Loop:
         return self.nominal.mass_matrix()
 
     def _torque(self, command: Command, reading: Reading, ramp: float) -> tuple[Float, Float]:
-        """Generalised forces (N, nv), held to the torque rate, and the law's wrench (N, 6)."""
+        """Generalised forces (N, nv) that the motors give, and the law's wrench (N, 6)."""
         torque, law = self.controller.torque(command, reading, ramp)
-        return self.guard.rate_limited(torque), law
+        if self.motors is not None:
+            torque = self.motors.held(torque, reading.velocity, self._joint_positions())
+        return torque, law
 
     def _stop_where_due(
         self, tick: int, time: float, observation: Observation, command: Command, position: Float, law: Float
     ) -> None:
-        twist, wrench = observation.twist, observation.wrench
-        for i, cause in self._violations(position, twist, wrench, law):
-            self._end(np.array([i]), time, f"{cause} (at {time:.3f} s)", True)
-        if tick % SLOW_TICKS == 0 and len(self.active):
-            for i, cause in self.intrusion.causes(self.plant, self.active):
-                self._end(np.array([i]), time, f"{cause} (at {time:.3f} s)", True)
-        if command.status.any():
+        slow, ending = tick % SLOW_TICKS == 0, np.count_nonzero(command.status)
+        self._end_broken([Broken(row, Ended.COMMAND, cause) for row, cause in self.faults], time)
+        broken = self._violations(position, observation.twist, observation.wrench, law)
+        if broken or slow or ending:
+            self._end_broken([*broken, *self.contact.look(self.active)], time)
+        if slow and len(self.active):
+            touched = self.intrusion.causes(self.plant, self.active)
+            self._end_broken([Broken(row, Ended.COLLISION, cause) for row, cause in touched], time)
+        if ending:
             for i in self.active[command.status[self.active] != Status.RUNNING]:
-                self.status[i] = command.status[i]
-                self._end(np.array([i]), time, str(command.reason[i]) or "the skill ended", False)
-        if self.setup.stop_when is not None and tick % SLOW_TICKS == 0 and len(self.active):
+                self._end_told(int(i), time, int(command.status[i]), command.reason[i])
+        if self.setup.stop_when is not None and slow and len(self.active):
             done = self.setup.stop_when(self.plant.tip_state())
             rows = self.active[done[self.active]]
             self.status[rows] = Status.SUCCESS
-            self._end(rows, time, "done", False)
+            self._end(rows, time, "done", False, Ended.GOAL)
 
-    def _violations(self, position: Float, twist: Float, wrench: Float, law: Float) -> list[tuple[int, str]]:
+    def _end_broken(self, broken: Sequence[Broken], time: float) -> None:
+        """End the trials that broke something, each for the first thing that is named."""
+        for row, code, cause in broken:
+            if row in self.active:
+                self._end(np.array([row]), time, f"{cause} (at {time:.3f} s)", True, code)
+
+    def _end_told(self, i: int, time: float, status: int, reason: object) -> None:
+        """End trial i as its skill says."""
+        if wrong := unknown_end(status, reason):
+            self._end_broken([Broken(i, Ended.COMMAND, wrong)], time)
+            return
+        self.status[i] = status
+        self._end(np.array([i]), time, str(reason) or "the skill ended", False, Ended.SKILL)
+
+    def _violations(self, position: Float, twist: Float, wrench: Float, law: Float) -> list[Broken]:
         """Trials that broke a limit, each with the cause in words."""
         return self.guard.violations(position, twist, wrench, law, self.active)
+
+    def _shares(self) -> tuple[Float, Float]:
+        """(N,) of each trial's worst joint: torque over effort, speed over velocity."""
+        if self.motors is None:
+            return (np.full(self.count, np.nan),) * 2
+        torque, speed = (share.reshape(self.count, -1).max(axis=-1) for share in self.motors.shares())
+        return torque, speed
 
     def _energy(self, rows: NDArray[np.int64]) -> Float:
         return self.guard.energy[rows]
 
-    def _end(self, rows: NDArray[np.int64], time: float, reason: str, limit: bool) -> None:
+    def _end(self, rows: NDArray[np.int64], time: float, reason: str, limit: bool, code: Ended = Ended.MACHINE) -> None:
         """Close trials: judge them by the scene's goal as they stand now, and stop stepping them."""
         if not len(rows):
             return
@@ -304,10 +333,13 @@ class Loop:
         self.errors[rows] = np.stack(self.setup.scene.goal_error(state), axis=-1)[rows]
         self.energy[rows] = self._energy(rows)
         self.duration[rows], self.limited[rows] = time, limit
+        torque_share, speed_share = self._shares()
+        self.torque_share[rows], self.speed_share[rows] = torque_share[rows], speed_share[rows]
+        self.filtered[rows] = self.contact.estimate[rows]
         if limit:
             self.status[rows] = Status.FAILURE
         for i in rows:
-            self.reason[i] = reason
+            self.reason[i], self.ended_by[i] = reason, code.value
         self.active = np.setdiff1d(self.active, rows)
         if self.recorder is not None:
             self.recorder.close(rows)
@@ -325,9 +357,17 @@ class Loop:
             ]
         return Result(
             success=success, failure=failure, status=self.status, reason=self.reason, duration_s=self.duration,
-            peak_force_n=self.peak, final_error_m=self.errors[:, 0], final_error_rad=self.errors[:, 1],
-            energy_j=self.energy, traces=traces, interrupted=self.interrupted,
+            peak_force_n=self.contact.peak, final_error_m=self.errors[:, 0], final_error_rad=self.errors[:, 1],
+            energy_j=self.energy, peak_force_filtered_n=self.filtered, peak_force_10ms_n=self.contact.mean,
+            peak_torque_share=self.torque_share, peak_speed_share=self.speed_share, ended_by=self.ended_by,
+            traces=traces, interrupted=self.interrupted,
         )  # fmt: skip
+
+    def _notes(self, i: int, success: bool) -> list[str]:
+        """Sentences about what a result holds and leaves out."""
+        mark = over(float(self.contact.peak[i]), self.setup.robot.spec.limits.force_n) if success else ""
+        silent = "" if self.motors is None else self.motors.silent()
+        return [text for text in (silent, mark) if text]
 
     def _meta(self, i: int, success: bool, failure: str) -> dict[str, Any]:
         scene = self.setup.scene
@@ -336,8 +376,16 @@ class Loop:
             "center_of_compliance": self.coc.tolist(), "frames": {k: list(v) for k, v in scene.tool.frames.items()},
             "hand": scene.tool.hand, "success": success, "failure": failure, "reason": str(self.reason[i]),
             "status": Status(int(self.status[i])).name, "duration_s": float(self.duration[i]),
-            "peak_force_n": float(self.peak[i]), "final_error_m": float(self.errors[i, 0]),
+            "peak_force_n": float(self.contact.peak[i]), "peak_force_filtered_n": float(self.filtered[i]),
+            "peak_force_10ms_n": float(self.contact.mean[i]), "peak_torque_share": _known(self.torque_share[i]),
+            "peak_speed_share": _known(self.speed_share[i]), "ended_by": self.ended_by[i],
+            "notes": self._notes(i, success), "final_error_m": float(self.errors[i, 0]),
             "final_error_rad": float(self.errors[i, 1]), "analytic": scene.analytic,
             "events": [[time, text] for time, text in self.skill.journal(i)],
             "limits": asdict(_joint_limits(self.setup.robot)),
         }  # fmt: skip
+
+
+def _known(share: float) -> float | None:
+    """A share of a limit that there is."""
+    return None if np.isnan(share) else float(share)

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from skillframe.errors import InputError
 from skillframe.frames import Float, Pose, norm
+from skillframe.handover import ShapeCheck
 from skillframe.skill import Command, Impedance, Observation, Reasons, Skill, Status, no_reasons, restartable
 
 Rows = NDArray[np.intp]
@@ -68,6 +69,7 @@ class Composition(Skill):
         n, k = len(rngs), len(self.parts)
         self._rngs = [rng.spawn(k) for rng in rngs]
         self._children: list[Skill | None] = [None] * k
+        self._checks: dict[int, ShapeCheck] = {}
         self.current: Rows = np.full(n, END)
         self._due: Rows | None = np.zeros(n, dtype=np.intp)
         self._status, self._reason = np.zeros(n, dtype=np.int64), no_reasons(n)
@@ -109,6 +111,7 @@ class Composition(Skill):
             child = self._children[part]
             if child is None:
                 child = self._children[part] = restartable(self.parts[part].make)
+                self._checks[part] = ShapeCheck(child, observation.time.shape)
                 child.start(observation, [rngs[part] for rngs in self._rngs])
             else:
                 child.restart(rows, observation, [self._rngs[i][part] for i in rows.tolist()])
@@ -118,9 +121,7 @@ class Composition(Skill):
     def _ask(self, observation: Observation) -> Command:
         """The command of each trial's own part."""
         if self._shared is not None:
-            child = self._children[self._shared]
-            assert child is not None
-            command = child.step(observation)
+            command = self._answer(self._shared, observation)
             return command._replace(impedance=Impedance(command.impedance.stiffness))
         answers = [(p, self._answer(p, observation)) for p in np.unique(self.current).tolist()]
         return _picked(self.current, answers)
@@ -128,7 +129,7 @@ class Composition(Skill):
     def _answer(self, part: int, observation: Observation) -> Command:
         child = self._children[part]
         assert child is not None
-        return child.step(observation)
+        return self._checks[part](child.step(observation))
 
     def _after(self, observation: Observation, command: Command) -> Command:
         for i in np.flatnonzero((command.status != Status.RUNNING) & (self._status == Status.RUNNING)).tolist():

@@ -57,7 +57,8 @@ class Trace:
             (T, k) [N], `force_sigma` (T, 2) of the estimated contact force in the machine's plane [N], `force_valid`
             (T,), `energy_supply` and `energy_pistons` (T,) since the start [J].
         meta: `robot`, `world`, `params`, `seed`, `trial`, `draws`, `success`, `failure`, `status`, `reason`,
-            `duration_s`, `peak_force_n`, `final_error_m`, `final_error_rad`, `center_of_compliance`, `skill`,
+            `duration_s`, `peak_force_n`, `peak_force_filtered_n`, `peak_force_10ms_n`, `peak_torque_share`,
+            `peak_speed_share`, `ended_by`, `final_error_m`, `final_error_rad`, `center_of_compliance`, `skill`,
             `events` ([[t, text]]), `actuators` (names of a machine's), `notes` (sentences about what stood in for
             what), and `bodies`: [{`name`, `geoms`: [{`kind`, `size`, `position`, `quaternion`, `rgba`, `vertices`,
             `faces`}]}] in the order of the body arrays.

@@ -17,6 +17,9 @@ KINDS: dict[str, type | tuple[type, ...]] = {
     **dict.fromkeys(("analytic", "draws", "frames", "limits", "params"), dict),
     **dict.fromkeys(("actuators", "bodies", "center_of_compliance", "events", "notes"), list),
     **dict.fromkeys(("duration_s", "peak_force_n", "final_error_m", "final_error_rad"), (int, float)),
+    **dict.fromkeys(("peak_force_filtered_n", "peak_force_10ms_n"), (int, float)),
+    **dict.fromkeys(("peak_torque_share", "peak_speed_share"), (int, float)),
+    "ended_by": str,
 }
 SIZES = {"box": 3, "sphere": 1, "capsule": 1, "cylinder": 2}
 """Numbers that the size of a drawn kind needs at least; a plane needs none."""

@@ -18,7 +18,7 @@ import numpy as np
 
 from skillframe.campaign.axes import Value
 from skillframe.campaign.pulse import beat
-from skillframe.campaign.rows import EXTRA, OUTCOME, TRACE, ChunkJob, Row, plain_value, rows_of
+from skillframe.campaign.rows import EXTRA, JUDGED, OUTCOME, TRACE, ChunkJob, Row, plain_value, rows_of
 from skillframe.campaign.sampling import draws, trial_rngs
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.trouble import needed
@@ -147,7 +147,7 @@ def _simulate(
     )  # fmt: skip
     if result.interrupted:  # rows that a Ctrl-C cut short are no outcome
         raise KeyboardInterrupt
-    rows = rows_of(spec, job.skill, trials, {name: getattr(result, name) for name in (*OUTCOME, *EXTRA)})
+    rows = rows_of(spec, job.skill, trials, {name: getattr(result, name) for name in (*OUTCOME, *JUDGED, *EXTRA)})
     for row, trace in zip(rows, result.traces or [], strict=job.traces):
         row[TRACE] = _trace_bytes(trace, row, list(spec.vary))
     return rows

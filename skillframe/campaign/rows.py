@@ -1,7 +1,7 @@
 """One row a trial and skill: its columns, its text form, and what two of them have to have in common.
 
-A row is a flat dict: `trial`, `skill`, `seed`, every varied quantity, then `OUTCOME`; a stored row also keeps `status`
-and `reason`. Numbers that JSON does not know (NaN, infinities) are stored as text and read back as numbers.
+A row is a flat dict: `trial`, `skill`, `seed`, every varied quantity, then `OUTCOME` and `JUDGED`; a stored row also
+keeps `status` and `reason`. A row of version 0.1 has no `JUDGED`: these cells stay empty. Numbers that JSON does not know (NaN, infinities) are stored as text and read back as numbers.
 """
 
 from __future__ import annotations
@@ -20,6 +20,9 @@ from skillframe.documents import shown
 Row = dict[str, Any]
 MEASURES = ("duration_s", "peak_force_n", "final_error_m", "final_error_rad")
 OUTCOME = ("success", "failure", *MEASURES)
+JUDGED_MEASURES = ("peak_force_filtered_n", "peak_torque_share", "peak_speed_share", "peak_force_10ms_n")
+JUDGED = (*JUDGED_MEASURES[:3], "ended_by", JUDGED_MEASURES[3])
+"""What came with version 0.2: what the estimate read, what motors were asked for, and what ended the trial."""
 EXTRA = ("status", "reason")
 TRACE = "trace"
 """Key of a row's trace as the bytes of a trace file, taken out before the row is stored."""
@@ -53,7 +56,7 @@ def trials_of(job: ChunkJob, spec: CampaignSpec) -> str:
 
 def columns(spec: CampaignSpec) -> list[str]:
     """The columns of results.csv."""
-    return ["trial", "skill", "seed", *spec.vary, *OUTCOME]
+    return ["trial", "skill", "seed", *spec.vary, *OUTCOME, *JUDGED]
 
 
 def rows_of(spec: CampaignSpec, skill: int, trials: tuple[int, ...], outcomes: Mapping[str, Any]) -> list[Row]:
@@ -63,10 +66,10 @@ def rows_of(spec: CampaignSpec, skill: int, trials: tuple[int, ...], outcomes: M
         spec: the campaign.
         skill: index of the skill.
         trials: n trial numbers.
-        outcomes: `OUTCOME` and, where there are, `EXTRA`, each (n,).
+        outcomes: `OUTCOME` and, where there are, `JUDGED` and `EXTRA`, each (n,).
     """
     drawn = draws(spec, trials)
-    given = {name: outcomes[name] for name in (*OUTCOME, *EXTRA) if name in outcomes}
+    given = {name: outcomes[name] for name in (*OUTCOME, *JUDGED, *EXTRA) if name in outcomes}
     return [
         {"trial": trial, "skill": spec.labels[skill], "seed": spec.seed}
         | {name: plain_value(values[i]) for name, values in {**drawn, **given}.items()}
@@ -76,7 +79,8 @@ def rows_of(spec: CampaignSpec, skill: int, trials: tuple[int, ...], outcomes: M
 
 def dead_row(spec: CampaignSpec, skill: int, trial: int, failure: str) -> Row:
     """The row of a trial that left no outcome."""
-    outcome = {"success": [False], "failure": [failure], **{name: [math.nan] for name in MEASURES}}
+    measures = {name: [math.nan] for name in (*MEASURES, *JUDGED_MEASURES)}
+    outcome = {"success": [False], "failure": [failure], "ended_by": ["lost"], **measures}
     return rows_of(spec, skill, (trial,), outcome)[0]
 
 
@@ -93,7 +97,8 @@ def encode(value: Any) -> Any:
 
 def decode(row: Row) -> Row:
     """A row as it was before `encode`."""
-    return {key: float(v) if key in MEASURES and isinstance(v, str) else v for key, v in row.items()}
+    measures = (*MEASURES, *JUDGED_MEASURES)
+    return {key: float(v) if key in measures and isinstance(v, str) else v for key, v in row.items()}
 
 
 def cell(value: Any) -> str:

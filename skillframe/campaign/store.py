@@ -293,5 +293,5 @@ def write_results(folder: Path, spec: CampaignSpec, rows: Sequence[Row]) -> None
     writer = csv.writer(text, lineterminator="\n")
     names = columns(spec)
     writer.writerow(names)
-    writer.writerows([cell(row[name]) for name in names] for row in rows)
+    writer.writerows([cell(row.get(name, "")) for name in names] for row in rows)
     write_text(folder / RESULTS, text.getvalue())

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from skillframe.trace import Trace
 
 LONGEST_S, RATE_HZ = 20.0, 100.0
+JUDGED = ("peak_force_filtered_n", "peak_force_10ms_n", "peak_torque_share", "peak_speed_share", "ended_by")
 QUIET_S = 5.0  # a run that is over by then needs no progress
 
 
@@ -138,24 +139,33 @@ def _hundredths(value: float) -> str:
     return f"{value:.2f}" if value >= 0.01 else "less than 0.01"
 
 
+def _shares(meta: dict[str, Any]) -> str:
+    """What the motors were asked for, of what they can give."""
+    parts = [("torque", meta["peak_torque_share"]), ("speed", meta["peak_speed_share"])]
+    return ", ".join(f"{what} at most {share:.0%} of its limit" for what, share in parts if share is not None)
+
+
 def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) -> None:
     keys = ["success", "failure", "reason", "duration_s", "peak_force_n", "final_error_m", "final_error_rad"]
     outcome = {key: _known(meta[key]) for key in keys}
+    judged = {key: _known(meta[key]) for key in JUDGED}
     for text in meta.get("notes") or []:
         click.echo(f"note: {text}", err=True)
     if as_json:
         named = {what: str(path) if path else None for what, path in files.items()}
-        click.echo(json.dumps({**outcome, **named}, sort_keys=True))
+        click.echo(json.dumps({**outcome, **judged, **named}, sort_keys=True))
         return
     click.echo("success" if meta["success"] else f"failure: {meta['failure']}")
     ended = f"  ended after {meta['duration_s']:.2f} s ({meta['reason']})"
     if None not in outcome.values():
         missed, turned = _hundredths(meta["final_error_m"] * 1000), _hundredths(math.degrees(meta["final_error_rad"]))
         ended += (
-            f"; peak contact force in the simulator {meta['peak_force_n']:.1f} N; "
-            f"{missed} mm and {turned} degrees from the goal"
+            f"; peak contact force in the simulator {meta['peak_force_n']:.1f} N, by the estimate "
+            f"{meta['peak_force_filtered_n']:.1f} N; {missed} mm and {turned} degrees from the goal"
         )
     click.echo(ended)
+    if meta["peak_torque_share"] is not None or meta["peak_speed_share"] is not None:
+        click.echo(f"  motors: {_shares(meta)}")
     for what, path in files.items():
         if path is not None:
             click.echo(f"  {what}: {path}")

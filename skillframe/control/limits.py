@@ -1,12 +1,13 @@
 """Safety limits that stop a trial, with the reason in words; each is checked at every control tick.
 
 - force: norm of the filtered contact force above `force_n` (and torque above `torque_n_m`);
-- torque rate: the commanded joint torques are held to `torque_rate_nm_s`; a command that asks for more for
-  `RATE_PERSISTENCE` ticks running is stopped (a short saturation, as at an impact, is what the limiter is for);
+- motors: torque rate, effort, speed and range of the joints (`skillframe.control.motors`);
 - workspace: the tool point outside its box;
 - energy: work the controller has done on the tool at the centre of compliance since the start, above `energy_j`;
 - divergence: a state, wrench or command that is not finite, a tool faster than `SPEED_CEILING` [m/s], or a law that
   asks for more than `WRENCH_CEILING` [N, Nm].
+
+What the simulator knows and no sensor tells, the true contact force, is `skillframe.control.contact`'s.
 """
 
 from __future__ import annotations
@@ -16,42 +17,34 @@ import sys
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.control.endings import Broken, Ended
+from skillframe.control.motors import Motors
 from skillframe.frames import Float, norm
 from skillframe.robot.spec import Limits
 
-RATE_PERSISTENCE = 20  # an impact keeps the limiter busy for 5 to 10 ms; twice that is a law gone wrong
 SPEED_CEILING, WRENCH_CEILING = 20.0, 1e6
 
 
 class LimitGuard:
-    """Keeps the limits of N trials; rows are independent of each other."""
+    """Keeps the limits of N trials; rows are independent of each other.
 
-    def __init__(self, limits: Limits, count: int, dt: float) -> None:
-        self._limits, self._dt = limits, dt
-        self._torque: Float | None = None
-        self._saturated = np.zeros(count, dtype=np.int64)
+    Args:
+        limits: of the robot.
+        count: N.
+        dt: [s] between two ticks.
+        motors: of the joints, where there are some.
+    """
+
+    def __init__(self, limits: Limits, count: int, dt: float, motors: Motors | None = None) -> None:
+        self._limits, self._dt, self._motors = limits, dt, motors
         self.energy = np.zeros(count)
         """(N,) work of the controller on the tool so far [J]."""
         self._centre, self._squares, self._bounds = _glance(limits)
 
-    def rate_limited(self, torque: Float) -> Float:
-        """Joint torques (N, nv) held to the torque rate of the limits."""
-        if self._limits.torque_rate_nm_s is None:
-            return torque
-        step = self._limits.torque_rate_nm_s * self._dt
-        if self._torque is not None:
-            change = torque - self._torque
-            over = np.abs(change) > step
-            if over.any():
-                torque = np.where(over, self._torque + np.copysign(step, change), torque)
-            self._saturated = (self._saturated + 1) * over.any(-1)
-        self._torque = torque
-        return torque
-
     def violations(
         self, position: Float, twist: Float, wrench: Float, command: Float, rows: NDArray[np.int64]
-    ) -> list[tuple[int, str]]:
-        """The trials among `rows` that broke a limit, each with the cause in words.
+    ) -> list[Broken]:
+        """The trials among `rows` that broke a limit.
 
         Args:
             position: (N, 3) tool point in base.
@@ -66,26 +59,27 @@ class LimitGuard:
             return []
         force, torque, speed = norm(wrench[:, :3]), norm(wrench[:, 3:]), norm(twist[:, :3])
         limits = self._limits
-        fine = self._inside(position) & (speed <= SPEED_CEILING) & (self._saturated < RATE_PERSISTENCE)
+        fine = self._inside(position) & (speed <= SPEED_CEILING)
+        if self._motors is not None:
+            fine &= self._motors.fine()
         fine &= (force <= _or_largest(limits.force_n)) & (torque <= _or_largest(limits.torque_n_m))
         fine &= (self.energy <= _or_largest(limits.energy_j)) & (norm(command) <= WRENCH_CEILING)
         if fine.all():
             return []
         return [
-            (int(i), self._cause(int(i), values[i], float(force[i]), float(torque[i]), float(speed[i])))
+            self._broken(int(i), values[i], float(force[i]), float(torque[i]), float(speed[i]))
             for i in rows[~fine[rows]]
         ]
 
     def _surely_fine(self, values: Float) -> bool:
         """Are all trials well inside all limits? One look for the many ticks in which nothing happens."""
-        with np.errstate(invalid="ignore", over="ignore"):
-            from_centre = values - self._centre
-            sums = (from_centre * from_centre) @ self._squares
+        from_centre = values - self._centre
+        sums = (from_centre * from_centre) @ self._squares
         if self._limits.energy_j is not None and not (self.energy <= self._limits.energy_j).all():
             return False
-        if self._torque is not None and self._saturated.any():
+        if self._motors is not None and self._motors.counting:
             return False
-        return bool((sums <= self._bounds).all())
+        return bool(np.count_nonzero(sums <= self._bounds) == sums.size)
 
     def _inside(self, position: Float) -> NDArray[np.bool_]:
         if self._limits.workspace_m is None:
@@ -94,24 +88,25 @@ class LimitGuard:
         inside: NDArray[np.bool_] = np.all((position >= low) & (position <= high), axis=-1)
         return inside
 
-    def _cause(self, i: int, values: Float, force: float, torque: float, speed: float) -> str:
+    def _broken(self, i: int, values: Float, force: float, torque: float, speed: float) -> Broken:
         """Why trial i is not fine, the first cause in the order of the module's list."""
         limits = self._limits
         if not np.isfinite(values).all():
-            return "diverged: state or command is not a finite number"
+            return Broken(i, Ended.DIVERGED, "diverged: state or command is not a finite number")
         if speed > SPEED_CEILING:
-            return f"diverged: the tool moves at {speed:.1f} m/s"
+            return Broken(i, Ended.DIVERGED, f"diverged: the tool moves at {speed:.1f} m/s")
         if norm(values[-6:]) > WRENCH_CEILING:
-            return f"diverged: the law asks for {norm(values[-6:]):.1e} N"
+            return Broken(i, Ended.DIVERGED, f"diverged: the law asks for {norm(values[-6:]):.1e} N")
         if force > _or_largest(limits.force_n):
-            return f"force limit: {force:.1f} N is above {limits.force_n:g} N"
+            return Broken(i, Ended.FORCE, f"force limit: {force:.1f} N is above {limits.force_n:g} N")
         if torque > _or_largest(limits.torque_n_m):
-            return f"torque limit: {torque:.2f} Nm is above {limits.torque_n_m:g} Nm"
-        if self._saturated[i] >= RATE_PERSISTENCE:
-            return f"torque rate limit: above {limits.torque_rate_nm_s:g} Nm/s for {RATE_PERSISTENCE} ticks"
+            return Broken(i, Ended.TORQUE, f"torque limit: {torque:.2f} Nm is above {limits.torque_n_m:g} Nm")
+        if self._motors is not None and (motor := self._motors.broken(i)) is not None:
+            return motor
         if self.energy[i] > _or_largest(limits.energy_j):
-            return f"energy limit: {self.energy[i]:.2f} J put into the tool, above {limits.energy_j:g} J"
-        return f"workspace limit: tool point at {np.round(values[:3], 3).tolist()} m"
+            text = f"energy limit: {self.energy[i]:.2f} J put into the tool, above {limits.energy_j:g} J"
+            return Broken(i, Ended.ENERGY, text)
+        return Broken(i, Ended.WORKSPACE, f"workspace limit: tool point at {np.round(values[:3], 3).tolist()} m")
 
 
 def _or_largest(limit: float | None) -> float:

@@ -22,6 +22,7 @@ from skillframe.actuation.delay import CommandDelay
 from skillframe.conditioning.momentum import Estimate, ForceSettings
 from skillframe.conditioning.residual_noise import residual_noise
 from skillframe.conditioning.valve import ValveIdentification, ValveSettings
+from skillframe.control.endings import Ended
 from skillframe.control.force_compiled import CompiledEstimator
 from skillframe.control.hydraulic import Demand, HydraulicGains, Measured, Reference, plane_task
 from skillframe.control.hydraulic_compiled import CompiledLaw
@@ -269,7 +270,7 @@ class MachineLoop(Loop):
         command = self._ask(tick, observation)
         reference, law = self._reference(command, observation, min(1.0, time / RAMP_S))
         self._valve(reference)
-        np.maximum(self.peak, self.plant.contact_force(), out=self.peak)
+        self._feel(observation.wrench)
         if self.recorder is not None:
             due = self.recorder.due(tick)
             seen, machine = (self._read(observation), self._columns()) if due else (observation, None)
@@ -332,8 +333,8 @@ class MachineLoop(Loop):
             if trial in self.active and (problem := self.bank.problem(index)):
                 self._end(np.array([trial]), time, problem, True)
 
-    def _end(self, rows: NDArray[np.int64], time: float, reason: str, limit: bool) -> None:
-        super()._end(rows, time, reason, limit)
+    def _end(self, rows: NDArray[np.int64], time: float, reason: str, limit: bool, code: Ended = Ended.MACHINE) -> None:
+        super()._end(rows, time, reason, limit, code)
         self.bank.active[(rows[:, None] * len(self.chain.actuated) + np.arange(len(self.chain.actuated))).ravel()] = 0
 
     def _watch_bonds(self, time: float) -> None:
@@ -362,8 +363,9 @@ class MachineLoop(Loop):
         }  # fmt: skip
 
     def _meta(self, i: int, success: bool, failure: str) -> dict[str, Any]:
-        notes = [*self.law.notes, *self.bank.notes, *self.findings[i]]
-        return {**super()._meta(i, success, failure), "actuators": list(self.chain.actuated), "notes": notes}
+        meta = super()._meta(i, success, failure)
+        notes = [*meta["notes"], *self.law.notes, *self.bank.notes, *self.findings[i]]
+        return {**meta, "actuators": list(self.chain.actuated), "notes": notes}
 
     def _kinematics(self) -> Kinematics:
         return self.plant.kinematics(self.coc)

@@ -109,7 +109,10 @@ def interval_bar(rate: Rate, index: int) -> Markup:
 
 def _typical(results: Results, skill: str) -> str:
     parts = []
-    for column, unit, what in (("peak_force_n", "N", "peak force"), ("duration_s", "s", "duration")):
+    for column, unit, what in (
+        ("peak_force_n", "N", "peak force"), ("peak_force_filtered_n", "N", "by the estimate"),
+        ("duration_s", "s", "duration"),
+    ):  # fmt: skip
         values = [r.values.get(column, math.nan) for r in results.of(skill)]
         finite = [v for v in values if math.isfinite(v)]
         if finite:

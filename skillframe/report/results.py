@@ -23,7 +23,10 @@ from skillframe.errors import InputError
 from skillframe.report.markup import percent
 
 REQUIRED = ("trial", "skill", "success")
-FIXED = (*REQUIRED, "seed", "failure", "reason", "duration_s", "peak_force_n", "final_error_m", "final_error_rad")
+JUDGED = ("stream", "peak_force_filtered_n", "peak_torque_share", "peak_speed_share", "ended_by", "peak_force_10ms_n")
+FIXED = (
+    *REQUIRED, "seed", "failure", "reason", "duration_s", "peak_force_n", "final_error_m", "final_error_rad", *JUDGED,
+)  # fmt: skip
 TRUTH = {"1": True, "true": True, "1.0": True, "0": False, "false": False, "0.0": False}
 
 

@@ -72,6 +72,7 @@ def _story(meta: Mapping[str, Any]) -> str:
     for key, what, unit, factor in (
         ("duration_s", "took", "s", 1.0),
         ("peak_force_n", "peak force in the simulator", "N", 1.0),
+        ("peak_force_filtered_n", "by the estimate", "N", 1.0),
         ("final_error_m", "final error", "mm", 1e3),
     ):
         if isinstance(meta.get(key), int | float):

@@ -145,15 +145,39 @@ def _forces(chapter: Chapter, results: Results) -> Markup:
     if not any(len(f) for f in finite.values()):
         return note("The table holds no peak forces.")
     known = [(skill, float(np.median(f)), float(f.max())) for skill, f in finite.items() if len(f)]
-    said = [f"{skill}: median {number(middle)} N, highest {number(top)} N" for skill, middle, top in known]
-    held = " Peaks are the simulator's; limits are held against the filtered force, which has lower ones."
+    said = [
+        f"{skill}: median {number(middle)} N, highest {number(top)} N{_by_estimate(results, skill)}"
+        for skill, middle, top in known
+    ]
     drawn = figure(
         "",
-        "; ".join(said) + "." + held * (chapter.force_limit is not None),
+        "; ".join(said) + "." + _held(results, chapter.force_limit),
         _histogram(list(finite.values()), chapter.force_limit),
         class_="plot wide",
     )
     return join([tag("h3", "How hard it pushed"), _skill_key(results), drawn])
+
+
+def _by_estimate(results: Results, skill: str) -> str:
+    """The highest force that the controller's estimate read, where the table has it."""
+    read = [row.values.get("peak_force_filtered_n", math.nan) for row in results.of(skill)]
+    finite = [value for value in read if math.isfinite(value)]
+    return f" ({number(max(finite))} N by the estimate)" if finite else ""
+
+
+def _held(results: Results, limit: float | None) -> str:
+    """What the limit is held against, and how many successes peaked above it."""
+    if limit is None:
+        return ""
+    if all(math.isnan(row.values.get("peak_force_10ms_n", math.nan)) for row in results.rows):
+        return " Peaks are the simulator's; limits are held against the filtered force, which has lower ones."
+    text = " Peaks are the simulator's. A trial fails if the estimate is above the limit, or in the simulator the mean"
+    text += " over 10 ms is above it or a peak above twice the limit."
+    marked = [row for row in results.rows if row.success and row.values.get("peak_force_n", 0.0) > limit]
+    if marked:
+        top = max(row.values["peak_force_n"] for row in marked)
+        text += f" {len(marked)} successes peaked above {limit:g} N for under 10 ms, at most {number(top)} N."
+    return text
 
 
 def _histogram(forces: Sequence[Float], limit: float | None) -> Markup:

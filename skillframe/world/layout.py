@@ -32,6 +32,7 @@ class Layout:
         self.free = bool(model.njnt and model.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE)
         sprung = [j for j in range(model.njnt) if model.joint(j).name.startswith(SPRUNG)]
         self.sprung = model.jnt_dofadr[sprung].astype(np.int64)
+        self.places = _places(model)
         self._set_chain(model)
         self._rows, self._columns = _sparse_indices(model)
         self._ordered: tuple[Any, list[tuple[int, int, int]]] = (None, [])
@@ -117,6 +118,15 @@ class Layout:
             else:
                 configuration[:, start] = qpos[:, address]
         return configuration
+
+
+def _places(model: mujoco.MjModel) -> NDArray[np.int64]:
+    """(nv,) where in the configuration the position of each generalised velocity's joint stands."""
+    joints = model.dof_jntid
+    single = (model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_HINGE) | (
+        model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_SLIDE
+    )
+    return np.where(single, model.jnt_qposadr[joints], 0).astype(np.int64)
 
 
 def _no_link(name: str) -> bool:

@@ -154,6 +154,12 @@ class Plant:
         return self._qpos, self._qvel
 
     @property
+    def joint_positions(self) -> Float:
+        """(N, nv) position of the joint that each generalised velocity is of [rad or m]; nothing for a free base."""
+        whole: Float = self._qpos
+        return whole if self.model.nq == self.model.nv else whole[:, self._layout.places]
+
+    @property
     def configuration(self) -> Float:
         """(N, nq) in Pinocchio's order."""
         return self._layout.to_pinocchio(self.robot.model, self._qpos)

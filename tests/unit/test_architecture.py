@@ -18,10 +18,10 @@ PLUGINS = sorted(p for p in (ROOT / "plugins").iterdir() if (p / "src").is_dir()
 FLOORS = [
     {"errors", "paths", "frames", "config", "files", "documents", "npzfile"},
     {"demonstration", "conditioning", "skill", "records", "hookspecs"},
-    {"sequence", "skillfile", "export", "robot", "registry", "skillsource"},
+    {"handover", "sequence", "skillfile", "export", "robot", "registry", "skillsource"},
     {"control", "actuation"},
     {"cosim", "world"},
-    {"executor", "arms", "machine", "recorder", "trace", "tracemeta", "prepare"},
+    {"executor", "arms", "machine", "recorder", "result", "trace", "tracemeta", "prepare"},
     {"teacher", "staged_teacher", "blind_teacher", "teleoperation", "metrics", "campaign"},
     {"report", "demonstrate", "demonstrate_blind", "demonstrate_machine"},
     {"conformance", "testing", "quickstart", "reproduce"},
@@ -35,6 +35,7 @@ ASKED_WHEN_CALLED = {  # uphill, and only inside the function that needs it
 }
 LOOP = {
     "skill",
+    "handover",
     "sequence",
     "teacher",
     "staged_teacher",

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from skillframe.control.limits import RATE_PERSISTENCE, SPEED_CEILING, WRENCH_CEILING, LimitGuard
+from skillframe.control.limits import SPEED_CEILING, WRENCH_CEILING, LimitGuard
+from skillframe.control.motors import RATE_PERSISTENCE, JointLimits, Motors
 from skillframe.robot.spec import Limits
 
 NONE = {"force_n": None, "torque_rate_nm_s": None}
@@ -12,10 +13,25 @@ def guard(count=1, **limits):
     return LimitGuard(Limits(**{**NONE, **limits}), count, DT)
 
 
+def motors(nv, count=1, rate=1000.0):
+    """Motors that only a torque rate limits."""
+    none = np.full(nv, np.inf)
+    return Motors([JointLimits(("joint",) * nv, (False,) * nv, none, none, -none, none)], rate, count, DT)
+
+
+def held(drive, torque):
+    torque = np.asarray(torque, dtype=float)
+    return drive.held(torque, np.zeros_like(torque), np.zeros_like(torque))
+
+
+def guard_of(drive, count=1):
+    return LimitGuard(Limits(**NONE), count, DT, drive)
+
+
 def check(limit_guard, position=(0.0, 0.0, 0.0), twist=(0.0,) * 6, wrench=(0.0,) * 6, command=(0.0,) * 6):
     position, twist, wrench, command = (np.array([value], dtype=float) for value in (position, twist, wrench, command))
     found = limit_guard.violations(position, twist, wrench, command, np.arange(1))
-    return [cause for _, cause in found]
+    return [broken.cause for broken in found]
 
 
 @pytest.mark.parametrize(
@@ -75,17 +91,17 @@ def test_a_law_that_asks_for_absurd_forces_is_a_divergence():
 
 
 def test_torques_are_held_to_their_rate_joint_by_joint():
-    limited = guard(torque_rate_nm_s=1000.0)
-    np.testing.assert_array_equal(limited.rate_limited(np.array([[5.0, 5.0]])), [[5.0, 5.0]])
-    np.testing.assert_array_equal(limited.rate_limited(np.array([[5.5, 9.0]])), [[5.5, 6.0]])
-    np.testing.assert_array_equal(limited.rate_limited(np.array([[5.5, 3.0]])), [[5.5, 5.0]])
+    drive = motors(2)
+    np.testing.assert_array_equal(held(drive, [[5.0, 5.0]]), [[5.0, 5.0]])
+    np.testing.assert_array_equal(held(drive, [[5.5, 9.0]]), [[5.5, 6.0]])
+    np.testing.assert_array_equal(held(drive, [[5.5, 3.0]]), [[5.5, 5.0]])
 
 
 def run_ramp(rate, ticks):
-    limited = guard(torque_rate_nm_s=1000.0)
+    drive = motors(1)
     for tick in range(ticks + 1):
-        limited.rate_limited(np.array([[rate * tick * DT]]))
-    return check(limited)
+        held(drive, [[rate * tick * DT]])
+    return check(guard_of(drive))
 
 
 def test_a_torque_rate_above_the_limit_for_some_ticks_running_stops_the_trial():
@@ -96,31 +112,31 @@ def test_a_torque_rate_above_the_limit_for_some_ticks_running_stops_the_trial():
 
 
 def test_one_calm_tick_starts_the_count_anew():
-    limited = guard(torque_rate_nm_s=1000.0)
+    drive = motors(1)
     for torque in [0.0, *[1e3] * (RATE_PERSISTENCE - 1)]:
-        limited.rate_limited(np.array([[torque]]))
-    limited.rate_limited(np.array([[1.0 * (RATE_PERSISTENCE - 1)]]))
-    limited.rate_limited(np.array([[1e3]]))
-    assert check(limited) == []
+        held(drive, [[torque]])
+    held(drive, [[1.0 * (RATE_PERSISTENCE - 1)]])
+    held(drive, [[1e3]])
+    assert check(guard_of(drive)) == []
 
 
 def test_rows_are_limited_independently():
     """A row beside one that saturates keeps its torque to the last bit."""
-    quiet, rng = guard(1, torque_rate_nm_s=1000.0), np.random.default_rng(0)
-    both = guard(2, torque_rate_nm_s=1000.0)
+    quiet, rng = motors(7), np.random.default_rng(0)
+    both = motors(7, count=2)
     for _ in range(2 * RATE_PERSISTENCE):
         calm, wild = 1e-3 * rng.normal(size=(1, 7)), 1e3 * rng.normal(size=(1, 7))
-        np.testing.assert_array_equal(both.rate_limited(np.concatenate([calm, wild]))[:1], quiet.rate_limited(calm))
+        np.testing.assert_array_equal(held(both, np.concatenate([calm, wild]))[:1], held(quiet, calm))
     wrench = np.zeros((2, 6))
-    found = both.violations(np.zeros((2, 3)), np.zeros((2, 6)), wrench, wrench, np.arange(2))
-    assert [i for i, _ in found] == [1]
+    found = guard_of(both, 2).violations(np.zeros((2, 3)), np.zeros((2, 6)), wrench, wrench, np.arange(2))
+    assert [broken.row for broken in found] == [1]
 
 
 def test_trials_that_have_ended_are_not_reported_again():
     limited = guard(2, force_n=1.0)
     wrench = np.full((2, 6), 9.0)
     zero = np.zeros((2, 6))
-    assert [i for i, _ in limited.violations(zero[:, :3], zero, wrench, zero, np.array([1]))] == [1]
+    assert [broken.row for broken in limited.violations(zero[:, :3], zero, wrench, zero, np.array([1]))] == [1]
 
 
 def test_no_limit_is_no_limit():

@@ -1,0 +1,212 @@
+"""What a robot's motors can give: joint torques held to their rate and to the URDF's effort, joints watched.
+
+The law's torques (with gravity, which a motor has to carry as well) are held to `torque_rate_nm_s`, then to each
+joint's `effort`. What a motor cannot do for long ends the trial, with the joint's name; the times are ours:
+
+- torque rate: a command that asks for more for `RATE_PERSISTENCE` ticks running (a short saturation, as at an impact,
+  is what the limiter is for);
+- effort: a law that asks for more than a joint's for `MOTOR_S` running; speed: a joint faster than its `velocity` for
+  as long; range: a joint of the arm pressed `RANGE_SLACK` into the end of its range for as long. Drives bear a peak of
+  torque or speed for a moment; a tenth of a second is ten times an impact.
+
+Zero, or nothing, in a URDF's `effort` or `velocity` means that it is not given, and no limit; `silent` names such
+joints, so that a result can say so. A free-flying base has no motors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.control.endings import Broken, Ended
+from skillframe.frames import Float
+from skillframe.robot.model import RobotModel
+from skillframe.robot.numbers import numbers
+
+RATE_PERSISTENCE = 20  # an impact keeps the limiter busy for 5 to 10 ms; twice that is a law gone wrong
+MOTOR_S, RANGE_SLACK = 0.1, 1e-3  # s; rad or m, more than rounding and noise, less than any use
+
+
+class JointLimits(NamedTuple):
+    """Limits of the generalised velocities of one batch row, in the simulator's order; infinite where none is given.
+
+    Attributes:
+        names: (nv) of the joints.
+        sliding: (nv) prismatic joints.
+        effort: (nv,) [N m or N]; velocity: (nv,) [rad/s or m/s].
+        lower, upper: (nv,) [rad or m].
+    """
+
+    names: tuple[str, ...]
+    sliding: tuple[bool, ...]
+    effort: Float
+    velocity: Float
+    lower: Float
+    upper: Float
+
+    @property
+    def silent(self) -> tuple[str, ...]:
+        """Joints that have a range or a speed, and whose effort or velocity the URDF does not give."""
+        unknown = np.isinf(self.effort) | np.isinf(self.velocity)
+        return tuple(name for name, missing in zip(self.names, unknown, strict=True) if name and missing)
+
+
+def joint_limits(
+    robot: RobotModel, engine: Any, arms: Sequence[NDArray[np.int64]] | None = None
+) -> list[JointLimits]:  # fmt: skip
+    """What the URDF says of a robot's joints, for each arm, or for the whole robot; empty if it has no joints.
+
+    Of a joint that no tool frame is carried by, as a gripper's that is closed, the range is not watched.
+
+    Args:
+        robot: with its URDF.
+        engine: the simulator's model, which orders the generalised velocities.
+        arms: of each arm its generalised velocities.
+    """
+    model, nv = robot.model, int(engine.nv)
+    names, sliding = [""] * nv, [False] * nv
+    effort, velocity, lower, upper = (np.full(nv, sign * np.inf) for sign in (1, 1, -1, 1))
+    carrying = {int(j) for f in robot.tool_frames for j in model.supports[model.frames[f].parentJoint]}
+    for index in range(1, model.njoints):
+        joint, urdf = model.joints[index], robot.urdf.joints.get(model.names[index])
+        if urdf is None or joint.nv != 1:
+            continue
+        i, limit = int(engine.joint(model.names[index]).dofadr[0]), urdf.element.find("limit")
+        names[i], sliding[i] = model.names[index], urdf.type == "prismatic"
+        given = (numbers(limit, what, 1, (0.0,))[0] for what in ("effort", "velocity"))
+        effort[i], velocity[i] = (value if value > 0.0 else np.inf for value in given)
+        if joint.nq == 1 and index in carrying:
+            lower[i], upper[i] = (end[joint.idx_q] for end in (model.lowerPositionLimit, model.upperPositionLimit))
+    if not any(names):
+        return []
+    chosen = [np.arange(nv)] if arms is None else arms
+    return [
+        JointLimits(tuple(names[i] for i in dofs), tuple(sliding[i] for i in dofs), *(
+            part[dofs] for part in (effort, velocity, lower, upper)
+        ))
+        for dofs in chosen
+    ]  # fmt: skip
+
+
+class Motors:
+    """The motors of N rows; rows are independent of each other.
+
+    Args:
+        limits: of each row's joints: one for all, or one per arm, which rows take in turn.
+        rate: [N m/s] of joint torques, or None.
+        count: N.
+        dt: [s] between two ticks.
+    """
+
+    def __init__(self, limits: Sequence[JointLimits], rate: float | None, count: int, dt: float) -> None:
+        self._limits, self._rate, self._dt = limits, rate, dt
+        nv, turns = len(limits[0].names), count // len(limits)
+        stacked = [np.tile([getattr(one, what) for one in limits], (turns, 1)) for what in JointLimits._fields[2:]]
+        self._effort, velocity, lower, upper = stacked
+        bounded = np.isfinite(lower) & np.isfinite(upper)
+        lower, upper = np.where(bounded, lower, -1.0), np.where(bounded, upper, 1.0)
+        self._middle = 0.5 * (lower + upper)
+        half = np.where(bounded, 0.5 * (upper - lower) + RANGE_SLACK, np.inf)
+        step = np.full((count, nv), np.inf if rate is None else rate * dt)
+        self._most = np.concatenate([step, self._effort, velocity, half], axis=-1)
+        self._now = np.zeros((count, 4 * nv))
+        self._change, self._asked, self._speed, self._place = (self._now[:, k * nv : (k + 1) * nv] for k in range(4))
+        self._torque: Float | None = None
+        self._ticks = np.zeros((count, 4 * nv), dtype=np.int64)
+        self._rate_ticks = np.zeros(count, dtype=np.int64)
+        self._peak = np.zeros((count, 4 * nv))
+        self._persistence = max(1, round(MOTOR_S / dt))
+        self.counting = False
+        """Is any row beyond what a motor can give?"""
+
+    def held(self, torque: Float, velocity: Float, position: Float) -> Float:
+        """Joint torques (N, nv) as the motors give them.
+
+        Args:
+            torque: (N, nv) that the law asks for.
+            velocity: (N, nv) of the joints.
+            position: (N, nv) of the joints.
+        """
+        last = torque if self._torque is None else self._torque
+        np.subtract(torque, last, out=self._change)
+        self._asked[:] = torque
+        self._speed[:] = velocity
+        np.subtract(position, self._middle, out=self._place)
+        size = np.abs(self._now)
+        np.maximum(self._peak, size, out=self._peak)
+        over = size > self._most
+        if np.count_nonzero(over):
+            torque = self._limited(torque, last, over)
+        elif self.counting:
+            self._ticks[:], self._rate_ticks[:], self.counting = 0, 0, False
+        self._torque = torque
+        return torque
+
+    def _limited(self, torque: Float, last: Float, over: NDArray[np.bool_]) -> Float:
+        nv = torque.shape[1]
+        fast = over[:, :nv]
+        self._ticks += 1
+        self._ticks *= over
+        self._rate_ticks = (self._rate_ticks + 1) * fast.any(-1)
+        self.counting = True
+        if self._rate is not None:
+            torque = np.where(fast, last + np.copysign(self._rate * self._dt, self._change), torque)
+        result: Float = np.minimum(np.maximum(torque, -self._effort), self._effort)
+        return result
+
+    def fine(self) -> NDArray[np.bool_]:
+        """(N,) no row beyond for too long."""
+        nv = self._effort.shape[1]
+        lasting: NDArray[np.bool_] = (self._rate_ticks < RATE_PERSISTENCE) & (
+            self._ticks[:, nv:] < self._persistence
+        ).all(-1)
+        return lasting
+
+    def broken(self, i: int) -> Broken | None:
+        """Why row i is not fine."""
+        if self._rate_ticks[i] >= RATE_PERSISTENCE:
+            text = f"torque rate limit: above {self._rate:g} Nm/s for {RATE_PERSISTENCE} ticks"
+            return Broken(i, Ended.TORQUE_RATE, text)
+        nv = self._effort.shape[1]
+        late = np.flatnonzero(self._ticks[i, nv:] >= self._persistence)
+        return None if not len(late) else self._lasting(i, int(late[0]) // nv, int(late[0]) % nv)
+
+    def _lasting(self, i: int, kind: int, joint: int) -> Broken:
+        """What joint `joint` of row i has asked, or done, for too long: 0 torque, 1 speed, 2 range."""
+        limits = self._limits[i % len(self._limits)]
+        name, sliding = limits.names[joint], limits.sliding[joint]
+        nv, spell = len(limits.names), f"for {1e3 * MOTOR_S:.0f} ms"
+        value, most = abs(self._now[i, (kind + 1) * nv + joint]), self._most[i, (kind + 1) * nv + joint]
+        if kind == 0:
+            unit = "N" if sliding else "Nm"
+            text = f"motor limit: {name} at its {most:g} {unit} {spell}, the law asks for {value:.3g} {unit}"
+            return Broken(i, Ended.MOTOR, text)
+        unit = "m" if sliding else "rad"
+        if kind == 1:
+            text = f"joint speed limit: {name} at {value:.3g} {unit}/s, above its {most:g} {unit}/s, {spell}"
+            return Broken(i, Ended.SPEED, text)
+        end = self._middle[i, joint] + np.copysign(most - RANGE_SLACK, self._now[i, 3 * nv + joint])
+        return Broken(i, Ended.RANGE, f"joint range: {name} pressed against its end at {end:.3g} {unit} {spell}")
+
+    def silent(self) -> str:
+        """Whose motors count as unlimited, as a sentence, or ""."""
+        names = [name for one in self._limits for name in one.silent]
+        if not names:
+            return ""
+        few = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+        return f"the URDF gives no effort or no velocity for {few}; what it does not give counts as unlimited"
+
+    def shares(self) -> tuple[Float, Float]:
+        """(N,) largest torque asked for over effort so far, and largest speed over velocity; NaN where none is given.
+
+        The torque is what the law asks for, so that a share above 1 tells how much a motor was short of.
+        """
+        nv = self._effort.shape[1]
+        share = self._peak[:, nv : 3 * nv] / self._most[:, nv : 3 * nv]
+        known = np.isfinite(self._most[:, nv : 3 * nv])
+        share = np.where(known, share, -1.0)
+        torque, speed = share[:, :nv].max(-1), share[:, nv:].max(-1)
+        return np.where(torque < 0.0, np.nan, torque), np.where(speed < 0.0, np.nan, speed)
