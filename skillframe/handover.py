@@ -231,7 +231,7 @@ _WRONG = {
 
 def _impossible(gain: Float, symmetric: bool) -> Any:
     """(...) which matrices (..., 6, 6) are finite, and not symmetric or with an eigenvalue below zero."""
-    finite: NDArray[np.bool_] = np.isfinite(gain).all(axis=(-1, -2))
+    finite = np.asarray(np.isfinite(gain).all(axis=(-1, -2)))
     sound = np.where(finite[..., None, None], gain, 0.0)
     slack = IMPEDANCE_SLACK * np.abs(sound).max(axis=(-1, -2)) + 1e-12
     even = 0.5 * (sound + sound.mT)

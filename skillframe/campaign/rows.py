@@ -1,7 +1,8 @@
 """One row a trial and skill: its columns, its text form, and what two of them have to have in common.
 
 A row is a flat dict: `trial`, `skill`, `seed`, every varied quantity, then `OUTCOME` and `JUDGED`; a stored row also
-keeps `status` and `reason`. A row of version 0.1 has no `JUDGED`: these cells stay empty. Numbers that JSON does not know (NaN, infinities) are stored as text and read back as numbers.
+keeps `status` and `reason`. A row of version 0.1 has no `JUDGED`: those cells stay empty. Numbers that JSON does not
+know (NaN, infinities) are stored as text and read back as numbers.
 """
 
 from __future__ import annotations

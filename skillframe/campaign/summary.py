@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
@@ -17,13 +18,15 @@ from skillframe.documents import read_json
 from skillframe.errors import InputError
 
 SUMMARY = "summary.json"
+PEAKS = ("peak_force_n", "peak_force_10ms_n", "peak_force_filtered_n", "peak_torque_share", "peak_speed_share")
 
 
 def rates(spec: CampaignSpec, rows: Sequence[Row], complete: bool) -> dict[str, dict[str, Any]]:
     """Per skill: trials, successes, rate, `interval_95` (null if there is none), method, and how often which failure.
 
-    Which interval it is, and why there may be none, `validity` says. An unfinished campaign counts each skill's trials
-    up to the first one that is missing; `uncounted` is the number of its rows beyond.
+    Besides, how often which code of `ended_by`, and the largest forces and shares of the motors. Which interval it is,
+    and why there may be none, `validity` says. An unfinished campaign counts each skill's trials up to the first one
+    that is missing; `uncounted` is the number of its rows beyond.
     """
     validity = validity_of(spec.plan, complete=complete)
     return {label: _rate(_of(rows, label, complete), rows, label, validity) for label in spec.labels}
@@ -40,6 +43,7 @@ def _rate(counted: Sequence[Row], rows: Sequence[Row], label: str, validity: Val
     n, s = len(counted), sum(row["success"] for row in counted)
     interval = validity.interval(s, n)
     failures = [row["failure"] for row in counted if not row["success"]]
+    ended = [row["ended_by"] for row in counted if "ended_by" in row]  # rows of 0.1 do not say
     return {
         "skill": label,
         "trials": n,
@@ -48,8 +52,15 @@ def _rate(counted: Sequence[Row], rows: Sequence[Row], label: str, validity: Val
         "interval_95": None if interval is None else list(interval),
         "method": validity.interval_method,
         "failures": {text: failures.count(text) for text in sorted(set(failures))},
+        "ended_by": {code: ended.count(code) for code in sorted(set(ended))},
+        "largest": {name: _largest([row.get(name) for row in counted]) for name in PEAKS},
         "uncounted": sum(row["skill"] == label for row in rows) - n,
     }
+
+
+def _largest(values: Sequence[Any]) -> float | None:
+    """The largest finite number, or None."""
+    return max((v for v in values if isinstance(v, float) and math.isfinite(v)), default=None)
 
 
 def comparisons(spec: CampaignSpec, rows: Sequence[Row], complete: bool) -> list[dict[str, Any]]:

@@ -1,7 +1,7 @@
 """What a robot's motors can give: joint torques held to their rate and to the URDF's effort, joints watched.
 
-The law's torques (with gravity, which a motor has to carry as well) are held to `torque_rate_nm_s`, then to each
-joint's `effort`. What a motor cannot do for long ends the trial, with the joint's name; the times are ours:
+The law's torques (with gravity, which a motor has to carry as well) are held to each joint's `effort`, and then to
+`torque_rate_nm_s`. What a motor cannot do for long ends the trial, with the joint's name; the times are ours:
 
 - torque rate: a command that asks for more for `RATE_PERSISTENCE` ticks running (a short saturation, as at an impact,
   is what the limiter is for);
@@ -146,16 +146,19 @@ class Motors:
         return torque
 
     def _limited(self, torque: Float, last: Float, over: NDArray[np.bool_]) -> Float:
+        """Held to the effort, and then to the rate: a motor at its effort is not asked for a rate besides."""
         nv = torque.shape[1]
-        fast = over[:, :nv]
+        torque = np.minimum(np.maximum(torque, -self._effort), self._effort)
+        change = torque - last
+        fast = np.abs(change) > self._most[:, :nv]
+        over[:, :nv] = fast
         self._ticks += 1
         self._ticks *= over
         self._rate_ticks = (self._rate_ticks + 1) * fast.any(-1)
         self.counting = True
-        if self._rate is not None:
-            torque = np.where(fast, last + np.copysign(self._rate * self._dt, self._change), torque)
-        result: Float = np.minimum(np.maximum(torque, -self._effort), self._effort)
-        return result
+        if self._rate is None:
+            return torque
+        return np.where(fast, last + np.copysign(self._rate * self._dt, change), torque)
 
     def fine(self) -> NDArray[np.bool_]:
         """(N,) no row beyond for too long."""
