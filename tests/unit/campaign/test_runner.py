@@ -108,7 +108,7 @@ def test_a_trial_that_raises_is_named_and_the_rest_stands(out, reference):
     changed = [line for line, undisturbed in zip(mine, other, strict=True) if line != undisturbed]
     assert len(changed) == 1
     assert changed[0].startswith(b"37,a.skill.json,7,")
-    assert changed[0].endswith(b",0,error: ValueError: the skill tripped,nan,nan,nan,nan")
+    assert changed[0].endswith(b",0,error: ValueError: the skill tripped,nan,nan,nan,nan,nan,nan,nan,lost,nan")
 
 
 def test_a_campaign_in_which_nothing_works_is_given_up_with_the_cause(out):

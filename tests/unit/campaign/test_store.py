@@ -13,6 +13,7 @@ from skillframe.campaign.lock import FolderLock, holder
 from skillframe.campaign.rows import MEASURES, decode, differences, encode
 from skillframe.campaign.store import RowLog, read_rows, repair_tail
 from skillframe.errors import InputError
+from skillframe.report.results import read_results
 
 
 @pytest.fixture
@@ -38,11 +39,20 @@ def test_results_have_the_contracts_columns_in_order(out):
     lines = (out / "results.csv").read_text().splitlines()
     assert lines[0] == (
         "trial,skill,seed,start.tilt_y,start.offset_x,world.friction,"
-        "success,failure,duration_s,peak_force_n,final_error_m,final_error_rad"
+        "success,failure,duration_s,peak_force_n,final_error_m,final_error_rad,"
+        "peak_force_filtered_n,peak_torque_share,peak_speed_share,ended_by,peak_force_10ms_n"
     )
     keys = [tuple(line.split(",")[:2]) for line in lines[1:]]
     assert keys == [(str(t), label) for t in range(6) for label in ("a.skill.json", "replay:demo.npz")]
     assert {line.split(",")[6] for line in lines[1:]} <= {"0", "1"}
+
+
+def test_rows_of_version_0_1_make_a_table_whose_later_cells_are_empty(out):
+    """The rows of these fakes hold what rows of 0.1 held."""
+    run(out)
+    lines = (out / "results.csv").read_text().splitlines()
+    assert {tuple(line.split(",")[-5:]) for line in lines[1:]} == {("",) * 5}
+    assert not read_results(out / "results.csv").notes
 
 
 def test_a_torn_last_line_cut_at_every_byte_is_taken_off_and_no_more(out):
