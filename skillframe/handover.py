@@ -27,6 +27,8 @@ from skillframe.skill import Command, Impedance, Observation, Skill, Status
 
 SLOW_TICKS = 10
 """Every 10 ms at 1 kHz: how often goals and what changes slowly are looked at."""
+RARE_TICKS = 100
+"""Every 100 ms: kinds of numbers, and whether a rotation is none because it mirrors."""
 ROTATION_SLACK = 1e-3
 """Largest entry of R^T R - 1 (ours): far above the rounding of an hour's products, or of single precision."""
 IMPEDANCE_SLACK = 1e-6
@@ -51,12 +53,15 @@ def unknown_end(status: int, reason: object) -> str:
 
 def shown(observation: Observation) -> Observation:
     """Copies that a skill can keep and cannot write to; nothing leads from them to what the loop goes by."""
-    time, dt, (position, rotation), twist, wrench = observation
-    arrays = time.copy(), position.copy(), rotation.copy(), twist.copy(), wrench.copy()
-    for array in arrays:
-        array.flags.writeable = False
-    time, position, rotation, twist, wrench = arrays
-    return Observation(time, dt, Pose(position, rotation), twist, wrench)
+    time, position, rotation = (
+        observation.time.copy(),
+        observation.pose.position.copy(),
+        observation.pose.rotation.copy(),
+    )
+    twist, wrench = observation.twist.copy(), observation.wrench.copy()
+    time.flags.writeable = position.flags.writeable = rotation.flags.writeable = False
+    twist.flags.writeable = wrench.flags.writeable = False
+    return Observation(time, observation.dt, Pose(position, rotation), twist, wrench)
 
 
 def asked(skill: Skill, method: Callable[..., Answer], *arguments: Any) -> Answer:
@@ -181,14 +186,14 @@ class CommandCheck:
         Raises:
             SkillframeError: as `check_shapes`.
         """
-        slow, faults = tick % SLOW_TICKS == 0, []
-        if slow:
+        slow, rare, faults = tick % SLOW_TICKS == 0, tick % RARE_TICKS == 0, []
+        if rare:
             check_shapes(self._skill, command, self._lead)
         rotation, (stiffness, damping) = self._shapes(command).pose.rotation, command.impedance
         if slow or rotation is not self._rotation:
             self._rotation = rotation
             near = np.abs(rotation.mT @ rotation - _EYE) <= ROTATION_SLACK
-            if np.count_nonzero(near) != near.size or (slow and not (np.linalg.det(rotation) > 0.0).all()):
+            if np.count_nonzero(near) != near.size or (rare and not (np.linalg.det(rotation) > 0.0).all()):
                 faults += self._turns(rotation)
         if slow or self._gains is None or stiffness is not self._gains[0] or damping is not self._gains[1]:
             faults += self._springs(command.impedance)
@@ -209,8 +214,9 @@ class CommandCheck:
 
     def _springs(self, impedance: Impedance) -> list[Fault]:
         """Rows whose stiffness or damping is finite and not possible."""
-        _check_gains(type(self._skill).__name__, impedance, self._lead)
-        self._gains = impedance
+        gains, self._gains = self._gains, impedance
+        if gains is None or impedance[0] is not gains[0] or impedance[1] is not gains[1]:
+            _check_gains(type(self._skill).__name__, impedance, self._lead)
         faults = []
         for k, (field, gain) in enumerate(zip(Impedance._fields, impedance, strict=True)):
             last = self._values[k]

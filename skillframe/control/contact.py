@@ -28,26 +28,31 @@ MEAN_S, TRANSIENT = 0.01, 2.0
 
 
 class _Window:
-    """One quantity of N trials over the last ticks, its largest value and its largest mean."""
+    """One quantity of N trials: its largest value, and its largest mean over `width` ticks.
+
+    The ring holds its running sum, so that a mean is the difference of two rows.
+    """
 
     def __init__(self, count: int, width: int, every: int) -> None:
-        self._width, self._ring = width, np.zeros((width + every, count))
-        self._tick = 0
+        self._width, self._ring, self._sum = width, np.zeros((width + every, count)), np.zeros(count)
+        self._ages = np.arange(every)
+        self._tick, self._seen = 0, np.zeros(count)
         self.peak, self.mean = np.zeros(count), np.zeros(count)
 
     def step(self, size: Float) -> None:
-        self._ring[self._tick % len(self._ring)] = size
+        self._sum += size
         self._tick += 1
+        self._ring[self._tick % len(self._ring)] = self._sum
         np.maximum(self.peak, size, out=self.peak)
 
     def look(self, rows: NDArray[np.int64]) -> None:
-        """Bring the largest mean (over a window) of some trials up to date."""
-        if not np.count_nonzero(self.peak[rows] > self.mean[rows]):
-            return
-        in_order = np.roll(self._ring, -(self._tick % len(self._ring)), axis=0)
-        sums = np.cumsum(np.concatenate([np.zeros((1, in_order.shape[1])), in_order]), axis=0)
-        means = (sums[self._width :] - sums[: -self._width]) / self._width
-        self.mean[rows] = np.maximum(self.mean, means.max(axis=0))[rows]
+        """Bring the largest mean of some trials up to date with the windows that ended since the last look."""
+        if not np.count_nonzero(self._sum != self._seen):
+            return  # nothing has touched since
+        self._seen[:] = self._sum
+        last = (self._tick - self._ages) % len(self._ring)
+        gained = self._ring.take(last, axis=0) - self._ring.take(last - self._width, axis=0, mode="wrap")
+        self.mean[rows] = np.maximum(self.mean, gained.max(axis=0) / self._width)[rows]
 
 
 class TrueContact:
@@ -119,8 +124,10 @@ class TrueContact:
     ) -> list[Broken]:
         if limit is None:
             return []
-        over = (seen.mean[rows] > limit) | (seen.peak[rows] > TRANSIENT * limit)
-        return [Broken(int(i), code, self._told(int(i), seen, limit, what, unit)) for i in rows[over]]
+        over = (seen.mean > limit) | (seen.peak > TRANSIENT * limit)
+        if not np.count_nonzero(over):
+            return []
+        return [Broken(int(i), code, self._told(int(i), seen, limit, what, unit)) for i in rows[over[rows]]]
 
     def _told(self, i: int, seen: _Window, limit: float, what: str, unit: str) -> str:
         mean, peak, digits = float(seen.mean[i]), float(seen.peak[i]), 1 if unit == "N" else 2
