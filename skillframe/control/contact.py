@@ -47,9 +47,9 @@ class _Window:
 
     def look(self, rows: NDArray[np.int64]) -> None:
         """Bring the largest mean of some trials up to date with the windows that ended since the last look."""
-        if not np.count_nonzero(self._sum != self._seen):
+        if not np.count_nonzero(self._sum[rows] != self._seen[rows]):
             return  # nothing has touched since
-        self._seen[:] = self._sum
+        self._seen[rows] = self._sum[rows]
         last = (self._tick - self._ages) % len(self._ring)
         gained = self._ring.take(last, axis=0) - self._ring.take(last - self._width, axis=0, mode="wrap")
         self.mean[rows] = np.maximum(self.mean, gained.max(axis=0) / self._width)[rows]
