@@ -6,10 +6,11 @@ the simulator. Such a trial is a failure of its own if
 - the true force, averaged over any `MEAN_S`, is above `force_n` (so for torque and `torque_n_m`), or
 - the true force of one control tick is above `TRANSIENT` times `force_n`.
 
-Ten milliseconds is about what the controller's 25 Hz filter smooths over (its time constant is 1 / (2 pi 25 Hz) = 6.4 ms),
-so that the rule asks no more than that the estimate be right; the factor of two is what ISO/TS 15066:2016, table A.2, allows a transient contact with a person
-over a lasting one. That table is about people and contacts of up to half a second: to hold tools and parts to it is our
-choice. An impact that stays below both is no failure: it is marked, by `over` ("peak 105 N for under 10 ms").
+Ten milliseconds is about what the controller's 25 Hz filter smooths over (1 / (2 pi 25 Hz) = 6.4 ms), so that the rule
+asks no more than that the estimate be right. The factor of two is what ISO/TS 15066:2016, table A.2, allows a transient
+contact with a person over a lasting one. That table is about people and contacts of up to half a second: to hold tools
+and parts to it is our choice. An impact that stays below both is no failure: it is marked, by `over` ("peak 105 N for
+under 10 ms").
 
 The mean is that of the force's size, never less than the size of the mean. It is looked at every 10 ms and at the end
 of a trial, over all windows since the last look.
