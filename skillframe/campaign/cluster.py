@@ -18,6 +18,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
+from concurrent.futures import wait
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from itertools import count
@@ -245,7 +246,7 @@ class ClusterPool:
         return time.monotonic() - task.gone_since > GONE_S
 
     def _answer(self, future: Any, task: _Task) -> Answer | None:
-        """What became of a job; None if its worker left before it began."""
+        """What became of a job; None if its worker left before it began, or with the rows before they were fetched."""
         from distributed import KilledWorker
         from distributed.client import FutureCancelledError
 
@@ -258,6 +259,10 @@ class ClusterPool:
             self._client.gather(future, asynchronous=True), self._client.loop.asyncio_loop
         )
         try:
+            if not self._fetched(gathered, task):
+                gathered.cancel()
+                future.cancel()
+                return None
             answer: list[Row] | Raised = gathered.result()
         except KilledWorker as error:
             self._crew.lost(task.worker)
@@ -270,6 +275,14 @@ class ClusterPool:
         if isinstance(answer, Raised) and answer.trouble:
             return answer._replace(text=f"{answer.text} (worker {task.worker})")
         return answer
+
+    def _fetched(self, gathered: Any, task: _Task) -> bool:
+        """Wait for rows on their way; False if their worker died with them, for no other worker may make them again."""
+        while not wait([gathered], timeout=LOOK_S).done:
+            self._crew.look()
+            if self._is_gone(task):
+                return False
+        return True
 
     def _goes_elsewhere(self, task: _Task, answer: Answer) -> bool:
         """Whether trouble of the environment sends a job to another worker; the one that had it gets no more work."""

@@ -1,3 +1,4 @@
+import asyncio
 import os
 import socket
 import ssl
@@ -9,6 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import campaign_fakes as fakes
+import distributed
 import psutil
 import pytest
 from distributed.security import Security
@@ -148,6 +150,23 @@ def heard(connection):
         return bool(connection.recv(1))
     except OSError:  # silence, or that the key is refused
         return False
+
+
+def test_rows_that_die_with_their_worker_before_they_are_fetched_are_made_again(out, reference, monkeypatch):
+    gather, gathers = distributed.Client._gather, []
+
+    async def too_late(*args, **options):
+        gathers.append(args)
+        if len(gathers) == 2:
+            for worker in workers_of_this_process():
+                os.kill(worker.pid, 9)
+            await asyncio.sleep(1.0)
+        return await gather(*args, **options)
+
+    monkeypatch.setattr(distributed.Client, "_gather", too_late)
+    fakes.run(out, fakes.slow, **LIMITS)
+    assert len(gathers) > 2
+    assert changed(out, reference) == []
 
 
 KILLED_AT_START = """
