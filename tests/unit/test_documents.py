@@ -238,5 +238,7 @@ def test_a_row_of_a_campaign_without_a_key_is_refused_by_line_and_key(tmp_path: 
     head = {"format": "skillframe.campaign", "version": 1, "campaign": "x"}
     del row[key]
     (tmp_path / "rows.jsonl").write_text(f"{json.dumps(head)}\n{json.dumps(row)}\n")
-    with pytest.raises(InputError, match=f"rows.jsonl: line 2: has no '{key}'; put the file back as it was, or delete that line"):
+    with pytest.raises(
+        InputError, match=f"rows.jsonl: line 2: has no '{key}'; put the file back as it was, or delete that line"
+    ):
         read_rows(tmp_path)

@@ -81,3 +81,21 @@ def test_table_of_configurations_signs_postures_and_friction(posture):
             print(f"  {name:2} friction {friction}: {reach:7} (published {PUBLISHED[name[0]]})  {text}", flush=True)
         if name in "ABCD":  # the bars
             assert all(largest(rows, sign, 0.0) >= 12.0 for sign in (1, -1))
+
+
+@pytest.mark.figures
+@pytest.mark.parametrize("posture", ["upright", "mirrored"])
+def test_table_of_forces_when_the_skill_goes_on_to_the_bottom(posture):
+    """The dual-arm page's table of impacts."""
+    print(f"\n{posture}, 8 degrees + and -, to the bottom: outcome, force [N]")
+    for name in ("A", "B", "C", "D", "E", "E*"):
+        rows = outcomes(name, [8.0, -8.0], [0.0, 0.5], posture=posture, to_the_bottom=True)
+        print(name, "; ".join(f"{r.joint_friction:g} Nm: {r.outcome} {r.force_n:.0f} ({r.reason[:40]})" for r in rows))
+        assert all(r.force_n >= 25.0 for r in rows), "nobody ends before the push of 30 N has grown"
+
+
+@pytest.mark.slow
+def test_a_pair_that_comes_free_hits_the_bottom_harder_than_it_was_pushed():
+    cut, whole = (outcomes("B", [8.0], [0.5], to_the_bottom=on) for on in (False, True))
+    assert cut[0].outcome == "success" and cut[0].force_n < 40.0  # the lead's 30 N and a third
+    assert whole[0].force_n > 150.0, "the table that is cut at the goal hides the impact"

@@ -74,13 +74,18 @@ def posed(robot: RobotModel, scene: Scene, posture: str) -> tuple[RobotModel, Sc
 
 def insert(
     robot: RobotModel, scene: Scene, phase: Phase, tilts_deg: Sequence[float], frictions: Sequence[float],
-    *, posture: str = "upright", seed: int = 0, duration_s: float = 30.0,
+    *, posture: str = "upright", seed: int = 0, duration_s: float = 30.0, to_the_bottom: bool = False,
 ) -> list[Row]:  # fmt: skip
-    """Insertions of every friction and tilt in one batch, frictions first; each ends where the goal is reached."""
+    """Insertions of every friction and tilt in one batch, frictions first.
+
+    Each ends where the goal is reached, 10 mm above the bottom, or, with `to_the_bottom`, where the skill ends.
+    """
     robot, scene = posed(robot, scene, posture)
     friction, tilt = np.array(list(product(frictions, tilts_deg)), dtype=float).T
     points = np.array([arm.center_of_compliance for arm in phase.arms])
-    setup = Setup(robot=robot, scene=scene, center_of_compliance=points, stop_when=scene.goal)
+    setup = Setup(
+        robot=robot, scene=scene, center_of_compliance=points, stop_when=None if to_the_bottom else scene.goal
+    )
     draws = {"start.tilt_y": np.radians(tilt), "robot.joint_friction": friction}
     rngs = [np.random.default_rng([seed, i]) for i in range(len(tilt))]
     result = simulate_arms(DualArm(phase), setup, draws, rngs, duration_s=duration_s)
