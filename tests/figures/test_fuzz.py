@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("rosbags", reason="rosbags is not installed (pip install 'skillframe[ros]')")
+pytest.importorskip("rosbags", reason="rosbags is not installed (pip install rosbags)")
 
 ROOT = Path(__file__).resolve().parents[2]
 COUNT = 20_000
