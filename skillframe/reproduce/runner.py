@@ -164,4 +164,4 @@ def _compute(job: Job, folder: Path) -> tuple[str, str]:
         return "refused", str(error)
     except Exception as error:  # the other rows go on; the command ends with an internal error
         return "broken", f"{type(error).__name__}: {error}"
-    return "done", f"{result.verdict} after {seconds:.0f} s: {result.ours}"
+    return "done", f"{store.verdict(row, result)} after {seconds:.0f} s: {result.ours}"
