@@ -11,14 +11,15 @@ from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot
 
 # Distance of each joint to the next along an arm, base to flange [m], and masses of the moving links [kg]: the makers'
-# published kinematic and dynamic parameters (Universal Robots' DH page and robot descriptions of UR3e, UR5e, UR10e,
-# UR20; Kinova's Gen3 user guide; KUKA's published description of the LBR iiwa 14), of the Panda as identified by Gaz et
-# al. (IEEE RA-L 4(4), 2019). Written here as chains of these reaches, without the turns of axes, which no mass sees.
+# published kinematic and dynamic parameters (Universal Robots' DH page, and physical_parameters.yaml of UR3e, UR5e,
+# UR10e and UR20 in Universal_Robots_ROS2_Description; Kinova's Gen3 user guide and URDF), of the LBR iiwa 14 as in
+# Drake's model, and of the Panda as identified by Gaz et al. (IEEE RA-L 4(4), 2019). Written here as chains of these
+# reaches, without the turns of axes, which no mass sees.
 ARMS = {
     "UR3e": ((0, 0.24355, 0.2502, 0.08535, 0.0921, 0), (1.98, 3.4445, 1.437, 0.871, 0.805, 0.261)),
     "UR5e": ((0, 0.425, 0.4143, 0.0997, 0.0996, 0), (3.761, 8.058, 2.846, 1.37, 1.3, 0.365)),
     "UR10e": ((0, 0.6127, 0.5975, 0.11985, 0.11655, 0), (7.369, 13.051, 3.989, 2.1, 1.98, 0.615)),
-    "UR20": ((0, 0.862, 0.756, 0.1593, 0.1543, 0), (16.343, 29.632, 7.879, 3.054, 3.126, 0.846)),
+    "UR20": ((0, 0.862, 0.756, 0.1593, 0.1543, 0), (16.343, 29.632, 7.879, 3.054, 3.126, 0.926)),
     "Panda": ((0, 0.316, 0.0825, 0.3928, 0, 0.088, 0.107), (4.97, 0.647, 3.229, 3.588, 1.226, 1.667, 0.735)),
     "iiwa 14": ((0.2025, 0.2045, 0.2155, 0.1845, 0.2155, 0.081, 0.045), (5.76, 6.35, 3.5, 3.5, 3.5, 1.8, 1.2)),
     "Gen3": (
