@@ -26,8 +26,8 @@ AFTER = 0.01
 HEADROOM = 0.06
 """Share of a plot's height that is left above the curves, for the numbers of events."""
 FORCE_CAPTION = (
-    "What the environment does to the tool, filtered: the controller's estimate. Limits are held against it and against "
-    "the simulator's own force; x, y, z are the robot's base axes."
+    "What the environment does to the tool, filtered: the controller's estimate. Limits are held against it and "
+    "against the simulator's own force; x, y, z are the robot's base axes."
 )
 ESTIMATE_CAPTION = (
     "What the environment does to the tool, as estimated from the pressures; x, y, z are the robot's base axes."

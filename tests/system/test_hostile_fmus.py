@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,8 @@ COMMANDS = {
     f"sys.exit(run(['fmu', 'simulate', *sys.argv[1:], '--stop', '0.02', '--step', '0.001', '--timeout', '{LIMIT_S}',"
     "'--out', sys.argv[1] + '.csv']))",
 }
+LISTENING = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
+"""As on a terminal: a shell starts what it runs in the background deaf to Ctrl-C."""
 EVERY_DAY = ("stray bytes to every descriptor", "a grandchild that outlives it", "writes files", "a forged end")
 BOTH = [
     pytest.param(name, command, marks=() if name in EVERY_DAY and command == "simulate" else pytest.mark.slow)
@@ -76,7 +79,8 @@ def mark(tmp_path):
     """A folder that everything started here names; nothing is left of it in the end."""
     yield tmp_path
     for pid in processes(tmp_path):
-        os.kill(pid, signal.SIGKILL)
+        with suppress(ProcessLookupError):  # gone meanwhile
+            os.kill(pid, signal.SIGKILL)
 
 
 def hostile(mark, name, command):
@@ -130,7 +134,7 @@ def test_an_fmu_that_attacks_ends_in_a_sentence_and_leaves_nothing(mark, confine
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
 def test_however_skillframe_itself_is_ended_nothing_of_an_fmu_goes_on(mark, how):
     path = hostile(mark, "a hundred children, and never answers", "simulate")
-    process = started(mark, COMMANDS["simulate"].replace(f"'{LIMIT_S}'", "'80'"), path)
+    process = started(mark, LISTENING + COMMANDS["simulate"].replace(f"'{LIMIT_S}'", "'80'"), path)
     patience = time.monotonic() + 60.0
     while len(processes(mark)) < 100:  # the FMU is in its step
         assert time.monotonic() < patience and process.poll() is None
