@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 if TYPE_CHECKING:
@@ -16,6 +17,26 @@ if TYPE_CHECKING:
 
 Document = dict[str, Any]
 """A skill file's content as plain JSON values; its keys are in the contract and `skillframe.skillfile`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lazy:
+    """A factory whose module is imported when it is called, so that listing what exists loads no library.
+
+    Attributes:
+        place: "module:function", as entry points are written.
+    """
+
+    place: str
+
+    def load(self) -> Any:
+        """What stands at the place; raises `ImportError` or `AttributeError` if nothing does."""
+        module, _, name = self.place.partition(":")
+        return getattr(import_module(module), name)
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Call what stands at the place."""
+        return self.load()(*args, **kwargs)
 
 
 class Illustration(NamedTuple):

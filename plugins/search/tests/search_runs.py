@@ -4,7 +4,8 @@ from functools import cache
 
 import numpy as np
 from skillframe_search import trials
-from skillframe_search.trials import FILLET_M, FOUND_M, Task, starts
+from skillframe_search.published import FILLET_M
+from skillframe_search.trials import FOUND_M, Task, starts
 
 from skillframe.prepare import load_robot_model
 

@@ -5,49 +5,47 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from skillframe import hookimpl
-from skillframe.records import SkillType
+from skillframe.records import Lazy, SkillType
 
 
 @hookimpl
 def skillframe_skills() -> Iterable[SkillType]:
     """The baselines' kinds of skill."""
-    from skillframe_baselines import dmp, document, gmr, replay, seds
-
     yield SkillType(
         name="replay",
         summary="Plays one demonstration again, from where the tool is now or at its recorded place.",
-        build=replay.build,
-        check=replay.check,
-        learn=document.learn,
-        settings=lambda: document.ReplaySettings,
-        describe=document.describe,
-        example=document.example,
+        build=Lazy("skillframe_baselines.replay:build"),
+        check=Lazy("skillframe_baselines.replay:check"),
+        learn=Lazy("skillframe_baselines.document:learn"),
+        settings=Lazy("skillframe_baselines.document:ReplaySettings").load,
+        describe=Lazy("skillframe_baselines.document:describe"),
+        example=Lazy("skillframe_baselines.document:example"),
     )
     yield SkillType(
         name="dmp",
         summary="Dynamic movement primitive: a spring to the demonstrated goal with a learned forcing term.",
-        build=dmp.build,
-        check=dmp.check,
-        learn=dmp.learn,
-        settings=lambda: dmp.DmpSettings,
-        describe=dmp.describe,
-        example=dmp.example,
+        build=Lazy("skillframe_baselines.dmp:build"),
+        check=Lazy("skillframe_baselines.dmp:check"),
+        learn=Lazy("skillframe_baselines.dmp:learn"),
+        settings=Lazy("skillframe_baselines.dmp:DmpSettings").load,
+        describe=Lazy("skillframe_baselines.dmp:describe"),
+        example=Lazy("skillframe_baselines.dmp:example"),
     )
     yield SkillType(
         name="gmr",
         summary="Gaussian mixture regression: the mean motion and wrench over time.",
-        build=gmr.build,
-        check=gmr.check,
-        learn=gmr.learn,
-        settings=lambda: gmr.GmrSettings,
-        describe=gmr.describe,
+        build=Lazy("skillframe_baselines.gmr:build"),
+        check=Lazy("skillframe_baselines.gmr:check"),
+        learn=Lazy("skillframe_baselines.gmr:learn"),
+        settings=Lazy("skillframe_baselines.gmr:GmrSettings").load,
+        describe=Lazy("skillframe_baselines.gmr:describe"),
     )
     yield SkillType(
         name="seds",
         summary="A stable dynamical system of the pose that ends at the demonstrated goal.",
-        build=seds.build,
-        check=seds.check,
-        learn=seds.learn,
-        settings=lambda: seds.SedsSettings,
-        describe=seds.describe,
+        build=Lazy("skillframe_baselines.seds:build"),
+        check=Lazy("skillframe_baselines.seds:check"),
+        learn=Lazy("skillframe_baselines.seds:learn"),
+        settings=Lazy("skillframe_baselines.seds:SedsSettings").load,
+        describe=Lazy("skillframe_baselines.seds:describe"),
     )

@@ -81,6 +81,6 @@ def skillframe_worlds() -> Iterable[WorldType]:
 @hookimpl
 def skillframe_rows() -> Iterable[RowType]:
     """Published results that this plug-in computes."""
-    from skillframe_dualarm.rows import row_types
+    from skillframe_dualarm.published import row_types
 
     return row_types()

@@ -6,20 +6,17 @@ friction, arms standing and one of them hanging. It is computed once for the row
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from skillframe.prepare import load_robot_model, load_world
-from skillframe.records import Illustration, RowResult, RowRun, RowType
+from skillframe.records import Illustration, RowResult, RowRun
 from skillframe_dualarm.document import Arm, Phase, configured, relative
 from skillframe_dualarm.experiment import POSTURES, PUBLISHED, Row, insert, largest
 
-SOURCE = "Suomalainen, Calinon, Pignat, Kyrki, ICRA 2019"
-SETTINGS = {"robot.joint_friction": 0.5, "world.friction": 0.2, "lead_force_n": 30.0, "speed": 0.02}
-CALIBRATED = "largest push 30 N, on B and D with joint friction, + sign"
 NAMES = ("A", "B", "C", "D", "E", "E*")
 FULL, QUICK = (4.0, 6.0, 8.0, 10.0, 12.0, 14.0), (4.0, 8.0, 12.0)
 STEP_DEG = 2.0
@@ -35,35 +32,6 @@ DIFFERENCE = {
     "11": "With joint friction one sign helps A; the paper does not say which sign it shows.",
     "12": "Failure (c) comes with E already at smaller angles than published: see row 7.",
 }
-
-
-def row_types() -> Iterable[RowType]:
-    """The rows of this plug-in."""
-
-    def row(name: str, summary: str, published: str, bar: str, run: Any, weak: str = "") -> RowType:
-        return RowType(
-            name=name, summary=summary, published=published, source=SOURCE, bar=bar, calibrated=CALIBRATED, weak=weak,
-            settings=SETTINGS, group="two arms", run=run,
-        )  # fmt: skip
-
-    yield row("7", "two arms insert up to a tilt that depends on who gives way where (Table I)",
-              "A 4, B 12, C fails at 4, D 8, E 12 degrees",
-              "with joint friction, + sign: each of A to E within 4 degrees (two steps) of the published",
-              _table)  # fmt: skip
-    yield row("8", "C fails because of static friction in the slave's joints", "C fails at 4 degrees",
-              "C at 8 degrees succeeds without joint friction and fails with it", _slave)  # fmt: skip
-    yield row("9", "both arms compliant insert in shorter time (from 8 degrees)", "B 26.5 s, D 13.0 s, E 5.0 s",
-              "with joint friction, + sign: E inserts in less time than D, and D in less than B", _times)  # fmt: skip
-    yield row("10", "both arms compliant insert with less joint motion (from 8 degrees)", "B 1.45, D 0.99, E 0.59 rad",
-              "with joint friction, + sign: the joints of E move less than those of D, and D's less than B's",
-              _paths)  # fmt: skip
-    yield row("11", "the opposite sign of the tilt works as well", "works",
-              "without joint friction the signs differ by at most 2 degrees for A to D", _signs,
-              "every configuration reaches the end of the sweep there, so the difference is 0 by its ceiling",
-              )  # fmt: skip
-    yield row("12", "the pair turns the wrong way only at large angles or low friction", "only there",
-              "without joint friction A to D never turn as a pair", _failures,
-              "all of these trials succeed, E is left out, and the friction of the parts is never varied")  # fmt: skip
 
 
 class Sweep(NamedTuple):
@@ -119,7 +87,8 @@ def _phase(name: str, frames: dict[str, Any], values: dict[str, float]) -> Phase
     return relative(made) if name.endswith("*") else made
 
 
-def _table(job: RowRun) -> RowResult:
+def table(job: RowRun) -> RowResult:
+    """Row 7: Table I."""
     sweep = _sweep(job)
     names = sweep.names
     reach = {n: sweep.reach(n, 1, stuck=True) for n in names}
@@ -155,7 +124,8 @@ def _number(value: float | None, unit: str = "") -> str:
     return "-" if value is None else f"{value:g}{unit}"
 
 
-def _slave(job: RowRun) -> RowResult:
+def slave(job: RowRun) -> RowResult:
+    """Row 8: configuration C with and without joint friction."""
     sweep = _sweep(job)
     outcome = {
         (stuck, sign): next(r.outcome for r in sweep.of("C", stuck=stuck) if r.tilt_deg == sign * 8.0)
@@ -194,12 +164,15 @@ def _compared(job: RowRun, row: str, key: str, unit: str, text: Any, ours: Any) 
     )  # fmt: skip
 
 
-def _times(job: RowRun) -> RowResult:
+def times(job: RowRun) -> RowResult:
+    """Row 9: times to insert from 8 degrees."""
     return _compared(job, "9", "time_s", " s", lambda r: f"{r.time_s:.1f} s" if r.outcome == "success" else r.outcome,
                      lambda r: r.time_s)  # fmt: skip
 
 
-def _paths(job: RowRun) -> RowResult:
+def paths(job: RowRun) -> RowResult:
+    """Row 10: joint motion from 8 degrees."""
+
     def text(row: Row) -> str:
         first, second = row.joint_path_rad
         return f"{first + second:.2f} rad ({first:.2f} + {second:.2f})" if row.outcome == "success" else row.outcome
@@ -207,7 +180,8 @@ def _paths(job: RowRun) -> RowResult:
     return _compared(job, "10", "joint_path_rad", " rad", text, lambda r: sum(r.joint_path_rad))
 
 
-def _signs(job: RowRun) -> RowResult:
+def signs(job: RowRun) -> RowResult:
+    """Row 11: largest tilts of both signs."""
     sweep = _sweep(job)
     columns = [(stuck, posture) for stuck in (False, True) for posture in sweep.postures]
 
@@ -228,7 +202,8 @@ def _signs(job: RowRun) -> RowResult:
     )  # fmt: skip
 
 
-def _failures(job: RowRun) -> RowResult:
+def failures(job: RowRun) -> RowResult:
+    """Row 12: how insertions fail."""
     sweep = _sweep(job)
     wrong = ("common rotation", "turned away")
     free = sum(r.outcome in wrong for n in "ABCD" for p in sweep.postures for r in sweep.of(n, p, stuck=False))

@@ -6,7 +6,7 @@ of its own. The aim noise, the friction and the geometry are ours; the papers pr
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from math import atan, degrees, radians
 from typing import Any
 
@@ -17,26 +17,17 @@ from skillframe.demonstration.record import Demonstration
 from skillframe.executor import simulate
 from skillframe.frames import Float
 from skillframe.prepare import load_robot_model, load_world, prepare
-from skillframe.records import Document, Illustration, LearnOptions, RowResult, RowRun, RowType
+from skillframe.records import Document, Illustration, LearnOptions, RowResult, RowRun
 from skillframe.registry import registry
 from skillframe.reproduce.bars import reached
 from skillframe.skillfile import new_document
 from skillframe.skillsource import learned
 from skillframe.teacher import TeacherSettings
 
-SEED = "the overview paper (Suomalainen), section on learning from force"
-PAPER_6 = "Suomalainen, Calinon, Pignat, Kyrki, ICRA 2019"
 DOWN, X, Y = np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
-NOISE = {"teacher.aim_noise_deg": 8.0, "world.friction": 0.2}
-VALLEY = {**NOISE, "world.slope_deg": 45.0}
 SHARE = 0.95
-TOPIC = "learning from force"
 REDRAWN = "demonstrations that failed and were redrawn"
 START_DEG = 8.0
-IGNORED = (
-    "the mean direction of the motions, and minus the mean force, which know nothing of sectors, reach it in 20 of 20 "
-    "pairs too, because starts and aim are symmetric about the valley"
-)
 FACE_M, LEVER_M = 0.030, 0.150
 LEVER = (
     "The verdict takes the flange, where the paper has its tool point and centre of compliance. Ours lies 150 mm "
@@ -45,48 +36,6 @@ LEVER = (
     "instead of flush; two demonstrations with this "
     "noise of the aim leave more than that in some pairs. Steered at the tip, the push has its full lever."
 )
-
-
-def row_types() -> Iterable[RowType]:
-    """The rows of this plug-in."""
-    yield RowType(
-        name="1", topic=TOPIC,
-        summary="the sector of feasible pushes narrows with friction", published="narrower with friction",
-        source=SEED, bar="median width within 1 degree of 90 - atan(friction), at three frictions",
-        frozen=True, settings={"world.friction": 0.2, "teacher.aim_noise_deg": 3.0}, run=_sector_width,
-    )  # fmt: skip
-    yield RowType(
-        name="2", topic=TOPIC,
-        summary="from either side, one push and one free axis slide to the valley's bottom",
-        published="slides from any start of the convergence region", source=SEED,
-        bar="largest tilt of the push within 2 degrees of slope - atan(friction), both sides",
-        frozen=True, settings={"world.friction": 0.2, "world.slope_deg": 45.0}, run=_valley_boundary,
-    )  # fmt: skip
-    yield RowType(
-        name="3", topic=TOPIC,
-        summary="the intersection of pyramids is robust to a wavering hand", published="robust to noise",
-        source=SEED, bar="a feasible direction from two demonstrations in 95 % of the pairs", weak=IGNORED,
-        settings=VALLEY, run=_noise,
-    )  # fmt: skip
-    yield RowType(
-        name="4", topic=TOPIC,
-        summary="hose coupler: a push, no turn; one compliant axis each; aligned from both starts",
-        published="translation yes, rotation no; 1 + 1 axes; both starts aligned", source=SEED,
-        bar="the same in 95 % of the pairs, and both starts of every pair that is run, steered at the flange",
-        settings=NOISE, run=_hose,
-    )  # fmt: skip
-    yield RowType(
-        name="5", topic=TOPIC,
-        summary="peg in hole: push along z, free along x, turns about y",
-        published="push z, no turn, axes x and y", source=PAPER_6,
-        bar="identical, and the push within 10 degrees of z, in 95 % of the pairs", settings=NOISE, run=_peg,
-    )  # fmt: skip
-    yield RowType(
-        name="6", topic=TOPIC,
-        summary="levering teaches that translation is the environment's", published="3-DoF compliance",
-        source=SEED, bar="translation fully compliant, rotation not, in every demonstration", settings=NOISE,
-        run=_levering,
-    )  # fmt: skip
 
 
 def _taught(
@@ -130,7 +79,9 @@ def _pictures(document: Document) -> list[Illustration]:
     return [d._replace(title=figures.get(d.title.split()[0], "") + d.title) for d in explain(document)]
 
 
-def _sector_width(job: RowRun) -> RowResult:
+def sector_width(job: RowRun) -> RowResult:
+    """Row 1: width of the sector of feasible pushes over friction."""
+
     from skillframe_lmc.intervals import track, translation
     from skillframe_lmc.sectors import sectors
     from skillframe_lmc.settings import Settings
@@ -181,7 +132,8 @@ def _slides(job: RowRun, slope: float, friction: Float, tilt: Float, side: Float
     return simulate(skill, setup, draws, rngs, duration_s=8.0).success
 
 
-def _valley_boundary(job: RowRun) -> RowResult:
+def valley_boundary(job: RowRun) -> RowResult:
+    """Row 2: the largest tilt of a push that slides to the bottom."""
     slope, middle = radians(float(job.settings["world.slope_deg"])), float(job.settings["world.friction"])
     beyond = np.arange(-4.0, 4.5, job.count(1, 2))
     friction, over, side = np.meshgrid([0.5 * middle, middle, 2.0 * middle], beyond, [1.0, -1.0], indexing="ij")
@@ -201,7 +153,8 @@ def _valley_boundary(job: RowRun) -> RowResult:
     )  # fmt: skip
 
 
-def _noise(job: RowRun) -> RowResult:
+def noise(job: RowRun) -> RowResult:
+    """Row 3: pairs of noisy demonstrations that give a feasible direction."""
     params = {"slope": radians(float(job.settings["world.slope_deg"])), "friction": job.settings["world.friction"]}
     limit = degrees(params["slope"] - atan(float(params["friction"])))
     given = float(job.settings["teacher.aim_noise_deg"])
@@ -225,7 +178,8 @@ def _noise(job: RowRun) -> RowResult:
     )  # fmt: skip
 
 
-def _hose(job: RowRun) -> RowResult:
+def hose(job: RowRun) -> RowResult:
+    """Row 4: what is learned for the hose coupler, and whether it aligns."""
     params, pairs = {"friction": job.settings["world.friction"]}, job.count(20, 4)
     groups, failed = _taught(job, "hose_coupler", params, pairs)
     documents = _documents(groups)
@@ -261,7 +215,8 @@ def _align(job: RowRun, params: dict[str, Any], document: Document, coc: str | N
     return [bool(good) for good in simulate(skill, setup, draws, rngs, duration_s=15.0).success]
 
 
-def _peg(job: RowRun) -> RowResult:
+def peg(job: RowRun) -> RowResult:
+    """Row 5: what is learned for the peg."""
     pairs = job.count(20, 4)
     groups, failed = _taught(job, "peg_in_hole", {"friction": job.settings["world.friction"]}, pairs)
     documents = _documents(groups)
@@ -283,7 +238,8 @@ def _peg(job: RowRun) -> RowResult:
     )  # fmt: skip
 
 
-def _levering(job: RowRun) -> RowResult:
+def levering(job: RowRun) -> RowResult:
+    """Row 6: who does the work in levering."""
     count = job.count(20, 4)
     groups, failed = _taught(job, "edge", {"friction": job.settings["world.friction"]}, count, each=1)
     documents = _documents(groups)

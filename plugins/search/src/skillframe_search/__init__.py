@@ -93,6 +93,6 @@ def skillframe_skills() -> Iterable[SkillType]:
 @hookimpl
 def skillframe_rows() -> Iterable[RowType]:
     """Published results that this plug-in computes."""
-    from skillframe_search.rows import row_types
+    from skillframe_search.published import row_types
 
     return row_types()

@@ -6,50 +6,22 @@ known. So the published shares are met by calibration; the lead over a random wa
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import cache
 from math import radians
 from typing import Any, NamedTuple
 
 from skillframe.campaign.statistics import clopper_pearson
 from skillframe.frames import Float
-from skillframe.records import Document, Illustration, RowResult, RowRun, RowType
+from skillframe.records import Document, Illustration, RowResult, RowRun
 from skillframe.reproduce.bars import reached
-from skillframe_search.trials import FILLET_M, NOBODY_KNEW, Task, demonstrations, document, goals, search, share
+from skillframe_search.trials import NOBODY_KNEW, Task, demonstrations, document, goals, search, share
 
-SOURCE = "Ehlers, Suomalainen, Lundell, Kyrki, ICRA 2019 (abstract), and the overview paper"
-SETTINGS = {
-    "time": 20.0, "push": 10.0, "speed": 0.015, "stiffness": 2000.0, "world.fillet": FILLET_M, "world.friction": 0.2,
-}  # fmt: skip
-CALIBRATED = "the budget of 20 s, against the published 85 % and 67 %"
 GOALS, QUICK_GOALS = 60, 10
 GIVEN = 5  # demonstrations
 BUDGETS = (3.0, 7.0, 13.4, 20.0)
 EARLY_S = 7.0
 SHIFT = (0.006, 0.0, 0.0)
 OFF = "peg, centre 6 mm off"
-
-
-def row_types() -> Iterable[RowType]:
-    """The rows of this plug-in."""
-    yield RowType(
-        name="13", summary="learned search finds the hole (peg) and the socket", published="85 % peg, 67 % socket",
-        source=SOURCE, bar="peg at least 75 %, socket at least 60 %, random walk at least 30 points below both",
-        calibrated=CALIBRATED, settings=SETTINGS, group="search", run=_found,
-    )  # fmt: skip
-    yield RowType(
-        name="14", summary="few blind demonstrations suffice", published="only few demonstrations", source=SOURCE,
-        bar="at most five demonstrations find 75 % of the holes", calibrated=CALIBRATED,
-        weak="five demonstrations are row 13's own run, so that this row passes whenever row 13 does",
-        settings=SETTINGS, group="search", run=_few,
-    )  # fmt: skip
-    yield RowType(
-        name="23", summary="a spiral is sure with the right pitch and centre, in the plane only",
-        published="guaranteed with the right pitch and start", source="the overview paper",
-        bar="centred spiral 100 % of the peg's holes; centre 6 mm off: at 7 s, 15 points behind the learned search",
-        calibrated="the fillet of the part, and the budgets of 20 s and 7 s", settings=SETTINGS,
-        group="spiral", topic="search", run=_spiral,
-    )  # fmt: skip
 
 
 class Tried(NamedTuple):
@@ -107,7 +79,8 @@ def _line(job: RowRun, name: str, method: str, tried: Tried) -> list[str]:
 HEAD = ("goal", "method", *(f"at {b:g} s" for b in BUDGETS), "95 % interval")
 
 
-def _found(job: RowRun) -> RowResult:
+def found(job: RowRun) -> RowResult:
+    """Row 13: share of holes and sockets found, beside the baselines."""
     time = float(job.settings["time"])
     methods = [("random walk", "random_walk", ()), ("samples, tour", "search", ("sampling",))]
     if not job.quick:
@@ -134,7 +107,8 @@ def _reached(job: RowRun, found: float, bar: float) -> bool:
     return reached(round(found * count), count, bar, quick=job.quick)
 
 
-def _few(job: RowRun) -> RowResult:
+def few(job: RowRun) -> RowResult:
+    """Row 14: share found over the number of demonstrations."""
     time = float(job.settings["time"])
     counts = (5,) if job.quick else (1, 2, 3, 4, 5)  # that of five is row 13's, too
     tried = {n: _of(job, "peg", "search", "sampling", *([] if n == GIVEN else [n])) for n in counts}
@@ -148,7 +122,8 @@ def _few(job: RowRun) -> RowResult:
     )  # fmt: skip
 
 
-def _spiral(job: RowRun) -> RowResult:
+def spiral(job: RowRun) -> RowResult:
+    """Row 23: a spiral, centred and off centre."""
     time = float(job.settings["time"])
     tried = {
         ("peg", "spiral"): _of(job, "peg", "spiral"), (OFF, "spiral"): _of(job, OFF, "spiral"),

@@ -25,7 +25,6 @@ from skillframe.skillsource import learned
 from skillframe.world.scene import Scene
 
 FOUND_M = 0.0025
-FILLET_M = 0.0008
 NEAR_M, NEAR_RAD = 0.0015, 0.06  # a part set down this near falls in by itself
 NOBODY_KNEW = (0.0, 0.0, 0.0)
 

@@ -104,6 +104,6 @@ def skillframe_skills() -> Iterable[SkillType]:
 @hookimpl
 def skillframe_rows() -> Iterable[RowType]:
     """Published results that this plug-in computes."""
-    from skillframe_segmenter.rows import row_types
+    from skillframe_segmenter.published import row_types
 
     return row_types()

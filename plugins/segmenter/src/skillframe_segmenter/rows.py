@@ -7,11 +7,11 @@ start, by 30 mm up or down.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from math import radians
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,15 +19,13 @@ from skillframe.demonstrate import record
 from skillframe.demonstration.record import Demonstration
 from skillframe.frames import Float, matrix_from_quaternion, rotation_vector
 from skillframe.prepare import load_robot_model, load_world
-from skillframe.records import Document, Illustration, LearnOptions, RowResult, RowRun, RowType
+from skillframe.records import Document, Illustration, LearnOptions, RowResult, RowRun
 from skillframe.registry import registry
 from skillframe.reproduce.bars import judged, reached, undecided
 from skillframe.teacher import TeacherSettings
 from skillframe_segmenter.model import from_document
 from skillframe_segmenter.observer import follow
 
-HAGOS = "Hagos, Suomalainen, Kyrki, IROS 2018 (abstract), and the overview paper"
-SETTINGS = {"teacher.aim_noise_deg": 8.0, "world.friction": 0.2, "table.moved": 0.03}
 GROUPS, QUICK_GROUPS, EACH = 12, 4, 3
 NEAR_S, FAR_S = 0.30, 0.35
 MOVED_M, TURNED_RAD = 1e-3, radians(1.0)
@@ -58,26 +56,6 @@ TASKS = {
     "corner": Staged("corner", (), (0.5**0.5, 0.5**0.5, 0.0)),
     "hose coupler": Staged("hose_coupler", (("interlock", 0.7),), (0.0, 0.0, 1.0), turns=True),
 }
-
-
-def row_types() -> Iterable[RowType]:
-    """The rows of this plug-in."""
-
-    def row(name: str, summary: str, published: str, bar: str, run: Any) -> RowType:
-        return RowType(
-            name=name, summary=summary, published=published, source=HAGOS, bar=bar, settings=SETTINGS, group="phases",
-            run=run,
-        )  # fmt: skip
-
-    yield row("15", "hose coupler: two phases, lower and interlock", "two phases",
-              "two phases and less than 5 % of the time mislabelled, in 90 % of the groups", _hose)  # fmt: skip
-    yield row("16", "valley: both sides are one phase, along the valley is the second", "one phase, then a second",
-              "two phases, both sides alike, the change within 0.3 s, in 90 % of the groups", _valley)  # fmt: skip
-    yield row("17", "wrench-driven transitions do not mind where things stand", "less prone to position error",
-              "tables 30 mm off: at least 90 % of changes within 0.3 s, pose-driven less than 20 %, in every world",
-              _moved)  # fmt: skip
-    yield row("18", "the phase is recognised online by the forward algorithm", "online",
-              "new demonstrations: at least 95 % of changes within 0.3 s, no switch elsewhere", _online)  # fmt: skip
 
 
 class Taught(NamedTuple):
@@ -165,13 +143,15 @@ def _all_found(job: RowRun, name: str) -> list[Found]:
     return [_found(p, taught[EACH * i : EACH * (i + 1)]) for i, p in enumerate(policies)]
 
 
-def _hose(job: RowRun) -> RowResult:
+def hose(job: RowRun) -> RowResult:
+    """Row 15: the phases of the hose coupler."""
     found = _all_found(job, "hose coupler")
     good = sum(f.phases == 2 and f.mislabelled < 0.05 for f in found)
     return _segmented(job, "hose coupler", found, good, "two phases and under 5 % mislabelled")
 
 
-def _valley(job: RowRun) -> RowResult:
+def valley(job: RowRun) -> RowResult:
+    """Row 16: the phases of the valley."""
     found = _all_found(job, "valley")
     alike = [f for f in found if f.phases == 2 and f.alike]
     good = sum(f.off <= NEAR_S for f in alike)
@@ -226,7 +206,8 @@ def _followed(policies: Sequence[Document], taught: Sequence[Taught], by: str) -
     return Followed(len(taught), near, false, delays, extra)
 
 
-def _moved(job: RowRun) -> RowResult:
+def moved(job: RowRun) -> RowResult:
+    """Row 17: transitions when the table has moved."""
     groups, key, seed = _groups(job), _key(job), 2000 + job.seed
     shift, rows, good = float(job.settings["table.moved"]), list[tuple[str, ...]](), True
     for name in TASKS:
@@ -256,7 +237,8 @@ def _moved(job: RowRun) -> RowResult:
     )  # fmt: skip
 
 
-def _online(job: RowRun) -> RowResult:
+def online(job: RowRun) -> RowResult:
+    """Row 18: phases followed online."""
     groups, key, seed = _groups(job), _key(job), 2000 + job.seed
     rows, near, changes, false = [], 0, 0, 0
     for name in TASKS:

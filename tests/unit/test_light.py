@@ -1,0 +1,120 @@
+"""What stays light: importing, help, listing and completion load no scientific library, since hooks yield factories."""
+
+import dataclasses
+import inspect
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from skillframe.registry import KINDS, registry
+
+PLUGINS = sorted(p for p in (Path(__file__).resolve().parents[2] / "plugins").iterdir() if (p / "src").is_dir())
+ALL_PLUGINS = ",".join(plugin.name for plugin in PLUGINS)
+HEAVY = {"scipy", "casadi", "fmpy", "filterpy", "mujoco", "matplotlib", "pinocchio"}
+
+
+def loaded_by(code, plugins="", **variables):
+    """Modules at top level that a fresh interpreter has loaded after some code, with no plug-in but those named."""
+    code += "\nimport sys; print(' '.join({m.partition('.')[0] for m in sys.modules}))"
+    environment = {**os.environ, "SKILLFRAME_PLUGINS": plugins, "SKILLFRAME_STRICT_PLUGINS": "1", **variables}
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+    return set(run.stdout.splitlines()[-1].split())
+
+
+def test_importing_skillframe_loads_no_scientific_library():
+    assert not loaded_by("import skillframe") & (HEAVY | {"numpy", "pluggy", "click"})
+
+
+def test_help_loads_no_scientific_library():
+    assert not loaded_by("from skillframe.cli.main import run; assert run(['--help']) == 0") & HEAVY
+
+
+def test_an_entry_module_of_a_plugin_loads_nothing_heavy():
+    for plugin in PLUGINS:
+        package = next((plugin / "src").iterdir()).name.removesuffix(".py")
+        code = f"from importlib import import_module as i\ntry: i({package!r})\nexcept ModuleNotFoundError: pass"
+        assert not loaded_by(code) & HEAVY, package
+
+
+CALL_EVERY_HOOK = """
+from skillframe.registry import registry
+found = [each for plugin in registry().plugins for each in plugin.provides]
+assert not registry().not_installed and len(registry().plugins) == {count} and len(found) >= {least}, found
+"""
+
+
+def test_no_hook_of_the_core_loads_a_heavy_library():
+    # 9 worlds, 4 readers, 4 rows of the crane
+    assert not loaded_by(CALL_EVERY_HOOK.format(count=1, least=17)) & HEAVY
+
+
+@pytest.mark.needs_plugins
+@pytest.mark.parametrize("plugin", PLUGINS, ids=lambda p: p.name)
+def test_no_hook_of_a_plugin_loads_a_heavy_library(plugin):
+    assert not loaded_by(CALL_EVERY_HOOK.format(count=2, least=18), plugin.name) & HEAVY
+
+
+@pytest.mark.needs_plugins
+@pytest.mark.parametrize("words", ["plugins list", "plugins list --json", "reproduce --list --json"])
+def test_a_listing_loads_no_heavy_library(words):
+    code = f"from skillframe.cli.main import run; assert run({words.split()!r}) == 0"
+    assert not loaded_by(code, ALL_PLUGINS) & HEAVY
+
+
+HELP_OF_EVERY_COMMAND = """
+import click
+from skillframe.cli.main import cli, run
+def ask(words, command):
+    assert run([*words, "--help"]) == 0
+    for name in command.list_commands(click.Context(command)) if isinstance(command, click.Group) else ():
+        ask([*words, name], command.get_command(click.Context(command), name))
+ask([], cli)
+"""
+
+
+@pytest.mark.needs_plugins
+def test_the_help_of_no_command_loads_a_heavy_library():
+    assert not loaded_by(HELP_OF_EVERY_COMMAND, ALL_PLUGINS) & HEAVY
+
+
+@pytest.mark.needs_plugins
+@pytest.mark.parametrize("typed", ["skillframe pl", "skillframe plugins s", "skillframe run --wo"])
+def test_completing_a_word_loads_no_heavy_library(typed):
+    code = (
+        "from skillframe.cli.main import cli\n"
+        "try: cli(prog_name='skillframe')\n"
+        "except SystemExit as end: assert end.code == 0, end.code"
+    )
+    words = {"_SKILLFRAME_COMPLETE": "bash_complete", "COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" "))}
+    assert not loaded_by(code, ALL_PLUGINS, **words) & HEAVY
+
+
+def factories():
+    """(what it is, place, number of arguments) of every factory that is imported when it is called."""
+    counts = {"build": 1, "check": 1, "learn": 2, "describe": 1, "explain": 1, "area": 1, "example": 0, "run": 1}
+    for kind in KINDS:
+        for record in registry().records(kind):
+            for field in dataclasses.fields(record):
+                value = getattr(record, field.name)
+                if type(value).__name__ == "Lazy":
+                    yield record, field.name, value, counts[field.name]
+
+
+def test_every_factory_that_is_imported_when_called_is_there_and_takes_what_it_is_given():
+    for record, name, factory, count in factories():
+        inspect.signature(factory.load()).bind(*range(count)), (record.name, name)
+
+
+def test_the_settings_of_every_record_are_a_dataclass():
+    given = [record.settings for kind in ("skill", "coordinator") for record in registry().records(kind)]
+    assert all(dataclasses.is_dataclass(settings()) for settings in given if settings is not None)
+
+
+@pytest.mark.needs_plugins
+def test_a_row_is_computed_by_the_function_that_says_its_number():
+    rows = [(record.name, factory.load()) for record, name, factory, _ in factories() if name == "run"]
+    assert len(rows) == 19  # 23 rows, less the crane's four, which stand in a light module
+    assert all(run.__doc__.startswith(f"Row {number}: ") for number, run in rows)
