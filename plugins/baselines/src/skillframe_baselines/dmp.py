@@ -165,7 +165,7 @@ class Dmp(Skill):
     def rollout(self, start: Float) -> Float:
         """States (T, N, 6) every `STEP`, from rest at states (N, 6), by Runge-Kutta steps of fourth order."""
         count, tau = len(self._wrench), self._basis.tau
-        times = np.arange(2 * count) * (STEP / 2)
+        times = np.arange(2 * count, dtype=np.float64) * (STEP / 2)
         force = (self._basis.activations(times) * self._basis.phase(times)[:, None]) @ self._weights.T
 
         def rate(y: Float, v: Float, f: Float) -> tuple[Float, Float]:

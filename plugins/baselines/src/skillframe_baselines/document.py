@@ -154,7 +154,8 @@ def moving_average(values: Float, width: int) -> Float:
 def _continuous(quaternion: Float) -> Float:
     """The same attitudes with signs chosen so that neighbours are near each other."""
     flips = np.where((quaternion[1:] * quaternion[:-1]).sum(1) < 0.0, -1.0, 1.0)
-    return quaternion * np.concatenate([[1.0], np.cumprod(flips)])[:, None]
+    result: Float = quaternion * np.concatenate([[1.0], np.cumprod(flips)])[:, None]
+    return result
 
 
 def describe(document: Document) -> list[str]:

@@ -60,7 +60,8 @@ def smooth(initial: Float, emission: Float, transition: Float) -> Smoothed:
     posterior = forward * backward
     posterior /= posterior.sum(axis=0)
     log_likelihood = highest.sum(axis=1) + np.log(total) + log_scale[:batch]
-    return Smoothed(*(np.moveaxis(x, 0, -1) for x in (posterior, forward, backward)), log_likelihood)
+    posterior, forward, backward = (np.moveaxis(x, 0, -1) for x in (posterior, forward, backward))
+    return Smoothed(posterior, forward, backward, log_likelihood)
 
 
 def _time_last(x: Float) -> Float:

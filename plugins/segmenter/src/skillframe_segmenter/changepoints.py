@@ -69,7 +69,8 @@ def _costs(x: Float) -> Float:
     size = np.diag(products)
     edge = np.arange(len(sums))
     length = np.maximum(edge[:, None] - edge, 1)
-    return squares[:, None] - squares - (size[:, None] + size - 2.0 * products) / length
+    result: Float = squares[:, None] - squares - (size[:, None] + size - 2.0 * products) / length
+    return result
 
 
 class Segments(NamedTuple):

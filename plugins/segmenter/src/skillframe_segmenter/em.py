@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ from skillframe_segmenter.settings import Settings
 MOST_ROUNDS, CLOSE, WRENCH_ROUNDS = 60, 1e-4, 3
 LEAK = 0.05
 NEVER = -1e3  # log density of a phase that a person has ruled out for a window
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +86,7 @@ class Data(NamedTuple):
         """Windows of each demonstration."""
         return [int(n) for n in self.inside.sum(axis=1)]
 
-    def split(self, values: Float) -> list[Float]:
+    def split(self, values: NDArray[Scalar]) -> list[NDArray[Scalar]]:
         """Rows (W, ...) by demonstration."""
         return np.split(values, np.cumsum(self.lengths)[:-1])
 

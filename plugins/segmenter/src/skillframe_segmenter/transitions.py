@@ -93,6 +93,6 @@ def _hessian(p: Float, pull: Float, squares: Float, size: int) -> Float:
 
 def softmax(logits: Float, axis: int = -1) -> Float:
     """Probabilities of logits, which add to one along an axis."""
-    e = np.exp(logits - logits.max(axis=axis, keepdims=True))
+    e: Float = np.exp(logits - logits.max(axis=axis, keepdims=True))
     e /= e.sum(axis=axis, keepdims=True)
     return e
