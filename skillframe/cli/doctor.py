@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -17,7 +16,6 @@ import click
 
 from skillframe.cli.output import emit_json, table
 
-GL_PROBE = "import os; os.environ['MUJOCO_GL'] = 'egl'; import mujoco; mujoco.GLContext(16, 16).free()"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 COMPILERS = ("cc", "gcc", "clang")
 LOWEST_PYTHON = (3, 11)
@@ -71,7 +69,6 @@ def examine() -> Iterator[Finding]:
     yield _python()
     yield from _libraries()
     yield _compiler()
-    yield _opengl()
     yield _browser()
     yield _recordings()
     yield from _plugins()
@@ -112,17 +109,6 @@ def _compiler() -> Finding:
         path = "ziglang"
     fix = "" if path else "sudo apt install build-essential (or: pip install ziglang)"
     return Finding(name="C compiler", found=path, needed_for="building FMUs", fix=fix)
-
-
-def _opengl() -> Finding:
-    """Tried in a process of its own, because a broken driver can end the process."""
-    try:
-        done = subprocess.run([sys.executable, "-c", GL_PROBE], capture_output=True, timeout=60, check=False)
-        works = done.returncode == 0
-    except subprocess.TimeoutExpired:
-        works = False
-    fix = "" if works else "sudo apt install libegl1 libgl1-mesa-dri (stills and films are wireframes without it)"
-    return Finding(name="OpenGL (EGL)", found="works" if works else "", needed_for="pictures by MuJoCo itself", fix=fix)
 
 
 def _browser() -> Finding:
