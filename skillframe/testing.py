@@ -18,11 +18,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from skillframe.conformance import skills
+from skillframe.conformance import beginning, running, skills
 from skillframe.conformance.examples import example_demonstrations, random_observations
+from skillframe.conformance.play import play
 from skillframe.conformance.readers import check_reader, differences
 from skillframe.conformance.segmenters import check_segmenter
-from skillframe.conformance.skills import check_skill, example_document, play
+from skillframe.conformance.skills import check_skill, example_document
 from skillframe.conformance.worlds import check_world
 from skillframe.demonstration.record import Demonstration
 from skillframe.frames import Float, Pose
@@ -123,6 +124,38 @@ class SkillConformance:
     def test_says_what_it_does(self) -> None:
         """The skill can be told in words, and its pictures are pictures."""
         self._check(skills.says_what_it_does)
+
+    def test_answers_in_time(self) -> None:
+        """A step is back before the loop needs it."""
+        self._check(running.answers_in_time)
+
+    def test_runs_for_two_seconds(self) -> None:
+        """Nothing raises over 2000 ticks, and speeds and feed-forward stay within bounds."""
+        self._check(running.runs_for_two_seconds)
+
+    def test_leaves_nothing_behind(self) -> None:
+        """It prints nothing, writes no file and runs no program."""
+        self._check(running.leaves_nothing_behind)
+
+    def test_remembers_little(self) -> None:
+        """Memory does not grow with every tick."""
+        self._check(running.remembers_little)
+
+    def test_goes_by_time(self) -> None:
+        """What it does goes by the observation's time, not by the count of ticks."""
+        self._check(beginning.goes_by_time)
+
+    def test_starts_again(self) -> None:
+        """A second start gives the same run as the first."""
+        self._check(beginning.starts_again)
+
+    def test_restarts_some_trials(self) -> None:
+        """Trials that restart do as after a start, and the others go on undisturbed."""
+        self._check(beginning.restarts_some_trials)
+
+    def test_tells_its_journal(self) -> None:
+        """The journal gives times and words for every trial."""
+        self._check(beginning.tells_its_journal)
 
 
 class CoordinatorConformance(SkillConformance):

@@ -174,6 +174,7 @@ def _check_row(plugin: Plugin, finding: Finding) -> dict[str, Any]:
         "subject": finding.subject,
         "checked": finding.problems is not None,
         "problems": finding.problems or [],
+        "warnings": finding.warnings,
     }
 
 
@@ -184,5 +185,7 @@ def _say(plugin: Plugin, findings: list[Finding]) -> None:
             click.echo(f"  {finding.subject}: {'FAILS' if finding.problems else 'passes'}")
         for problem in finding.problems or []:
             click.echo(f"    - {problem}")
+        for warning in finding.warnings:
+            click.echo(f"    - warning: {warning}")
     for kind, names in by_kind([finding.subject for finding in findings if finding.problems is None]).items():
         click.echo(f"  {kind} {', '.join(names)}: no checks for this kind")

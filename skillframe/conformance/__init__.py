@@ -6,7 +6,7 @@
 from skillframe.conformance.plugins import Finding, check_plugin
 from skillframe.conformance.readers import check_reader
 from skillframe.conformance.segmenters import check_segmenter
-from skillframe.conformance.skills import check_skill
+from skillframe.conformance.skills import check_skill, skill_warnings
 from skillframe.conformance.worlds import check_world
 
-__all__ = ["Finding", "check_plugin", "check_reader", "check_segmenter", "check_skill", "check_world"]
+__all__ = ["Finding", "check_plugin", "check_reader", "check_segmenter", "check_skill", "check_world", "skill_warnings"]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from skillframe.conformance.readers import check_reader
 from skillframe.conformance.segmenters import check_segmenter
-from skillframe.conformance.skills import check_skill
+from skillframe.conformance.skills import check_skill, skill_warnings
 from skillframe.conformance.worlds import check_world
 from skillframe.registry import Plugin, Registry
 
@@ -28,10 +28,12 @@ class Finding:
     Attributes:
         subject: "skill:replay"; "plug-in" for its loading.
         problems: in words; empty if it conforms, None if there is no check for its kind.
+        warnings: what is allowed and may surprise, in words.
     """
 
     subject: str
     problems: list[str] | None
+    warnings: list[str] = field(default_factory=list)
 
 
 def check_plugin(registry: Registry, plugin: Plugin) -> list[Finding]:
@@ -40,8 +42,14 @@ def check_plugin(registry: Registry, plugin: Plugin) -> list[Finding]:
     for subject in plugin.provides:
         kind, _, name = subject.partition(":")
         if name in registry.names(kind):
-            findings.append(Finding(subject=subject, problems=_check(registry, kind, name)))
+            problems = _check(registry, kind, name)
+            warnings = [] if problems else _warnings(registry, kind, name)
+            findings.append(Finding(subject=subject, problems=problems, warnings=warnings))
     return findings
+
+
+def _warnings(registry: Registry, kind: str, name: str) -> list[str]:
+    return skill_warnings(getattr(registry, kind)(name)) if kind in ("skill", "coordinator") else []
 
 
 def _check(registry: Registry, kind: str, name: str) -> list[str] | None:

@@ -13,7 +13,7 @@ def attempt(what: str, check: Callable[[], Iterable[str]]) -> list[str]:
     """The problems that a check finds; whatever it raises is one."""
     try:
         return [f"{what}: {problem}" for problem in check()]
-    except Exception as error:  # foreign code: any failure is a finding
+    except (Exception, SystemExit) as error:  # foreign code: any failure is a finding
         return [f"{what}: raised {type(error).__name__}: {error}"]
 
 

@@ -9,19 +9,29 @@ from __future__ import annotations
 
 import copy
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 
 import numpy as np
 
-from skillframe.conformance.examples import example_demonstrations, random_observations
+from skillframe.conformance import beginning, running
+from skillframe.conformance.examples import example_demonstrations
+from skillframe.conformance.play import (
+    AGREEMENT,
+    TRIALS,
+    arms_of,
+    first_difference,
+    observations_of,
+    play,
+    rows_of_command,
+    with_row,
+)
 from skillframe.conformance.problems import attempt, json_problems
+from skillframe.conformance.watch import watched
 from skillframe.frames import Float, norm, rotation_vector
-from skillframe.records import CoordinatorType, Document, SkillType
-from skillframe.skill import Command, Observation, Skill, Status, row
+from skillframe.records import Document, SkillType
+from skillframe.skill import Command, Skill, Status, row
 
-TRIALS, TICKS, DT = 8, 25, 0.05  # 200 observations over 1.25 s
-AGREEMENT = 1e-9
 LARGEST_STEP = (2e-3, 5e-3)  # m, rad in the first millisecond: more than any tool that starts at rest can follow
 LARGEST_FEEDFORWARD = (1.0, 0.1)  # N, Nm at the first tick
 
@@ -35,66 +45,49 @@ def example_document(skill: SkillType) -> Document:
 
 def check_skill(skill: SkillType, document: Document | None = None) -> list[str]:
     """Problems of a skill type, tried with a document (default: `example_document`); empty if it conforms."""
-    if document is None:
-        try:
-            document = example_document(skill)
-        except Exception as error:  # foreign code: any failure is a finding
-            return [
-                f"no document to try it with: {type(error).__name__}: {error}; give SkillType.example, or a document"
-            ]
-    return [p for what, check in CHECKS.items() for p in attempt(what, partial(check, skill, document))]
+    with watched():  # what is printed is told by a check, and stays out of what the command prints
+        if document is None:
+            try:
+                document = example_document(skill)
+            except Exception as error:  # foreign code: any failure is a finding
+                what = f"no document to try it with: {type(error).__name__}: {error}"
+                return [f"{what}; give SkillType.example, or a document"]
+        stop = attempt("builds", partial(_unusable, skill, copy.deepcopy(document))) or attempt(
+            "answers in time", partial(running.answers_in_time, skill, copy.deepcopy(document))
+        )
+        rest = {what: check for what, check in CHECKS.items() if what != "answers in time"}
+        return stop or [p for what, check in rest.items() for p in attempt(what, partial(check, skill, document))]
 
 
-def play(skill: Skill, observations: Sequence[Observation], seeds: Sequence[int]) -> list[Command]:
-    """Start a skill and step it through observations, one generator per trial."""
-    skill.start(observations[0], [np.random.default_rng([7, seed]) for seed in seeds])
-    return [_kept(skill.step(observation)) for observation in observations]
+def _unusable(skill: SkillType, document: Document) -> Iterator[str]:
+    """What leaves nothing to be tried."""
+    built = skill.build(document)
+    if not isinstance(built, Skill):
+        yield f"build gave {type(built).__name__}, not a skillframe.Skill"
 
 
-def _kept(command: Command) -> Command:
-    """A copy, in case the skill re-uses its arrays."""
-    return copy.deepcopy(command)
-
-
-def _arms(skill: SkillType, document: Document) -> tuple[int, ...]:
-    """The dimension of arms, (arms,) for a coordinator and () for a skill."""
-    if not isinstance(skill, CoordinatorType):
-        return ()
-    return (2 if skill.centers is None else len(skill.centers(document)),)
-
-
-def _observations(
-    skill: SkillType, document: Document, seed: int = 1, ticks: int = TICKS, dt: float = DT
-) -> list[Observation]:
-    lead = (TRIALS, *_arms(skill, document))
-    flat = random_observations(np.random.default_rng([8, seed]), int(np.prod(lead)), ticks, dt)
-    return [_shaped(observation, lead) for observation in flat]
-
-
-def _shaped(flat: Observation, lead: tuple[int, ...]) -> Observation:
-    """An observation of trials as one of shape (N, arms, ...)."""
-
-    def of(values: Float) -> Float:
-        return values.reshape(*lead, *values.shape[1:])
-
-    pose = type(flat.pose)(of(flat.pose.position), of(flat.pose.rotation))
-    return Observation(of(flat.time), flat.dt, pose, of(flat.twist), of(flat.wrench))
+def skill_warnings(skill: SkillType, document: Document | None = None) -> list[str]:
+    """What is allowed and may surprise, in words: a skill that never ends and does not say so."""
+    try:
+        document = example_document(skill) if document is None else document
+        with watched():
+            return list(running.end_warnings(skill, document))
+    except Exception:  # foreign code: what raises is a problem of `check_skill`
+        return []
 
 
 def builds(skill: SkillType, document: Document) -> Iterator[str]:
     """Building gives a `Skill`, from a document that stays as it was."""
     before = copy.deepcopy(document)
-    built = skill.build(document)
-    if not isinstance(built, Skill):
-        yield f"build gave {type(built).__name__}, not a skillframe.Skill"
+    yield from _unusable(skill, document)
     if document != before:
         yield "build changes the document it is given"
 
 
 def answers_in_shape(skill: SkillType, document: Document) -> Iterator[str]:
     """Commands have the contract's shapes, finite values, rotations and symmetric gains."""
-    for command in play(skill.build(document), _observations(skill, document), range(TRIALS)):
-        problems = list(_command_problems(command, (TRIALS, *_arms(skill, document))))
+    for command in play(skill.build(document), observations_of(skill, document), range(TRIALS)):
+        problems = list(_command_problems(command, (TRIALS, *arms_of(skill, document))))
         if problems:
             yield from problems
             return
@@ -134,7 +127,7 @@ def _gain_problems(name: str, gain: Float, lead: tuple[int, ...]) -> Iterator[st
 
 def starts_without_a_bump(skill: SkillType, document: Document) -> Iterator[str]:
     """The first command asks for the pose where the tool is, and for next to no force."""
-    observations = _observations(skill, document, ticks=1, dt=1e-3)
+    observations = observations_of(skill, document, ticks=1, dt=1e-3)
     command = play(skill.build(document), observations, range(TRIALS))[0]
     measured = observations[0].pose
     step = norm(command.pose.position - measured.position).max()
@@ -148,53 +141,42 @@ def starts_without_a_bump(skill: SkillType, document: Document) -> Iterator[str]
 
 def rows_equal_single_trials(skill: SkillType, document: Document) -> Iterator[str]:
     """Each row of a batch is commanded as the same trial would be alone."""
-    observations = _observations(skill, document)
+    observations = observations_of(skill, document)
     together = play(skill.build(document), observations, range(TRIALS))
     for i in range(TRIALS):
         alone = play(skill.build(document), [row(o, i) for o in observations], [i])
-        yield from _first_difference(
-            together, alone, slice(i, i + 1), AGREEMENT, f"trial {i} of {TRIALS} against alone"
-        )
+        yield from first_difference(together, alone, slice(i, i + 1), AGREEMENT, f"trial {i} of {TRIALS} against alone")
 
 
 def rows_are_independent(skill: SkillType, document: Document) -> Iterator[str]:
     """What happens in other trials does not reach a trial."""
-    observations, others = _observations(skill, document, 1), _observations(skill, document, 2)
-    mixed = [_with_row(other, own, 0) for other, own in zip(others, observations, strict=True)]
+    observations, others = observations_of(skill, document, 1), observations_of(skill, document, 2)
+    mixed = [with_row(other, own, 0) for other, own in zip(others, observations, strict=True)]
     first = play(skill.build(document), observations, range(TRIALS))
     second = play(skill.build(document), mixed, [0, *range(100, 99 + TRIALS)])
     one = slice(0, 1)
-    yield from _first_difference(
-        [_rows(c, one) for c in first], [_rows(c, one) for c in second], one, AGREEMENT, "trial 0 among other trials"
+    yield from first_difference(
+        [rows_of_command(c, one) for c in first],
+        [rows_of_command(c, one) for c in second],
+        one,
+        AGREEMENT,
+        "trial 0 among other trials",
     )
-
-
-def _with_row(base: Observation, other: Observation, i: int) -> Observation:
-    """`base` with its trial i taken from `other`."""
-
-    def mix(a: Float, b: Float) -> Float:
-        result = a.copy()
-        result[i] = b[i]
-        result.setflags(write=False)
-        return result
-
-    pose = type(base.pose)(*(mix(a, b) for a, b in zip(base.pose, other.pose, strict=True)))
-    return Observation(base.time, base.dt, pose, mix(base.twist, other.twist), mix(base.wrench, other.wrench))
 
 
 def repeats_with_its_seed(skill: SkillType, document: Document) -> Iterator[str]:
     """The same seeds give exactly the same commands, and numpy's global generator is left alone."""
     state = np.random.get_state(legacy=False)  # noqa: NPY002 - watched, not used
-    first = play(skill.build(document), _observations(skill, document), range(TRIALS))
-    again = play(skill.build(document), _observations(skill, document), range(TRIALS))
-    yield from _first_difference(first, again, slice(None), 0.0, "the same seeds run twice")
+    first = play(skill.build(document), observations_of(skill, document), range(TRIALS))
+    again = play(skill.build(document), observations_of(skill, document), range(TRIALS))
+    yield from first_difference(first, again, slice(None), 0.0, "the same seeds run twice")
     if str(np.random.get_state(legacy=False)) != str(state):  # noqa: NPY002
         yield "draws from numpy's global generator; use the generators handed to start"
 
 
 def ends_with_a_reason(skill: SkillType, document: Document) -> Iterator[str]:
     """Status is RUNNING, SUCCESS or FAILURE; what has ended says why, what runs says nothing."""
-    for command in play(skill.build(document), _observations(skill, document, ticks=200, dt=0.1), range(TRIALS)):
+    for command in play(skill.build(document), observations_of(skill, document, ticks=200, dt=0.1), range(TRIALS)):
         status = np.asarray(command.status)
         if not np.issubdtype(status.dtype, np.integer) or not set(status.tolist()) <= {int(s) for s in Status}:
             yield f"status holds {sorted(set(status.tolist()))} ({status.dtype}), expected the integers of Status"
@@ -211,9 +193,9 @@ def survives_json(skill: SkillType, document: Document) -> Iterator[str]:
 
     yield from json_problems(document)
     back = json.loads(json.dumps(document))
-    first = play(skill.build(document), _observations(skill, document), range(TRIALS))
-    second = play(skill.build(back), _observations(skill, document), range(TRIALS))
-    yield from _first_difference(first, second, slice(None), 0.0, "built from the document read back")
+    first = play(skill.build(document), observations_of(skill, document), range(TRIALS))
+    second = play(skill.build(back), observations_of(skill, document), range(TRIALS))
+    yield from first_difference(first, second, slice(None), 0.0, "built from the document read back")
 
 
 def says_what_it_does(skill: SkillType, document: Document) -> Iterator[str]:
@@ -226,51 +208,9 @@ def says_what_it_does(skill: SkillType, document: Document) -> Iterator[str]:
             yield f"explain's picture {picture.title!r} is not SVG"
 
 
-def _first_difference(
-    a: Sequence[Command], b: Sequence[Command], rows: slice, tolerance: float, what: str
-) -> Iterator[str]:
-    """The first tick at which rows of `a` differ from all of `b`, in words."""
-    for tick, (one, two) in enumerate(zip(a, b, strict=True)):
-        for name, x, y in zip(NAMES, _fields(_rows(one, rows)), _fields(two), strict=True):
-            equal = x.tolist() == y.tolist() if x.dtype == object else _gap(x, y) <= tolerance
-            if not equal:
-                size = "" if x.dtype == object else f" by {_gap(x, y):.3g}"
-                yield f"{what}: {name} differs{size} at tick {tick}"
-                return
-
-
-NAMES = ("position", "rotation", "twist", "stiffness", "damping", "feedforward", "status", "reason")
-
-
-def _rows(command: Command, rows: slice) -> Command:
-    """Some rows of a command; gains that all rows share are spread first."""
-    lead = command.pose.position.shape[:-1]
-    gains = [None if g is None else np.broadcast_to(g, (*lead, 6, 6))[rows] for g in command.impedance]
-    assert gains[0] is not None
-    return Command(
-        type(command.pose)(*(v[rows] for v in command.pose)), command.twist[rows],
-        type(command.impedance)(gains[0], gains[1]), command.feedforward[rows], command.status[rows],
-        command.reason[rows],
-    )  # fmt: skip
-
-
-def _fields(command: Command) -> list[np.ndarray]:  # type: ignore[type-arg]
-    whole = _rows(command, slice(None))
-    damping = np.zeros(0) if whole.impedance.damping is None else whole.impedance.damping
-    return [
-        *whole.pose, whole.twist, whole.impedance.stiffness, damping, whole.feedforward, whole.status,
-        np.asarray(whole.reason, dtype=object),
-    ]  # fmt: skip
-
-
-def _gap(x: Float, y: Float) -> float:
-    if x.shape != y.shape:
-        return float("inf")
-    return float(np.abs(x - y).max(initial=0.0))
-
-
 CHECKS: Mapping[str, Callable[[SkillType, Document], Iterable[str]]] = {
     "builds": builds,
+    "answers in time": running.answers_in_time,
     "answers in shape": answers_in_shape,
     "starts without a bump": starts_without_a_bump,
     "batched rows equal single trials": rows_equal_single_trials,
@@ -279,4 +219,11 @@ CHECKS: Mapping[str, Callable[[SkillType, Document], Iterable[str]]] = {
     "ends with a reason": ends_with_a_reason,
     "survives JSON": survives_json,
     "says what it does": says_what_it_does,
+    "runs for two seconds": running.runs_for_two_seconds,
+    "leaves nothing behind": running.leaves_nothing_behind,
+    "remembers little": running.remembers_little,
+    "goes by time": beginning.goes_by_time,
+    "starts again": beginning.starts_again,
+    "restarts some trials": beginning.restarts_some_trials,
+    "tells its journal": beginning.tells_its_journal,
 }

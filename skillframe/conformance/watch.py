@@ -1,0 +1,87 @@
+"""Watching what foreign code leaves behind while it runs: words on the terminal, files, other programs."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+CHANGING = {
+    "os.mkdir": "makes the folder",
+    "os.remove": "removes",
+    "os.rename": "renames",
+    "os.rmdir": "removes the folder",
+    "os.system": "runs the program",
+    "socket.connect": "connects to",
+    "subprocess.Popen": "runs the program",
+}
+"""Audit events of the interpreter, and what each means in words; `open` is looked at for its mode."""
+
+
+@dataclass(slots=True)
+class Seen:
+    """What was watched.
+
+    Attributes:
+        out: text written to standard output and standard error.
+        deeds: what was done to files, programs and connections, each once and in order.
+    """
+
+    out: io.StringIO = field(default_factory=io.StringIO)
+    deeds: list[str] = field(default_factory=list)
+
+
+_WATCHING: list[Seen] = []
+
+
+@contextlib.contextmanager
+def watched() -> Iterator[Seen]:
+    """Keep what is printed off the terminal, and note it with what is written, removed, run and connected to."""
+    _hook()
+    seen = Seen()
+    _WATCHING.append(seen)
+    try:
+        with contextlib.redirect_stdout(seen.out), contextlib.redirect_stderr(seen.out):
+            yield seen
+    finally:
+        _WATCHING.remove(seen)
+
+
+@cache
+def _hook() -> None:
+    """Ask the interpreter to tell; it cannot be asked to stop, so this is done once a process."""
+    sys.addaudithook(_told)
+
+
+def _told(event: str, arguments: tuple[Any, ...]) -> None:
+    if not _WATCHING or not (deed := _deed(event, arguments)):
+        return
+    for seen in _WATCHING:
+        if deed not in seen.deeds:
+            seen.deeds.append(deed)
+
+
+def _deed(event: str, arguments: tuple[Any, ...]) -> str:
+    if event == "open":
+        path, _, flags = arguments
+        writes = isinstance(flags, int) and flags & WRITING and not _own(path)
+        return f"opens the file {_name(path)} for writing" if writes else ""
+    if event not in CHANGING:
+        return ""
+    what = arguments[1] if event == "socket.connect" else arguments[0]
+    return "" if _own(what) else f"{CHANGING[event]} {_name(what)}"
+
+
+def _own(path: Any) -> bool:
+    """What the interpreter itself writes when a module is imported, and the device that takes everything."""
+    return path == os.devnull or "__pycache__" in str(path)
+
+
+def _name(path: Any) -> str:
+    return repr(os.path.basename(os.fsdecode(path))) if isinstance(path, str | bytes | os.PathLike) else repr(path)

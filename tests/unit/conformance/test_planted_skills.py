@@ -1,0 +1,38 @@
+"""The kit names the defects that an author can plant without noticing, and has nothing to say of what is sound."""
+
+import pytest
+
+from skillframe.conformance import check_skill
+from skillframe.skill import per_trial
+from tests.unit.conformance.planted_skills import PLANTED, Glide, NeverEnds, Restarting, kind
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path, monkeypatch):
+    """Some of them write files."""
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize("make", PLANTED, ids=lambda make: make.__name__)
+def test_a_skill_with_a_defect_is_named_for_it(make, capsys):
+    problems = check_skill(kind(make))
+    assert any(PLANTED[make] in problem for problem in problems), problems
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("make", [Glide, Restarting, lambda: per_trial(Glide)], ids=["glide", "restarting", "each"])
+def test_a_skill_without_a_defect_has_no_finding(make):
+    from skillframe.conformance import skill_warnings
+
+    sound = kind(Glide, build=lambda document: make())
+    assert check_skill(sound) == []
+    assert skill_warnings(sound) == []
+
+
+def test_a_skill_that_never_ends_is_a_warning_unless_it_says_so():
+    from skillframe.conformance import skill_warnings
+
+    assert check_skill(kind(NeverEnds)) == []
+    said = "is still under way after 120 s; give it a time limit, or say in a line of `describe` that it never ends"
+    assert skill_warnings(kind(NeverEnds)) == [said]
+    assert skill_warnings(kind(NeverEnds, describe=lambda document: ["holds, and never ends"])) == []
