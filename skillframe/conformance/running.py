@@ -16,7 +16,7 @@ import numpy as np
 
 from skillframe.conformance.loop import LateError, run
 from skillframe.conformance.play import arms_of
-from skillframe.conformance.watch import watched
+from skillframe.conformance.watch import left_behind, watched
 from skillframe.errors import SkillframeError
 from skillframe.frames import Float, norm, rotation_vector
 from skillframe.handover import CommandCheck
@@ -160,11 +160,7 @@ def leaves_nothing_behind(skill: SkillType, document: Document) -> Iterator[str]
     """From building to the journal of a run of 120 s, it prints nothing, writes no file and runs no program."""
     with watched() as seen:
         ended_at(skill, document)
-    if text := seen.out.getvalue().strip():
-        first = text.splitlines()[0]
-        yield f"prints {first[:60]!r}, which gets into what a command prints; tell it in `journal`, or not at all"
-    for deed in seen.deeds[:3]:
-        yield f"{deed}; a skill owns no files and no programs, so leave it out or tell it in `journal`"
+    yield from left_behind(seen)
 
 
 def ended_at(skill: SkillType, document: Document) -> float | None:

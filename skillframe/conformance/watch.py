@@ -40,6 +40,14 @@ class Seen:
 _WATCHING: list[Seen] = []
 
 
+def left_behind(seen: Seen) -> Iterator[str]:
+    """What was printed and done, in words."""
+    if text := seen.out.getvalue().strip():
+        yield f"prints {text.splitlines()[0][:60]!r}, which gets into what a command prints; leave it out"
+    for deed in seen.deeds[:3]:
+        yield f"{deed}; a plug-in owns no files and no programs, so leave it out"
+
+
 @contextlib.contextmanager
 def watched() -> Iterator[Seen]:
     """Keep what is printed off the terminal, and note it with what is written, removed, run and connected to."""

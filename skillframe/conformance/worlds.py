@@ -1,15 +1,22 @@
-"""What every world must do: build a scene from its defaults, the same each time, with a goal that starts unreached."""
+"""What every world must do: build a scene from its defaults, the same each time, with a goal that starts unreached.
+
+A scene that builds is compiled and run too (`skillframe.conformance.trials`), and its goal is tried with many states
+(`skillframe.conformance.goals`).
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from skillframe.conformance import goals, trials
 from skillframe.conformance.problems import attempt
+from skillframe.conformance.watch import left_behind, watched
 from skillframe.frames import Pose, matrix_from_quaternion
 from skillframe.records import WorldType
 
@@ -19,10 +26,14 @@ if TYPE_CHECKING:
 
 def check_world(world: WorldType) -> list[str]:
     """Problems of a world, built from its defaults; empty if it conforms."""
-    problems = attempt("parameters", lambda: _parameter_problems(world))
-    if problems:
-        return problems
-    return attempt("scene", lambda: _scene_problems(world))
+    with watched(), np.errstate(all="ignore"):
+        for what, check in (("parameters", _parameter_problems), ("scene", _scene_problems)):
+            if problems := attempt(what, partial(check, world)):
+                return problems
+        scene = world.build(world.params())
+        problems = [p for what, check in SCENES.items() for p in attempt(what, partial(check, scene))]
+        problems += attempt("parameters", partial(goals.idle_parameters, world, scene))
+        return problems or attempt("runs", partial(trials.runs, scene))
 
 
 def _parameter_problems(world: WorldType) -> Iterator[str]:
@@ -37,7 +48,9 @@ def _parameter_problems(world: WorldType) -> Iterator[str]:
 
 
 def _scene_problems(world: WorldType) -> Iterator[str]:
-    scene = world.build(world.params())
+    with watched() as seen:
+        scene = world.build(world.params())
+    yield from left_behind(seen)
     if scene.name != world.name:
         yield f"the scene calls itself {scene.name!r}"
     if scene.friction < 0.0:
@@ -102,3 +115,12 @@ def _fingerprint(scene: Scene) -> str:
         for geom in _geoms(scene)
     ]
     return json.dumps([rows, scene.start_tip, scene.start_quaternion, scene.friction, scene.tool.mass, scene.analytic])
+
+
+SCENES: Mapping[str, Callable[[Scene], Iterable[str]]] = {
+    "size": trials.right_size,
+    "attitude": trials.points_into_the_fixture,
+    "start": trials.compiles,
+    "goal": goals.rows_alone,
+}
+"""What is asked of a scene that builds."""

@@ -1,0 +1,140 @@
+"""States to try a world's goal with: from all around the start to where the goal's own error is smallest."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from skillframe.conformance.play import Rows
+from skillframe.errors import SkillframeError
+from skillframe.frames import Pose, matrix_from_quaternion, rotation_matrix
+from skillframe.records import WorldType
+
+if TYPE_CHECKING:
+    from skillframe.world.scene import Scene, State, Task
+
+ROUNDS, TRIED, BEST = 14, 60, 12
+SPREAD, SMALLEST = (0.1, 0.3), 1e-5  # m, rad at first; of either at last
+FAR, SLOWEST = 2.0, 0.4  # m at first at most; how fast the spread may shrink from round to round
+RADIAN_M = 0.1  # an angle counts as much as what it moves at this lever
+ROWS = 24
+AGREEMENT = 1e-9
+
+
+def states_of(scene: Scene) -> State:
+    """States (N) around the start, and ever nearer to where `goal_error` is smallest; the same every time."""
+    from skillframe.world.scene import State
+
+    rng = np.random.default_rng(11)
+    base = matrix_from_quaternion(scene.start_quaternion if scene.task.aligned is None else scene.task.aligned)
+    middle, spread = np.append(np.array(scene.start_tip, dtype=float), np.zeros(3)), np.repeat(SPREAD, 3)
+    away = scene.goal_error(State(Pose(middle[None, :3], base[None]), np.zeros((1, 6))))[0]
+    spread[:3] = np.clip(np.max(away), SPREAD[0], FAR)
+    parts: list[State] = []
+    for _ in range(ROUNDS):
+        drawn = middle + spread * rng.normal(size=(TRIED, 6))
+        wrench = rng.normal(size=(TRIED, 6)) * np.repeat([20.0, 1.0], 3) * rng.integers(0, 2, (TRIED, 1))
+        parts.append(State(Pose(drawn[:, :3], rotation_matrix(drawn[:, 3:]) @ base), wrench))
+        distance, angle = scene.goal_error(parts[-1])
+        best = drawn[np.argsort(distance + RADIAN_M * angle, kind="stable")[:BEST]]
+        middle, spread = best.mean(0), np.maximum(best.std(0), np.maximum(SLOWEST * spread, SMALLEST))
+    return _joined(parts)
+
+
+def _joined(parts: list[State]) -> State:
+    from skillframe.world.scene import State
+
+    position, rotation = (np.concatenate([getattr(p.tip, name) for p in parts]) for name in Pose._fields)
+    return State(Pose(position, rotation), np.concatenate([p.wrench for p in parts]))
+
+
+def some(state: State, rows: Rows) -> State:
+    """Some of several states."""
+    from skillframe.world.scene import State
+
+    return State(Pose(state.tip.position[rows], state.tip.rotation[rows]), state.wrench[rows])
+
+
+def rows_alone(scene: Scene) -> Iterator[str]:
+    """Each trial's goal and its error are the same in a batch as alone."""
+    state = states_of(scene)
+    reached = np.flatnonzero([bool(np.all(scene.goal(some(state, slice(i, i + 1))))) for i in range(len(state.wrench))])
+    chosen = np.append(np.arange(0, len(state.wrench), len(state.wrench) // ROWS), reached[: ROWS // 2])
+    together = some(state, chosen)
+    for name, judge in _judges(scene):
+        whole = judge(together)
+        alone = np.concatenate([judge(some(together, slice(i, i + 1))) for i in range(len(chosen))])
+        if whole.shape != alone.shape or np.abs(whole - alone).max() > AGREEMENT:
+            yield f"{name} of a trial depends on the others of its batch; judge each row of the state by itself"
+
+
+def _judges(scene: Scene) -> list[tuple[str, Any]]:
+    return [
+        ("goal", lambda state: np.asarray(scene.goal(state), dtype=float)),
+        ("goal_error[0]", lambda state: np.asarray(scene.goal_error(state)[0])),
+        ("goal_error[1]", lambda state: np.asarray(scene.goal_error(state)[1])),
+    ]
+
+
+def idle_parameters(world: WorldType, scene: Scene) -> Iterator[str]:
+    """Every parameter changes something: the scene, its goal, or what the teacher does."""
+    defaults = world.params()
+    state = states_of(scene)
+    before = _told(scene, state)
+    for each in dataclasses.fields(world.params):
+        tried = []
+        for value in _others(getattr(defaults, each.name)):
+            try:
+                other = world.build(dataclasses.replace(defaults, **{each.name: value}))
+            except SkillframeError:  # out of its range
+                continue
+            tried.append(value)
+            if _told(other, state) != before:
+                break
+        else:
+            if tried:
+                values = " or ".join(f"{v:.4g}" if isinstance(v, float) else repr(v) for v in tried[:2])
+                yield f"parameter {each.name} has no effect: {values} gives the same scene and goal; use it or drop it"
+
+
+def _others(value: Any) -> list[Any]:
+    """Values near a parameter's own; none where the kind does not say what else it could be."""
+    if isinstance(value, bool):
+        return [not value]
+    if isinstance(value, int):
+        return [value + 1, value - 1, 2 * value, value + 4]
+    if isinstance(value, float):
+        near = [1.2 * value, 0.8 * value, 1.02 * value, 0.98 * value, 2.0 * value, 0.5 * value]
+        return [v for v in near if v != value] + [value + 0.001, value + 0.05, value - 0.05, value + 1.0, value + 1e4]
+    if isinstance(value, tuple) and all(isinstance(v, int | float) for v in value):
+        return [value[1:] + value[:1], tuple(-v for v in value), tuple(v + 0.1 for v in value)]
+    return []
+
+
+def _told(scene: Scene, state: State) -> list[Any]:
+    """All that a scene is, and what its functions say of some states, as values that compare."""
+    offset = 0.1 * np.linspace(-1.0, 1.0, 12).reshape(4, 3)
+    functions = [scene.goal(state), *scene.goal_error(state), scene.start_lift(offset, offset[::-1])]
+    functions += [stage.done(state) for stage in _stages(scene.task) if stage.done is not None]
+    plain = {field.name: getattr(scene, field.name) for field in dataclasses.fields(scene) if field.name != "params"}
+    return [_plain(plain), [np.asarray(value).tolist() for value in functions]]
+
+
+def _stages(task: Task) -> list[Task]:
+    return [task, *(inner for stage in task.then for inner in _stages(stage))]
+
+
+def _plain(value: Any) -> Any:
+    """Records, arrays and tuples as lists; functions are left out."""
+    if dataclasses.is_dataclass(value):
+        return [_plain(getattr(value, field.name)) for field in dataclasses.fields(value)]
+    if isinstance(value, dict):
+        return [[key, _plain(value[key])] for key in value]
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    return None if callable(value) else value
