@@ -6,9 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from skillframe.conformance.problems import attempt
 from skillframe.conformance.readers import check_reader
 from skillframe.conformance.segmenters import check_segmenter
 from skillframe.conformance.skills import check_skill, skill_warnings
+from skillframe.conformance.watch import printed, watched
 from skillframe.conformance.worlds import check_world
 from skillframe.registry import Plugin, Registry
 
@@ -58,4 +60,6 @@ def _check(registry: Registry, kind: str, name: str) -> list[str] | None:
         return None
     record: Any = getattr(registry, kind)(name)
     general = [] if record.summary else ["has no summary; write one line for listings"]
-    return general + check(record)
+    with watched() as seen:  # what is printed stays out of what the command prints
+        problems = attempt("checks", lambda: check(record))
+    return general + [p.removeprefix("checks: ") for p in problems] + list(printed(seen))

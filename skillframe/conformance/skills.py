@@ -49,7 +49,7 @@ def check_skill(skill: SkillType, document: Document | None = None) -> list[str]
         if document is None:
             try:
                 document = example_document(skill)
-            except Exception as error:  # foreign code: any failure is a finding
+            except (Exception, SystemExit) as error:  # foreign code: any failure is a finding
                 what = f"no document to try it with: {type(error).__name__}: {error}"
                 return [f"{what}; give SkillType.example, or a document"]
         stop = attempt("builds", partial(_unusable, skill, copy.deepcopy(document))) or attempt(
@@ -72,7 +72,7 @@ def skill_warnings(skill: SkillType, document: Document | None = None) -> list[s
         document = example_document(skill) if document is None else document
         with watched():
             return list(running.end_warnings(skill, document))
-    except Exception:  # foreign code: what raises is a problem of `check_skill`
+    except (Exception, SystemExit):  # foreign code: what raises is a problem of `check_skill`
         return []
 
 

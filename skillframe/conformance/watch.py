@@ -40,10 +40,15 @@ class Seen:
 _WATCHING: list[Seen] = []
 
 
-def left_behind(seen: Seen) -> Iterator[str]:
-    """What was printed and done, in words."""
+def printed(seen: Seen) -> Iterator[str]:
+    """What was printed, in words."""
     if text := seen.out.getvalue().strip():
         yield f"prints {text.splitlines()[0][:60]!r}, which gets into what a command prints; leave it out"
+
+
+def left_behind(seen: Seen) -> Iterator[str]:
+    """What was printed and done, in words."""
+    yield from printed(seen)
     for deed in seen.deeds[:3]:
         yield f"{deed}; a plug-in owns no files and no programs, so leave it out"
 

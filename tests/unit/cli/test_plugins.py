@@ -224,3 +224,64 @@ def test_every_learner_that_lists_settings_says_what_they_are(capsys):
         assert run(["plugins", "show", name, "--json"]) == 0
         settings = json.loads(capsys.readouterr().out)["settings"]
         assert settings and all(each["about"] for each in settings)
+
+
+SPOILED = """
+from pathlib import Path
+import numpy as np
+from skillframe import hookimpl
+from skillframe.records import SkillType
+from skillframe.testing import HoldSkill
+class Chatty(HoldSkill):
+    def step(self, observation):
+        print("a step")
+        return super().step(observation)
+    def journal(self, trial):
+        return {}["events"]
+@hookimpl
+def skillframe_skills():
+    yield SkillType(
+        name="chatty", summary="prints", example=lambda: {"phases": [{}]}, describe=lambda document: ["holds"],
+        build=lambda document: Chatty(duration=VALUE),
+    )
+"""
+ODD = """
+from dataclasses import dataclass, replace
+from skillframe import hookimpl
+from skillframe.records import WorldType
+from skillframe.world.scene import Geom
+from skillframe.world.worlds import valley
+@hookimpl
+def skillframe_worlds():
+    def build(params):
+        return replace(valley.build(params), name="odd", fixture=(Geom(kind="torus", size=(0.1, 0.02)),))
+    yield WorldType(name="odd", summary="a ring", params=valley.ValleyParams, build=build)
+"""
+
+
+def spoiled(made, text):
+    (made / "src" / "skillframe_glide_slowly" / "__init__.py").write_text(text)
+
+
+def test_check_s_json_stays_json_when_a_skill_prints(made, capsys):
+    spoiled(made, SPOILED.replace("VALUE", "5.0"))
+    capsys.readouterr()
+    assert run(["plugins", "check", "glide_slowly", "--json"]) == 1
+    problems = json.loads(capsys.readouterr().out)[1]["problems"]
+    assert any("prints 'a step'" in problem for problem in problems)
+    assert any("journal(0) raised KeyError: 'events'" in problem for problem in problems)
+
+
+def test_check_names_a_kind_of_geom_that_is_none_and_says_which_there_are(made, capsys):
+    spoiled(made, ODD)
+    assert run(["plugins", "check", "glide_slowly"]) == 1
+    said = capsys.readouterr()
+    assert "unknown kind 'torus'" in said.out
+    assert "internal error" not in said.err
+
+
+def test_check_warns_of_a_skill_that_never_ends_and_exits_0(made, capsys):
+    quiet = SPOILED.replace("VALUE", "None").replace('print("a step")', "pass").replace('{}["events"]', "[]")
+    spoiled(made, quiet)
+    assert run(["plugins", "check", "glide_slowly"]) == 0
+    assert "    - warning: is still under way after 120 s; give it a time limit" in capsys.readouterr().out
