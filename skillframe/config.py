@@ -12,6 +12,8 @@ from typing import Any, TypeVar
 
 from skillframe.documents import NotToml, parse_toml, read_text, shown, storable
 from skillframe.errors import InputError, UnknownName
+from skillframe.fields import texts
+from skillframe.units import parse, si, unit_of
 
 T = TypeVar("T")
 LARGEST = 1e100
@@ -45,11 +47,21 @@ def build(cls: type[T], values: Mapping[str, Any], where: str) -> T:
     for key in values:
         if key not in fields:
             raise InputError(where, str(UnknownName("key", str(key), fields)))
-    ready = {key: coerce(value, hints[key], f"{where}.{key}") for key, value in values.items()}
+    ready = {
+        key: coerce(_in_si(cls, key, value, hints[key], f"{where}.{key}"), hints[key], f"{where}.{key}")
+        for key, value in values.items()
+    }
     missing = [n for n, f in fields.items() if n not in ready and _required(f)]
     if missing:
         raise InputError(where, f"missing {', '.join(missing)}", "add it")
     return cls(**ready)
+
+
+def _in_si(cls: type, key: str, value: Any, hint: Any, where: str) -> Any:
+    """A text such as "8mm" as a number, where the field is one; its docstring says in which unit."""
+    if not isinstance(value, str) or parse(value) is None or str in (hint, *typing.get_args(hint)):
+        return value
+    return si(value, unit_of(texts(cls).get(key, "")), where)
 
 
 def _required(field: dataclasses.Field[Any]) -> bool:

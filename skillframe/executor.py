@@ -31,8 +31,9 @@ from skillframe.robot.spec import Limits
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 from skillframe.world.convert import held
 from skillframe.world.intrusion import LinkIntrusion
-from skillframe.world.placement import QUANTITIES, check_quantities, fixture_poses, start_configurations
+from skillframe.world.placement import check_quantities, fixture_poses, start_configurations
 from skillframe.world.plant import Draws, Kinematics, Plant
+from skillframe.world.quantities import QUANTITIES
 from skillframe.world.rates import ratio
 from skillframe.world.scene import Scene, State
 from skillframe.world.sensors import TARE_TICKS, Sensors, SensorSettings, at_point
@@ -148,7 +149,7 @@ class Loop:
         self.reason, self.status = no_reasons(count), np.zeros(count, dtype=np.int64)
         self.limited = np.zeros(count, dtype=bool)
         self.duration, self.ended_by = np.zeros(count), no_reasons(count)
-        self.filtered, self.torque_share, self.speed_share = (np.full(count, np.nan) for _ in range(3))
+        self.filtered, self.torque_share, self.speed_share, self.way = (np.full(count, np.nan) for _ in range(4))
         self.goal, self.errors, self.energy = np.zeros(count, dtype=bool), np.zeros((count, 2)), np.zeros(count)
         self.recorder = None if trace_hz is None else self._recorder(ratio(rate, trace_hz, "control", "the trace"))
         self.interrupted = False
@@ -331,6 +332,8 @@ class Loop:
         state = self.plant.tip_state()
         self.goal[rows] = self.setup.scene.goal(state)[rows]
         self.errors[rows] = np.stack(self.setup.scene.goal_error(state), axis=-1)[rows]
+        if self.setup.scene.way is not None:
+            self.way[rows] = self.setup.scene.way.reached(state)[rows]
         self.energy[rows] = self._energy(rows)
         self.duration[rows], self.limited[rows] = time, limit
         torque_share, speed_share = self._shares()
@@ -381,11 +384,12 @@ class Loop:
             "peak_speed_share": _known(self.speed_share[i]), "ended_by": self.ended_by[i],
             "notes": self._notes(i, success), "final_error_m": float(self.errors[i, 0]),
             "final_error_rad": float(self.errors[i, 1]), "analytic": scene.analytic,
+            "progress": None if scene.way is None else scene.way.told(_known(self.way[i])),
             "events": [[time, text] for time, text in self.skill.journal(i)],
             "limits": asdict(_joint_limits(self.setup.robot)),
         }  # fmt: skip
 
 
 def _known(share: float) -> float | None:
-    """A share of a limit that there is."""
+    """A figure that there is."""
     return None if np.isnan(share) else float(share)

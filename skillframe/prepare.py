@@ -15,7 +15,7 @@ import numpy as np
 
 from skillframe.demonstration.record import resolve_point
 from skillframe.errors import InputError, UnknownName
-from skillframe.executor import QUANTITIES, Setup
+from skillframe.executor import Setup
 from skillframe.frames import Float, Pose
 from skillframe.records import CoordinatorType, Document
 from skillframe.registry import registry
@@ -25,8 +25,10 @@ from skillframe.robot.model import RobotModel, load_model
 from skillframe.robot.spec import load_robot
 from skillframe.skill import Skill
 from skillframe.skillfile import understood
+from skillframe.units import si
 from skillframe.world.catalogue import make_scene
 from skillframe.world.placement import start_poses
+from skillframe.world.quantities import QUANTITIES, UNITS
 from skillframe.world.scene import Scene
 
 
@@ -35,7 +37,7 @@ def split_settings(world: str, settings: Mapping[str, Any]) -> tuple[dict[str, A
 
     Raises:
         UnknownName: a key that exists in neither, with the nearest one.
-        InputError: a quantity that is not a number.
+        InputError: a quantity that is not a number, or has a unit of another dimension.
     """
     fields = {f"world.{f.name}" for f in dataclasses.fields(registry().world(world).params)}
     params: dict[str, Any] = {}
@@ -44,8 +46,13 @@ def split_settings(world: str, settings: Mapping[str, Any]) -> tuple[dict[str, A
         if key in fields:
             params[key.removeprefix("world.")] = value
         elif key in QUANTITIES:
+            value = si(value, UNITS[key], f"--set {key}")
             if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-                raise InputError(f"--set {key}", f"expected a finite number, got {value!r}", "give it in SI units")
+                raise InputError(
+                    f"--set {key}",
+                    f"expected a finite number, got {value!r}",
+                    "give it in SI units, or with a unit: 8mm, 5deg",
+                )
             draws[key] = float(value)
         else:
             known = {*fields, *QUANTITIES}

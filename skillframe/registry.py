@@ -22,6 +22,7 @@ import pluggy
 
 from skillframe import hookspecs
 from skillframe.errors import SkillframeError, UnknownName
+from skillframe.homes import where_to_get
 from skillframe.records import CoordinatorType, ReaderType, RowType, SegmenterType, SkillType, WorldType
 
 KINDS: Mapping[str, str] = {
@@ -152,18 +153,20 @@ class Registry:
         if (kind, name) in self._conflicts:
             raise self._conflicts[kind, name]
         if name not in self._records[kind]:
-            raise UnknownName(kind, name, self.names(kind), self._absences())
+            raise UnknownName(kind, name, self.names(kind), self._absences(kind, name))
         return self._records[kind][name][0]
 
-    def _absences(self) -> str:
+    def _absences(self, kind: str, name: str) -> str:
         """Why a plug-in that a person has in mind may not be here."""
+        here = [*(plugin.name for plugin in self.plugins), *self.unselected]
         failed = [f"{p.distribution} {p.version} ({p.error})" for p in self.plugins if p.error]
         notes = [f"these plug-ins failed to load: {', '.join(failed)}"] if failed else []
         if self.unselected:
             notes.append(f"SKILLFRAME_PLUGINS leaves out {', '.join(self.unselected)}")
         if self.not_installed:
             notes.append(f"SKILLFRAME_PLUGINS asks for {', '.join(self.not_installed)}, which is not installed")
-        return "; ".join(notes)
+        missing = where_to_get(kind, name, self._records[kind], here)
+        return "; ".join([missing, *notes] if missing else notes)
 
     def skill(self, name: str) -> SkillType:
         """The skill type of that name; raises `UnknownName`, or `PluginConflict` if two plug-ins have it."""

@@ -9,11 +9,15 @@ from __future__ import annotations
 
 import dataclasses
 import typing
+from collections.abc import Mapping
 from typing import Any
 
 from skillframe.campaign.axes import Axis, Value
 from skillframe.config import coerce
 from skillframe.errors import InputError, UnknownName, suggest
+from skillframe.fields import texts
+from skillframe.units import si, unit_of
+from skillframe.world.quantities import QUANTITIES, UNITS
 
 GROUPS = ("start", "fixture", "grasp", "world", "robot", "actuator", "sensor")
 
@@ -30,8 +34,6 @@ def check_name(name: str, params: type, where: str) -> None:
     Raises:
         InputError: with the nearest name, and the names of its group if the group is right.
     """
-    from skillframe.executor import QUANTITIES
-
     known = {*(name for name in QUANTITIES if not name.startswith("world.")), *world_hints(params)}
     if name in known:
         return
@@ -46,8 +48,24 @@ def check_name(name: str, params: type, where: str) -> None:
 def check_value(name: str, value: Value, params: type, where: str) -> Value:
     """A value of a quantity, of the type that its world parameter has; every other quantity is a number."""
     hint = world_hints(params).get(name, float)
-    checked: Value = coerce(value, hint, where)
+    checked: Value = coerce(in_si(name, value, params, where), hint, where)
     return checked
+
+
+def in_si(name: str, content: Any, params: type, where: str) -> Any:
+    """What was written for a quantity, texts with a unit in it ("8mm") as SI numbers.
+
+    Raises:
+        InputError: a unit of another dimension.
+    """
+    if isinstance(content, Mapping):
+        return {key: in_si(name, value, params, f"{where}.{key}") for key, value in content.items()}
+    if isinstance(content, list | tuple):
+        return [in_si(name, value, params, f"{where}[{i}]") for i, value in enumerate(content)]
+    if not isinstance(content, str) or world_hints(params).get(name, float) is str:
+        return content
+    about = texts(params).get(name.removeprefix("world."), "") if name.startswith("world.") else ""
+    return si(content, unit_of(about) or UNITS.get(name, ""), where)
 
 
 def check_axis(name: str, axis: Axis, params: type, where: str) -> Axis:

@@ -16,7 +16,7 @@ from typing import Any
 
 from skillframe.campaign.axes import Axis, Value, cells_of, parse_axis
 from skillframe.campaign.entries import parse_entry
-from skillframe.campaign.quantities import GROUPS, check_axis, check_name, check_value
+from skillframe.campaign.quantities import GROUPS, check_axis, check_name, check_value, in_si
 from skillframe.campaign.validity import Plan, plan_of
 from skillframe.config import build, read_toml
 from skillframe.errors import InputError
@@ -106,6 +106,11 @@ class CampaignSpec:
         return tuple(parse_entry(text).label for text in self.skills)
 
     @property
+    def robot_name(self) -> str:
+        """The robot's name, also where `robot` is the path of its files."""
+        return name_of(self.robot)
+
+    @property
     def cells(self) -> int:
         """Number of cells of the grid; 1 without grid axes."""
         return cells_of(self.vary)
@@ -156,6 +161,11 @@ class CampaignSpec:
                    folder=path.parent)  # fmt: skip
         _check_designs(spec, path)
         return spec
+
+
+def name_of(robot: str) -> str:
+    """A robot's name from what a campaign file calls it: a name, a folder, or the robot.toml in it."""
+    return robot.removesuffix("/robot.toml").rsplit("/", 1)[-1]
 
 
 def flatten(table: Mapping[str, Any], where: str) -> dict[str, Any]:
@@ -215,7 +225,7 @@ def _check_skills(file: _File, path: Path) -> None:
 def _axis(name: str, value: Any, params: type, file: _File, path: Path) -> Axis:
     where = f"{path}: vary.{name}"
     check_name(name, params, where)
-    axis = check_axis(name, parse_axis(value, where), params, where)
+    axis = check_axis(name, parse_axis(in_si(name, value, params, where), where), params, where)
     if axis.kind == "values" and len(axis.numbers) != file.trials:
         raise InputError(where, f"{len(axis.numbers)} values for {file.trials} trials", "give one value per trial")
     return axis

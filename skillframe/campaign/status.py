@@ -21,8 +21,9 @@ def status_of(folder: Path, params: type | None = None) -> dict[str, Any]:
         params: the world's parameter dataclass; None looks it up.
 
     Returns:
-        `name`, `rows`, `planned_rows`, `complete`, `stopped_after_trial`, `running` (null, or `pid` and `host` of the
-        process that is writing), `skills` and `comparisons` as in summary.json, `remarks`: sentences to be read first.
+        `name`, `robot`, `world`, `rows`, `planned_rows`, `complete`, `stopped_after_trial`, `running` (null, or `pid`
+        and `host` of the process that is writing), `skills` and `comparisons` as in summary.json, `remarks`: sentences
+        to be read first.
 
     Raises:
         InputError: not a campaign's folder, or rows of another campaign or changed ones.
@@ -37,6 +38,8 @@ def status_of(folder: Path, params: type | None = None) -> dict[str, Any]:
     rows, owner = ordered(spec, done.values(), rule.after), holder(folder)
     return {
         "name": spec.name,
+        "robot": spec.robot_name,
+        "world": spec.world,
         "rows": len(rows),
         "planned_rows": planned,
         "complete": complete,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,10 +11,10 @@ import click
 
 from skillframe.cli.endings import TRACE
 from skillframe.cli.numbers import COUNT, NATURAL, POSITIVE
+from skillframe.cli.output import note, quiet_option
 
 if TYPE_CHECKING:
-    from skillframe.campaign.runner import Options, Progress
-    from skillframe.campaign.spec import CampaignSpec
+    from skillframe.campaign.runner import Options
 
 _FOLDER = click.Path(path_type=Path)
 INTERRUPTED, TERMINATED = 130, 143
@@ -45,17 +44,18 @@ def _running(function: Callable[..., int]) -> Callable[..., int]:
             help="Wall time without progress after which a worker is taken for hung [120]; a slow one is not.",
         ),
         click.option("--traces", type=NATURAL, help="Trials per skill that leave a trace [8]."),
+        click.option("--json", "as_json", is_flag=True, help="The summary as JSON alone on stdout."),
     ]  # fmt: skip
     for option in reversed(options):
         function = option(function)
-    return function
+    return quiet_option(function)
 
 
 @command.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--out", type=_FOLDER, required=True, help="Folder for the results; absent or empty.")
 @_running
-def run(file: Path, out: Path, **settings: Any) -> int:
+def run(file: Path, out: Path, as_json: bool, **settings: Any) -> int:
     """Run the campaign that FILE (campaign.toml) declares.
 
     Exit code 0; 1 if a success rate is below `[expect] rate`; 2 if something given cannot be used, or if files, memory,
@@ -79,13 +79,13 @@ def run(file: Path, out: Path, **settings: Any) -> int:
         except KeyboardInterrupt:
             click.echo("interrupted before the first trial; nothing is left", err=True)
             return code()
-    return _go_on(out, options)
+    return _go_on(out, options, as_json)
 
 
 @command.command()
 @click.argument("folder", type=_FOLDER)
 @_running
-def resume(folder: Path, **settings: Any) -> int:
+def resume(folder: Path, as_json: bool, **settings: Any) -> int:
     """Run what is missing of the campaign in FOLDER; ends in the table an uninterrupted run gives.
 
     Exit codes as for `run`.
@@ -94,7 +94,7 @@ def resume(folder: Path, **settings: Any) -> int:
     Example:
       skillframe campaign resume results --workers 2
     """
-    return _go_on(folder, _options(settings))
+    return _go_on(folder, _options(settings), as_json)
 
 
 @command.command()
@@ -108,6 +108,7 @@ def status(folder: Path, as_json: bool) -> int:
       skillframe campaign status results --json
     """
     from skillframe.campaign.status import status_of
+    from skillframe.cli.campaign_words import show_rates
     from skillframe.cli.output import emit_json
 
     now = status_of(folder)
@@ -117,8 +118,9 @@ def status(folder: Path, as_json: bool) -> int:
     state = "complete" if now["complete"] else "unfinished"
     if now["running"]:
         state = f"running, process {now['running']['pid']} on {now['running']['host']}"
-    click.echo(f"{now['name']}: {now['rows']} of {now['planned_rows']} runs, {state}")
-    _show_rates(now["skills"])
+    where = f"{now['robot']} in {now['world']}"
+    click.echo(f"{now['name']} ({where}): {now['rows']} of {now['planned_rows']} runs, {state}")
+    show_rates(now["skills"])
     for text in now["remarks"]:
         click.echo(f"note: {text}")
     if state == "unfinished":
@@ -169,25 +171,26 @@ def _options(settings: dict[str, Any]) -> Options:
     return Options(**{name: value for name, value in settings.items() if value is not None})
 
 
-def _go_on(folder: Path, options: Options) -> int:
+def _go_on(folder: Path, options: Options, as_json: bool) -> int:
     """Run what is missing and tell the outcome."""
     from skillframe.campaign import evaluate
     from skillframe.campaign.folder import load
     from skillframe.campaign.runner import run_campaign
+    from skillframe.cli.campaign_words import conclude, progress
 
     spec = load(folder)
     if spec.trials % spec.cells:
         from skillframe.campaign.validity import validity_of
 
-        click.echo(f"there will be {validity_of(spec.plan, complete=True).interval_method}", err=True)
+        note(f"there will be {validity_of(spec.plan, complete=True).interval_method}")
     with _terminable() as code:
         try:
-            with _progress() as notify:
+            with progress() as notify:
                 summary = run_campaign(folder, evaluate.evaluate, options, notify)
         except KeyboardInterrupt:
             click.echo(f"interrupted; finished rows are kept, to go on: skillframe campaign resume {folder}", err=True)
             return code()
-    return _conclude(folder, spec, summary)
+    return conclude(folder, spec, summary, as_json)
 
 
 @contextmanager
@@ -211,107 +214,3 @@ def _terminable() -> Iterator[Callable[[], int]]:
         yield lambda: codes[-1]
     finally:
         signal.signal(signal.SIGTERM, before)
-
-
-def _conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any]) -> int:
-    from skillframe.campaign.summary import below_bar
-    from skillframe.robot.guesses import guess_note
-    from skillframe.robot.spec import load_robot
-
-    _show_rates(summary["skills"])
-    for pair in summary["comparisons"]:
-        click.echo(f"{pair['first']} against {pair['second']} on the same {pair['trials']} draws:")
-        click.echo(f"  only the first succeeds in {pair['only_first']}, only the second in {pair['only_second']}")
-        click.echo(f"  {_p_value(pair)}{pair['method']}")
-    if summary["stopped_after_trial"] is not None:
-        click.echo(f"stopped early after trial {summary['stopped_after_trial']}: the intervals are narrow enough")
-    click.echo(f"results: {folder / 'results.csv'}")
-    failed = any(skill["failures"] for skill in summary["skills"].values())
-    if failed and (note := guess_note(load_robot(str(spec.folder / spec.robot)))):
-        click.echo(f"note: {note}", err=True)
-    short = below_bar(spec, summary)
-    if short:
-        click.echo(short, err=True)
-    return 1 if short else 0
-
-
-def _p_value(pair: dict[str, Any]) -> str:
-    if pair["p_value"] is None:
-        return ""
-    corrected = f" ({pair['correction']})" if pair["correction"].startswith("Holm") else ""
-    return f"p = {pair['p_value']:.2g}{corrected}, "
-
-
-def _show_rates(skills: dict[str, dict[str, Any]]) -> None:
-    from skillframe.cli.output import table
-    from skillframe.report.results import cause_of
-
-    rows = [
-        [
-            label, s["trials"], s["successes"], "-" if s["rate"] is None else f"{s['rate']:.3f}",
-            "none" if s["interval_95"] is None else f"{s['interval_95'][0]:.3f} .. {s['interval_95'][1]:.3f}",
-        ]
-        for label, s in skills.items()
-    ]  # fmt: skip
-    table(["skill", "trials", "successes", "rate", "95 % interval"], rows)
-    for method in dict.fromkeys(s["method"] for s in skills.values()):
-        click.echo(f"  {method}" if method.startswith("no interval") else f"  intervals: {method}")
-    for label, s in skills.items():
-        if s["uncounted"]:
-            more = f"{s['uncounted']} finished runs after trial {s['trials']} are not counted until that trial has run"
-            click.echo(f"  {label}: {more}")
-        causes: Counter[str] = Counter()
-        for text, count in s["failures"].items():
-            causes[cause_of(text)] += count
-        for cause, count in causes.most_common(3):
-            click.echo(f"  {label}: {count} x {cause}")
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[Progress], None]]:
-    """A bar on a terminal, a line per tenth of the work in a pipe; both on stderr."""
-    import sys
-
-    if not sys.stderr.isatty():
-        yield _lines()
-        return
-    from rich.console import Console
-    from rich.progress import Progress as Bar
-
-    console = Console(stderr=True)
-    with Bar(console=console, transient=True) as bar:
-        task = bar.add_task("runs", total=None)
-
-        def show(progress: Progress) -> None:
-            bar.update(task, completed=progress.done + progress.under_way, total=progress.total)
-            if progress.note:
-                console.print(progress.note, markup=False)
-
-        yield show
-
-
-def _lines() -> Callable[[Progress], None]:
-    """Lines with the share that is done, the runs that have ended, and a guess of what is left from the pace so far."""
-    import time
-
-    shown, began, first = -1, time.monotonic(), -1.0
-
-    def show(progress: Progress) -> None:
-        nonlocal shown, first
-        share = (progress.done + progress.under_way) / progress.total
-        first = share if first < 0.0 else first
-        if int(10 * share) > shown:
-            shown = int(10 * share)
-            spent = time.monotonic() - began
-            left = spent * (1.0 - share) / (share - first) if share > first else 0.0
-            guess = f", about {_span(left)} left" if left >= 1.0 else ""
-            click.echo(f"{share:.0%} simulated, {progress.done} of {progress.total} runs complete{guess}", err=True)
-        if progress.note:
-            click.echo(progress.note, err=True)
-
-    return show
-
-
-def _span(seconds: float) -> str:
-    """A length of time for people."""
-    return f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"

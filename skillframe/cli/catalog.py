@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
-import inspect
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from skillframe.errors import UnknownName
+from skillframe.fields import settings_of
 
 if TYPE_CHECKING:
     from skillframe.registry import Registry
-
-ENTRY = re.compile(r"    (\w[\w, ]*): (.*)")
 
 
 def by_kind(provides: Sequence[str]) -> dict[str, list[str]]:
@@ -47,23 +43,13 @@ def found(registry: Registry, name: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def settings_of(kind: type) -> Iterator[dict[str, Any]]:
-    """Fields of a dataclass with their defaults and what its docstring says of them."""
-    texts = _texts(kind)
-    for field in dataclasses.fields(kind):
-        factory = field.default_factory
-        default = factory() if factory is not dataclasses.MISSING else field.default
-        required = default is dataclasses.MISSING
-        yield {"name": field.name, "default": None if required else default, "about": texts.get(field.name, "")}
-
-
-def _texts(kind: type) -> dict[str, str]:
-    """Entries under "Attributes:" in the docstrings of a dataclass and its bases; several names may share one."""
-    texts: dict[str, str] = {}
-    for each in reversed(kind.__mro__):
-        names: list[str] = []
-        for line in inspect.cleandoc(each.__doc__ or "").partition("Attributes:\n")[2].splitlines():
-            entry = ENTRY.fullmatch(line)
-            names = entry[1].split(", ") if entry else names
-            texts |= {n: entry[2] if entry else f"{texts.get(n, '')} {line.strip()}".strip() for n in names}
-    return texts
+def rows_of(registry: Registry, kind: str) -> list[dict[str, Any]]:
+    """A row per record of a kind, by name: `name`, `kind`, `summary`, `distribution`, `version`."""
+    rows = []
+    for record in registry.records(kind):
+        plugin = registry.provider(kind, record.name)
+        rows.append({
+            "name": record.name, "kind": kind, "summary": record.summary, "distribution": plugin.distribution,
+            "version": plugin.version,
+        })  # fmt: skip
+    return rows

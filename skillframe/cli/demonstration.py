@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from skillframe.cli import names
 from skillframe.cli.numbers import NUMBER
 from skillframe.cli.output import emit_json
 
@@ -86,7 +87,10 @@ _OPTIONS = [
     click.option("--pose-topic", help="Topic of a ROS bag with the tool's pose, or with --robot its joint states."),
     click.option("--pose-frames", metavar="BASE,TOOL", help="Frames of a ROS bag's transforms (/tf, /tf_static)."),
     click.option("--wrench-topic", help="Topic of a ROS bag with the wrench (WrenchStamped)."),
-    click.option("--robot", help="The robot whose joint states a ROS bag holds (name or path of its robot.toml)."),
+    click.option(
+        "--robot", shell_complete=names.robots,
+        help="The robot whose joint states a ROS bag holds (name or path of its robot.toml).",
+    ),
 ]  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from skillframe.cli import names
 from skillframe.cli.numbers import WHOLE
 
 if TYPE_CHECKING:
@@ -16,7 +17,9 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("skill", required=False, type=click.Path(path_type=Path))
-@click.option("--to", "form", metavar="FORMAT", help="Format to write; --list names them.")
+@click.option(
+    "--to", "form", metavar="FORMAT", shell_complete=names.formats, help="Format to write; --list names them."
+)
 @click.option("--out", type=click.Path(path_type=Path), help="File to write (.yaml).")
 @click.option("--phase", type=WHOLE, help="Phase of a policy, counted from 1.")
 @click.option("--coc", help='Centre of compliance: "x,y,z" in the tool frame, or a frame (tip) [as learned].')

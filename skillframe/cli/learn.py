@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from skillframe.cli import names
 from skillframe.cli.endings import SKILL
 from skillframe.cli.words import tell
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--out", required=True, type=SKILL, help="Skill file to write (.json).")
-@click.option("--skill", default="lmc", show_default=True, help="Kind of skill to learn.")
+@click.option("--skill", default="lmc", show_default=True, shell_complete=names.skills, help="Kind of skill to learn.")
 @click.option(
     "--at", help='Where it is learned: a frame\'s name or "x,y,z" [m] in the tool frame; default: tool point.'
 )

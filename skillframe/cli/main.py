@@ -33,12 +33,17 @@ COMMANDS = {
     "report": "Make a self-contained HTML report from results.",
     "reproduce": "The papers' results, row by row.",
     "robots": "List, check and show robots.",
+    "worlds": "List and show worlds.",
+    "skills": "List kinds of skills.",
+    "settings": "List what --set takes, with units.",
     "fmu": "List, build, check and simulate FMUs.",
     "plugins": "List, show, check and start plug-ins.",
     "doctor": "What is installed, what is missing, what to type.",
 }
 
 
+NO_ARGUMENTS: Any = getattr(click.exceptions, "NoArgsIsHelpError", ())
+"""Help in place of an answer; older releases of click have no error of its own for it."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -107,8 +112,11 @@ def run(arguments: Sequence[str], debug: bool = False) -> int:
     _print_anything()
     try:
         result = cli.main(list(arguments), prog_name="skillframe", standalone_mode=False)
-    except click.ClickException as error:
+    except NO_ARGUMENTS as error:
         error.show()
+        return 2
+    except click.ClickException as error:
+        click.echo(f"error: {_of_usage(error, arguments)}", err=True)
         return 2
     except SkillframeError as error:
         if debug:
@@ -126,6 +134,15 @@ def run(arguments: Sequence[str], debug: bool = False) -> int:
     except Exception as error:
         return _internal(error, debug)
     return result if isinstance(result, int) else 0
+
+
+def _of_usage(error: click.ClickException, arguments: Sequence[str]) -> str:
+    """What click does not understand, in the style of every other error, and where help is."""
+    said = " ".join(error.format_message().split()).removesuffix(".").replace(". Did you", "; did you")
+    context = getattr(error, "ctx", None)
+    typed = arguments[0] if arguments and arguments[0] in COMMANDS else ""
+    command = f"skillframe {typed}".strip() if context is None else context.command_path
+    return f"{said[:1].lower()}{said[1:]} (help: {command} --help)"
 
 
 def _print_anything() -> None:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import zip_longest
 from textwrap import wrap
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 
@@ -19,36 +21,103 @@ def emit_json(value: Any) -> None:
     click.echo(json.dumps(value, indent=2, sort_keys=True, allow_nan=False, ensure_ascii=False))
 
 
+F = TypeVar("F", bound=Callable[..., Any])
+QUIET = "skillframe.quiet"
+
+
+def quiet_option(function: F) -> F:
+    """`-q`: what is long says nothing of how far it is."""
+    option = click.option(
+        "-q", "--quiet", is_flag=True, expose_value=False, callback=_silence,
+        help="No progress and no notes on stderr; warnings and errors stay.",
+    )  # fmt: skip
+    return option(function)
+
+
+def _silence(ctx: click.Context, param: click.Parameter, value: bool) -> None:
+    ctx.meta[QUIET] = value
+
+
+def is_quiet() -> bool:
+    """Was the command that runs told to be quiet?"""
+    context = click.get_current_context(silent=True)
+    return context is not None and bool(context.meta.get(QUIET, False))
+
+
+def note(text: str) -> None:
+    """A line on stderr that is not needed; `-q` leaves it out."""
+    if not is_quiet():
+        click.echo(text, err=True)
+
+
+GAP = 2  # columns of blanks between the columns of a table
 PAGE_WIDTH = 110
 """Columns of text that a page or an editor shows without breaking lines of its own accord."""
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[object]], width: int | None = None) -> None:
-    """Print rows under headings: a drawn table on a terminal, plain aligned columns in a pipe.
+    """Print rows under headings: as wide as a terminal, and in a pipe a line per row.
 
     Args:
         columns: headings.
         rows: cells.
-        width: in a pipe, of the whole; what does not fit goes on below in its own column. None: a line per row.
+        width: of the whole in a pipe; None: as wide as it is.
     """
     texts = [[str(cell) for cell in row] for row in rows]
-    if sys.stdout.isatty():
-        _drawn(columns, texts)
+    terminal = sys.stdout.isatty()
+    room = shutil.get_terminal_size().columns if terminal else width
+    for number, line in enumerate(laid_out(columns, texts, room)):
+        click.echo(bold(line) if number == 0 else line)
+
+
+def bold(text: str) -> str:
+    """A text in bold on a terminal, unless NO_COLOR is set; as it is anywhere else."""
+    plain = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb" or not sys.stdout.isatty()
+    return text if plain else click.style(text, bold=True)
+
+
+def laid_out(columns: Sequence[str], texts: Sequence[Sequence[str]], width: int | None) -> Iterator[str]:
+    """The lines of a table within a width; no word is ever broken.
+
+    What does not fit goes on below in its own column, with an empty line between rows; where the columns' longest words
+    do not fit side by side, each cell has a line, behind its heading.
+    """
+    whole = [columns, *texts]
+    natural = [max(len(line[i]) for line in whole) for i in range(len(columns))]
+    least = [max(len(word) for line in whole for word in [*line[i].split(), ""]) for i in range(len(columns))]
+    room = None if width is None else width - GAP * (len(columns) - 1)
+    if room is not None and sum(least) > room:
+        yield from _paragraphs(columns, texts, width or 0)
         return
-    natural = [max(len(line[i]) for line in [columns, *texts]) for i in range(len(columns))]
-    widths = natural if width is None else _narrowed(natural, width - 2 * (len(columns) - 1))
-    for i, line in enumerate([columns, *texts]):
+    widths = natural if room is None else _narrowed(natural, least, room)
+    for i, line in enumerate(whole):
         if i > 1 and widths != natural:
-            click.echo()  # rows of several lines are told apart by an empty one
-        cells = [wrap(cell, at) if len(cell) > at else [cell] for cell, at in zip(line, widths, strict=True)]
+            yield ""
+        cells = [_wrapped(cell, at) if len(cell) > at else [cell] for cell, at in zip(line, widths, strict=True)]
         for parts in zip_longest(*cells, fillvalue=""):
-            click.echo("  ".join(part.ljust(at) for part, at in zip(parts, widths, strict=True)).rstrip())
+            yield (GAP * " ").join(part.ljust(at) for part, at in zip(parts, widths, strict=True)).rstrip()
 
 
-def _narrowed(natural: Sequence[int], room: int) -> list[int]:
-    """Widths that share a room: as wide as they are, but none above a cap that makes them fit."""
-    cap = next((c for c in range(max(natural), 0, -1) if sum(min(c, n) for n in natural) <= room), 1)
-    return [min(cap, n) for n in natural]
+def _narrowed(natural: Sequence[int], least: Sequence[int], room: int) -> list[int]:
+    """Widths that share a room: as wide as they are, but none above a cap that makes them fit, nor below its least."""
+
+    def capped(cap: int) -> list[int]:
+        return [max(low, min(cap, n)) for n, low in zip(natural, least, strict=True)]
+
+    return next((widths for c in range(max(natural), 0, -1) if sum(widths := capped(c)) <= room), list(least))
+
+
+def _wrapped(text: str, width: int) -> list[str]:
+    return wrap(text, width, break_long_words=False, break_on_hyphens=False)
+
+
+def _paragraphs(columns: Sequence[str], texts: Sequence[Sequence[str]], width: int) -> Iterator[str]:
+    """Rows one below the other, each cell behind its heading."""
+    yield ", ".join(columns)
+    for line in texts:
+        yield ""
+        for heading, cell in zip(columns, line, strict=True):
+            yield from _wrapped(f"{heading}: {cell}", width)
 
 
 @contextmanager
@@ -57,6 +126,9 @@ def progress(what: str, after_s: float = 0.0) -> Iterator[Callable[[float, float
 
     Work that is over within `after_s` shows nothing in a pipe.
     """
+    if is_quiet():
+        yield lambda done, total: None
+        return
     if not sys.stderr.isatty():
         yield _tenths(what, time.monotonic() + after_s)
         return
@@ -78,15 +150,3 @@ def _tenths(what: str, earliest: float) -> Callable[[float, float], None]:
             click.echo(f"{done:g} of {total:g} {what}", err=True)
 
     return show
-
-
-def _drawn(columns: Sequence[str], texts: Sequence[Sequence[str]]) -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    drawn = Table(*columns, box=box.SIMPLE_HEAD, header_style="bold")
-    for line in texts:
-        drawn.add_row(*(Text(cell) for cell in line))
-    Console().print(drawn)

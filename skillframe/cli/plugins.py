@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from skillframe.cli.catalog import by_kind
-from skillframe.cli.output import emit_json
+from skillframe.cli.output import emit_json, note, quiet_option
+from skillframe.cli.settings import typed
 from skillframe.errors import UnknownName
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ def command() -> None:
 
 @command.command("list")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@quiet_option
 def list_(as_json: bool) -> None:
     """List installed plug-ins: what each provides, and its error if it has one.
 
@@ -47,7 +49,7 @@ def list_(as_json: bool) -> None:
         emit_json(rows)
     else:
         _list(rows)
-        click.echo("skillframe plugins show NAME says what one is, and what can be set", err=True)
+        note("skillframe plugins show NAME says what one is, and what can be set")
     for name in known.not_installed:
         click.echo(f"SKILLFRAME_PLUGINS asks for {name!r}, which is not installed", err=True)
     if known.unselected:
@@ -85,17 +87,14 @@ def show(name: str, as_json: bool) -> None:
     click.echo(f"{row['kind']} {row['name']} ({row['distribution']} {row['version']}): {row['summary']}")
     prefix = "world." if row["kind"] == "world" else ""
     for each in row["settings"] or ():
-        click.echo(f"  --set {prefix}{each['name']}{_default(each['default'])}")
+        unit = f" [{each['unit']}]" if each["unit"] else ""
+        click.echo(f"  --set {prefix}{each['name']}{_default(each['default'])}{unit}")
         click.echo(f"      {each['about']}")
 
 
 def _default(value: Any) -> str:
     """As it would be typed; nothing where the recordings decide."""
-    if value is None:
-        return ""
-    if isinstance(value, bool):
-        return f"={str(value).lower()}"
-    return f"={value:.6g}" if isinstance(value, float) else f"={value}"
+    return "" if value is None else f"={typed(value)}"
 
 
 def distribution_rows(registry: Registry) -> list[dict[str, Any]]:
@@ -117,6 +116,7 @@ def distribution_rows(registry: Registry) -> list[dict[str, Any]]:
 @click.option(
     "--out", type=click.Path(path_type=Path, file_okay=False), help="Folder to write (default: skillframe-NAME)."
 )
+@quiet_option
 def new(name: str, out: Path | None) -> None:
     """Write a working plug-in to start from: one skill, with its conformance tests.
 
@@ -130,7 +130,7 @@ def new(name: str, out: Path | None) -> None:
     folder = out or Path(f"skillframe-{name.replace('_', '-')}")
     for path in write_template(name, folder):
         click.echo(path)
-    click.echo(f"next: pip install -e {folder} && skillframe plugins check {name}", err=True)
+    note(f"next: pip install -e {folder} && skillframe plugins check {name}")
 
 
 @command.command()

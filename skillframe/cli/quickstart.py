@@ -8,13 +8,18 @@ from __future__ import annotations
 
 import shlex
 import shutil
+import sys
 import time
 from collections.abc import Iterator
+from contextlib import nullcontext, redirect_stdout
 from pathlib import Path
+from typing import Any
 
 import click
 
+from skillframe.cli.names import robot_option
 from skillframe.cli.numbers import COUNT, SEED
+from skillframe.cli.output import bold, emit_json, is_quiet, quiet_option
 from skillframe.files import write_whole
 
 MARKER = ".skillframe-quickstart"
@@ -54,11 +59,13 @@ TASKS = (("valley", "valley", VALLEY, None), ("peg", "peg_in_hole", PEG, "tip"))
 
 @click.command(name="quickstart")
 @click.option("--out", default="demo", show_default=True, type=click.Path(path_type=Path), help="Folder to make.")
-@click.option("--robot", default="panda", show_default=True, help="Robot to teach.")
+@robot_option
 @click.option("--trials", default=96, show_default=True, type=COUNT, help="Trials per skill and campaign.")
 @click.option("--workers", default=2, show_default=True, type=COUNT, help="Worker processes of the campaigns.")
 @click.option("--seed", default=1, show_default=True, type=SEED, help="Seed of the demonstrations.")
-def command(out: Path, robot: str, trials: int, workers: int, seed: int) -> int:
+@click.option("--json", "as_json", is_flag=True, help="The outcome as JSON alone on stdout; the log goes to stderr.")
+@quiet_option
+def command(out: Path, robot: str, trials: int, workers: int, seed: int, as_json: bool) -> int:
     """Demonstrate, learn, run and prove two skills, and write a report.
 
     A simulated person shows a robot twice how to slide into a valley, and how to put a peg into a hole with 0.25 mm of
@@ -73,15 +80,29 @@ def command(out: Path, robot: str, trials: int, workers: int, seed: int) -> int:
     for name, _, template, _ in TASKS:
         text = template.format(trials=trials, robot=robot)
         write_whole(out / f"{name}.campaign.toml", text.encode())
-    for number, step in enumerate(_steps(out, robot, workers, seed), start=1):
-        code = _type(step, number)
-        if code:
-            return code
-    click.echo(
-        f"\nDone in {time.perf_counter() - began:.0f} s. Open {out / 'report.html'} in a browser: what was learned,"
-    )
+    steps, quiet = list(_steps(out, robot, workers, seed)), is_quiet()
+    with redirect_stdout(sys.stderr) if as_json else nullcontext():
+        for number, step in enumerate(steps, start=1):
+            code = _type(step, number, quiet)
+            if code:
+                return code
+    spent = time.perf_counter() - began
+    if as_json:
+        emit_json(_outcome(out, robot, steps, spent))
+        return 0
+    click.echo(f"\nDone in {spent:.0f} s. Open {out / 'report.html'} in a browser: what was learned,")
     click.echo("the runs in 3-D, and where the skills work, beside a plain replay of the demonstrations.")
     return 0
+
+
+def _outcome(out: Path, robot: str, steps: list[list[str]], wall_s: float) -> dict[str, Any]:
+    """What a script wants to know: where the report is, and how each campaign ended."""
+    from skillframe.campaign.summary import read_summary
+
+    found = {name: read_summary(out / name)["skills"] for name, *_ in TASKS}
+    campaigns = [{"robot": robot, "world": world, "skills": found[name]} for name, world, *_ in TASKS]
+    typed = [shlex.join(["skillframe", *step]) for step in steps]
+    return {"report": str(out / "report.html"), "campaigns": campaigns, "commands": typed, "wall_s": wall_s}
 
 
 def _make_room(out: Path) -> None:
@@ -126,9 +147,9 @@ def _copy(files: list[str], folder: Path) -> None:
         shutil.copy(file, folder)
 
 
-def _type(step: list[str], number: int) -> int:
-    """Echo a command and run it."""
+def _type(step: list[str], number: int, quiet: bool) -> int:
+    """Echo a command and run it; `learn` has warnings only, and so nothing to leave out."""
     from skillframe.cli.main import run
 
-    click.secho(f"\n[{number} of {STEPS}] $ skillframe {shlex.join(step)}", bold=True)
-    return run(step)
+    click.echo(bold(f"\n[{number} of {STEPS}] $ skillframe {shlex.join(step)}"))
+    return run([*step, "--quiet"] if quiet and step[0] != "learn" else step)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from skillframe.cli.names import robot_option, world_option
 from skillframe.cli.numbers import COUNT, NOT_NEGATIVE, NUMBER, POSITIVE, SEED
-from skillframe.cli.output import progress
+from skillframe.cli.output import note, progress, quiet_option
 
 if TYPE_CHECKING:
     from skillframe.blind_teacher import BlindSettings
@@ -22,8 +23,8 @@ QUIET_S = 5.0  # a recording that is over by then needs no progress
 
 
 @click.command(name="record")
-@click.option("--world", required=True, help="World to demonstrate (skillframe plugins list names them).")
-@click.option("--robot", default="free_tool", show_default=True, help="Robot name, or its robot.toml or folder.")
+@world_option("World to demonstrate")
+@robot_option
 @click.option(
     "--teacher", type=click.Choice(["kinesthetic", "teleoperation", "blind"]), default="kinesthetic", show_default=True
 )
@@ -58,9 +59,10 @@ QUIET_S = 5.0  # a recording that is over by then needs no progress
     "settings",
     multiple=True,
     metavar="KEY=VALUE",
-    help="start.*, fixture.*, world.* (skillframe plugins show WORLD lists these) ...",
+    help="What differs from the nominal: start.tilt_y=5deg ... (skillframe settings lists all).",
 )
 @click.option("--json", "as_json", is_flag=True, help="What was recorded as JSON on stdout.")
+@quiet_option
 def command(
     world: str, robot: str, teacher: str, out: Path, count: int, seed: int, noise: float | None, delay: float | None,
     scale: float | None, belief: str | None, centre: str | None, rate: float | None, settings: tuple[str, ...],
@@ -85,21 +87,25 @@ def command(
       skillframe demonstration record --world pallets --robot hiab_xs031 --teacher teleoperation --delay 0.15 \\
         --angle -40 --count 2 --out push.npz
     """
+    from skillframe.cli.settings import warn
     from skillframe.config import parse_setting
     from skillframe.demonstration.files import check_writable
     from skillframe.prepare import load_robot_model, load_world, split_settings
 
     check_writable(out)
-    params, draws = split_settings(world, dict(parse_setting(text) for text in settings))
+    given = dict(parse_setting(text) for text in settings)
+    params, draws = split_settings(world, given)
+    warn(world, given)
     machine, scene = load_robot_model(robot), load_world(world, params)
-    common: dict[str, Any] = {"count": count, "seed": seed, "draws": draws, "progress": _progress}
+    common: dict[str, Any] = {"count": count, "seed": seed, "draws": draws, "progress": note}
     common |= {} if rate is None else {"rate_hz": rate}
     with progress("s simulated", QUIET_S) as show:
         common["watch"] = lambda now, longest: show(round(now, 1), longest)
         recording = _recorded(machine, scene, teacher, (noise, delay, scale), (belief, centre), operated, common)
     files = _write(recording, out, count)
     if as_json:
-        click.echo(json.dumps({"files": [str(f) for f in files], "rejected": recording.rejected}))
+        where = {"robot": machine.spec.name, "world": world}
+        click.echo(json.dumps({**where, "files": [str(f) for f in files], "rejected": recording.rejected}))
         return 0
     for path, demonstration in zip(files, recording.demonstrations, strict=True):
         click.echo(f"{path}: {demonstration.duration:.2f} s at {demonstration.rate:.0f} Hz")
@@ -175,10 +181,6 @@ def _operated(
 def _given(value: object) -> bool:
     """Was an option on the command line?"""
     return value is not None and value is not False
-
-
-def _progress(text: str) -> None:
-    click.echo(text, err=True)
 
 
 def _write(recording: Recording, out: Path, count: int) -> list[Path]:

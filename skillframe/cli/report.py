@@ -7,12 +7,15 @@ from pathlib import Path
 import click
 
 from skillframe.cli.endings import PAGE
+from skillframe.cli.output import quiet_option
 
 
 @click.command()
 @click.argument("inputs", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="DIR|TRACE...")
 @click.option("--out", required=True, type=PAGE, help="The HTML file to write.")
-def command(inputs: tuple[Path, ...], out: Path) -> None:
+@click.option("--json", "as_json", is_flag=True, help="What was written, and of what, as JSON on stdout.")
+@quiet_option
+def command(inputs: tuple[Path, ...], out: Path, as_json: bool) -> None:
     """Make a report from campaign folders, trace files, or both: one HTML file that needs nothing else.
 
     \b
@@ -25,7 +28,18 @@ def command(inputs: tuple[Path, ...], out: Path) -> None:
       skillframe report results/peg --out peg.html
       skillframe report run1.npz run2.npz --out runs.html
     """
-    from skillframe.report.page import write_report
+    from skillframe.cli.output import emit_json
+    from skillframe.report.page import write_chapters
+    from skillframe.report.sources import read_chapters, scenes
 
-    size = write_report(inputs, out)
-    click.echo(f"{out} ({size / 1e6:.1f} MB)")
+    chapters = read_chapters(inputs)
+    size, seen = write_chapters(chapters, out), [scenes(chapter) for chapter in chapters]
+    if as_json:
+        told = [
+            {"name": chapter.name, "scenes": [{"robot": robot, "world": world} for robot, world in where]}
+            for chapter, where in zip(chapters, seen, strict=True)
+        ]
+        emit_json({"file": str(out), "bytes": size, "chapters": told})
+        return
+    places = dict.fromkeys(f"{robot} in {world}" for where in seen for robot, world in where)
+    click.echo(f"{out} ({size / 1e6:.1f} MB)" + (f": {', '.join(places)}" if places else ""))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from skillframe.cli.numbers import COUNT, SEED
+from skillframe.cli.output import note, quiet_option
 
 if TYPE_CHECKING:
     from skillframe.reproduce.runner import Outcome
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 @click.option("--fresh", is_flag=True, help="Compute rows again that OUT holds already.")
 @click.option("--list", "only_list", is_flag=True, help="List rows and their settings, compute nothing.")
 @click.option("--json", "as_json", is_flag=True, help="The table as JSON on stdout.")
+@quiet_option
 def command(
     rows: tuple[str, ...], out: Path, quick: bool, settings: tuple[str, ...], seed: int, workers: int | None,
     fresh: bool, only_list: bool, as_json: bool,
@@ -50,13 +52,9 @@ def command(
     jobs = jobs_of(registry(), rows, changed, seed=seed, quick=quick)
     if only_list:
         return _list([registry().row(job.row) for job in jobs], as_json)
-    outcome = run(jobs, out, workers=workers or os.cpu_count() or 1, fresh=fresh, tell=_tell)
+    outcome = run(jobs, out, workers=workers or os.cpu_count() or 1, fresh=fresh, tell=note)
     _write(outcome.entries, out)
     return _end(outcome, out, quick, as_json)
-
-
-def _tell(text: str) -> None:
-    click.echo(text, err=True)
 
 
 def _list(rows: Sequence[Any], as_json: bool) -> int:
@@ -90,13 +88,14 @@ def _end(outcome: Outcome, out: Path, quick: bool, as_json: bool) -> int:
 
     changed = committed.changes(outcome.entries, committed.verdicts(quick=quick))
     _show(outcome.entries, as_json)
-    _tell(f"table: {out / 'reproduce.json'}, page: {out / 'reproduce.html'}")
+    note(f"table: {out / 'reproduce.json'}, page: {out / 'reproduce.html'}")
     for sentence in changed:
-        _tell(f"changed: {sentence}")
+        click.echo(f"changed: {sentence}", err=True)
     if outcome.ended_by:
         done = ", ".join(each["row"] for each in outcome.entries) or "none yet"
         name = Signals(outcome.ended_by).name
-        _tell(f"ended by {name}; finished rows are kept in {out} ({done}), the same command goes on from there")
+        kept = f"ended by {name}; finished rows are kept in {out} ({done}), the same command goes on from there"
+        click.echo(kept, err=True)
         return 128 + outcome.ended_by
     if outcome.broken:
         raise RuntimeError("; ".join(outcome.broken))

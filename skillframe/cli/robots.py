@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from skillframe.cli import names
+
 if TYPE_CHECKING:
     from skillframe.robot.audit import Audit
 
@@ -50,7 +52,7 @@ def list_robots(as_json: bool) -> int:
 
 
 @command.command()
-@click.argument("robot", metavar="URDF|NAME")
+@click.argument("robot", metavar="URDF|NAME", shell_complete=names.robots)
 @click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
 def check(robot: str, as_json: bool) -> int:
     """Is a robot usable for dynamics? A URDF, a robot.toml, or a name.
@@ -79,7 +81,7 @@ def check(robot: str, as_json: bool) -> int:
 
 
 @command.command()
-@click.argument("robot", metavar="NAME|URDF")
+@click.argument("robot", metavar="NAME|URDF", shell_complete=names.robots)
 @click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
 def show(robot: str, as_json: bool) -> None:
     """What a robot is like: joints, limits, home, mass, tool frames.

@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from skillframe.cli.endings import PAGE, TRACE
+from skillframe.cli.names import robot_option, world_option
 from skillframe.cli.numbers import POSITIVE, SEED
+from skillframe.cli.output import note, quiet_option
 
 if TYPE_CHECKING:
     from skillframe.trace import Trace
@@ -24,15 +26,15 @@ QUIET_S = 5.0  # a run that is over by then needs no progress
 
 @click.command(name="run")
 @click.argument("skill")
-@click.option("--world", required=True, help="World to run in (skillframe plugins list names them).")
-@click.option("--robot", default="free_tool", show_default=True, help="Robot name, or its robot.toml or folder.")
+@world_option("World to run in")
+@robot_option
 @click.option("--coc", help='Centre of compliance: "x,y,z" in the tool frame, or a frame (tip, wrist) [as learned].')
 @click.option(
     "--set",
     "settings",
     multiple=True,
     metavar="KEY=VALUE",
-    help="start.*, fixture.*, grasp.*, world.* (skillframe plugins show WORLD lists these) ...",
+    help="What differs from the nominal: start.offset_x=8mm ... (skillframe settings lists all).",
 )
 @click.option("--out", type=TRACE, help="Trace file (.npz).")
 @click.option("--replay", type=PAGE, help="Page with a 3-D replay and plots of the run (.html).")
@@ -43,6 +45,7 @@ QUIET_S = 5.0  # a run that is over by then needs no progress
 )
 @click.option("--rate", default=RATE_HZ, show_default=True, type=POSITIVE, help="Rate of the trace [Hz].")
 @click.option("--json", "as_json", is_flag=True, help="The outcome as JSON on stdout.")
+@quiet_option
 def command(
     skill: str, world: str, robot: str, coc: str | None, settings: tuple[str, ...], out: Path | None,
     replay: Path | None, video: Path | None, seed: int, duration: float, rate: float, as_json: bool,
@@ -60,6 +63,7 @@ def command(
     import numpy as np
 
     from skillframe.cli.output import progress
+    from skillframe.cli.settings import warn
     from skillframe.config import parse_setting
     from skillframe.executor import simulate
     from skillframe.prepare import load_robot_model, load_world, prepare, split_settings
@@ -70,7 +74,9 @@ def command(
         from skillframe.report.video import check_film
 
         check_film(video)
-    params, draws = split_settings(world, dict(parse_setting(text) for text in settings))
+    given = dict(parse_setting(text) for text in settings)
+    params, draws = split_settings(world, given)
+    warn(world, given)
     name, document = load_skill(skill)
     model = load_robot_model(robot)
     runnable, setup = prepare(model, load_world(world, params), document, coc)
@@ -83,8 +89,8 @@ def command(
     trace = result.traces[0]
     typed = _typed(skill, world, robot, coc, settings, seed, duration, rate)
     trace.meta.update({"skill": name, "seed": seed, "draws": draws, "command": typed})
-    if not result.success[0] and (note := guess_note(model.spec)):
-        trace.meta["notes"] = [*trace.meta.get("notes", []), note]
+    if not result.success[0] and (guess := guess_note(model.spec)):
+        trace.meta["notes"] = [*trace.meta.get("notes", []), guess]
     if out is not None:
         trace.save(out)
     if replay is not None:
@@ -145,17 +151,29 @@ def _shares(meta: dict[str, Any]) -> str:
     return ", ".join(f"{what} at most {share:.0%} of its limit" for what, share in parts if share is not None)
 
 
+def _scene(meta: dict[str, Any]) -> str:
+    """Who did it where, and how far it got, where the world can say that."""
+    where, way = f"{meta['robot']} in {meta['world']}", meta["progress"]
+    if way is None:
+        return where
+    reached = "an unknown part" if way["reached_m"] is None else f"{way['reached_m'] * 1000:.0f}"
+    return f"{where}, {way['word']} {reached} of {way['of_m'] * 1000:.0f} mm"
+
+
 def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) -> None:
     keys = ["success", "failure", "reason", "duration_s", "peak_force_n", "final_error_m", "final_error_rad"]
     outcome = {key: _known(meta[key]) for key in keys}
     judged = {key: _known(meta[key]) for key in JUDGED}
     for text in meta.get("notes") or []:
-        click.echo(f"note: {text}", err=True)
+        note(f"note: {text}")
+    if files["trace"] is None:
+        note("not saved; add --out run.npz")
     if as_json:
         named = {what: str(path) if path else None for what, path in files.items()}
-        click.echo(json.dumps({**outcome, **judged, **named}, sort_keys=True))
+        where = {"robot": meta["robot"], "world": meta["world"], "progress": meta["progress"]}
+        click.echo(json.dumps({**outcome, **judged, **where, **named}, sort_keys=True))
         return
-    click.echo("success" if meta["success"] else f"failure: {meta['failure']}")
+    click.echo(f"{'success' if meta['success'] else 'failure: ' + meta['failure']} ({_scene(meta)})")
     ended = f"  ended after {meta['duration_s']:.2f} s ({meta['reason']})"
     if None not in outcome.values():
         missed, turned = _hundredths(meta["final_error_m"] * 1000), _hundredths(math.degrees(meta["final_error_rad"]))

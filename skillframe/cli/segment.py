@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from skillframe.cli import names
 from skillframe.cli.endings import SKILL
 from skillframe.cli.numbers import WHOLE
 from skillframe.cli.words import tell
@@ -19,8 +20,14 @@ if TYPE_CHECKING:
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--out", required=True, type=SKILL, help="Policy file to write (.json).")
 @click.option("--phases", type=WHOLE, help="Number of phases; default: it is found.")
-@click.option("--segmenter", default="wrench_hmm", show_default=True, help="How phases are told apart.")
-@click.option("--skill", default="lmc", show_default=True, help="Kind of skill that each phase is learned as.")
+@click.option(
+    "--segmenter", default="wrench_hmm", show_default=True, shell_complete=names.segmenters,
+    help="How phases are told apart.",
+)  # fmt: skip
+@click.option(
+    "--skill", default="lmc", show_default=True, shell_complete=names.skills,
+    help="Kind of skill that each phase is learned as.",
+)  # fmt: skip
 @click.option(
     "--set-boundary", "boundaries", multiple=True, metavar="DEMO:NUMBER=SECONDS",
     help="Move a boundary of a demonstration (both counted from 1, or a file's name) and refit (repeatable).",

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from skillframe.campaign.spec import name_of
 from skillframe.report.learned import described
 from skillframe.report.markup import Markup, escape, join, number, percent, tag
 from skillframe.report.quantities import quantity
@@ -67,8 +68,7 @@ def _origin(document: dict[str, Any] | None) -> str:
 def _setting(chapter: Chapter, results: Results) -> str:
     """Who did what, and over which ranges."""
     robot, world = (str(chapter.spec.get(key) or chapter.summary.get(key) or "") for key in ("robot", "world"))
-    robot = robot.removesuffix("/robot.toml").rsplit("/", 1)[-1]
-    where = f"Robot {robot}, world {world}" if robot and world else "Every trial"
+    where = f"Robot {name_of(robot)}, world {world}" if robot and world else "Every trial"
     ranges = [_range(results, name) for name in results.varied]
     return f"{where}; varied from trial to trial: {', '.join(ranges)}." if ranges else f"{where}; nothing varied."
 

@@ -36,7 +36,16 @@ def write_report(inputs: Sequence[Path], out: Path) -> int:
     Raises:
         InputError: nothing to report on, input that cannot be read, or a file that cannot be written.
     """
-    page = render(read_chapters(inputs)).encode("utf-8")
+    return write_chapters(read_chapters(inputs), out)
+
+
+def write_chapters(chapters: Sequence[Chapter], out: Path) -> int:
+    """As `write_report`, of what was read before.
+
+    Raises:
+        InputError: there are no chapters, or the file cannot be written.
+    """
+    page = render(chapters).encode("utf-8")
     write_whole(out, page)
     return len(page)
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from skillframe.campaign.axes import parse_axis
-from skillframe.campaign.spec import flatten
+from skillframe.campaign.spec import flatten, name_of
 from skillframe.campaign.validity import Plan, plan_of
 from skillframe.campaign.verify import edited_results
 from skillframe.config import read_toml
@@ -70,6 +70,14 @@ class Chapter:
     force_limit: float | None = None
     notes: list[str] = field(default_factory=list)
     hashes: list[tuple[str, str]] = field(default_factory=list)
+
+
+def scenes(chapter: Chapter) -> list[tuple[str, str]]:
+    """(robot, world) of what a chapter shows, each pair once; without what its files do not say."""
+    found = [(chapter.spec or chapter.summary)] + [run.trace.meta for run in chapter.runs]
+    pairs = [(str(f.get("robot") or ""), str(f.get("world") or "")) for f in found]
+    named = [(name_of(robot), world) for robot, world in pairs]
+    return list(dict.fromkeys(pair for pair in named if all(pair)))
 
 
 def read_chapters(inputs: Sequence[Path]) -> list[Chapter]:

@@ -17,16 +17,10 @@ from skillframe.robot.kinematics import inverse_kinematics
 from skillframe.robot.model import RobotModel
 from skillframe.world.convert import held
 from skillframe.world.plant import displacement
+from skillframe.world.quantities import QUANTITIES
 from skillframe.world.scene import Scene
 
-_VECTORS = [f"{p}.{k}_{a}" for p in ("start", "fixture", "grasp") for k in ("offset", "tilt") for a in "xyz"]
-_SENSOR = [f"sensor.{k}_bias_{a}" for k in ("force", "torque") for a in "xyz"]
-_ACTUATOR = [f"actuator.{k}" for k in ("supply_pressure", "deadband", "friction_scale", "delay")]
-QUANTITIES = frozenset(
-    [*_VECTORS, *_SENSOR, "sensor.force_noise", "sensor.torque_noise", "robot.mass_scale", "robot.joint_friction",
-     "robot.payload", "robot.nominal_payload", *_ACTUATOR, "world.friction"]
-)  # fmt: skip
-"""What can differ between the trials of one batch; other `world.*` parameters need a scene of their own."""
+_ACTUATOR = tuple(name for name in QUANTITIES if name.startswith("actuator."))
 NOT_NEGATIVE = frozenset({"sensor.force_noise", "sensor.torque_noise", "robot.joint_friction", "world.friction"})
 LARGEST = dict.fromkeys(("start", "fixture", "grasp", "sensor", "robot", "world"), 1e6)
 """Of any quantity in SI units, whatever it is; supply pressures alone are larger."""

@@ -141,6 +141,24 @@ class Task:
     believed: Vector = (0.004, 0.004, 0.0)
 
 
+class Way(NamedTuple):
+    """How far a task has got, for people: "inserted 58 of 60 mm".
+
+    Attributes:
+        word: what was done, "inserted".
+        of_m: the whole of it [m].
+        reached: how much of it is done, (N,) [m].
+    """
+
+    word: str
+    of_m: float
+    reached: Callable[[State], Float]
+
+    def told(self, reached_m: float | None) -> dict[str, Any]:
+        """As plain values for a trace: `word`, `of_m`, `reached_m` [m], which is None where it is not known."""
+        return {"word": self.word, "of_m": self.of_m, "reached_m": reached_m}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
     """Everything about a task but the robot.
@@ -156,6 +174,7 @@ class Scene:
         goal: predicate per trial.
         goal_error: distance to the goal: (N,) [m] and (N,) [rad].
         holder: lets a second arm hold the fixture; None: it always stands still.
+        way: how far a run has got, of a task that has a depth; None for any other.
         analytic: figures of closed-form theory for the report (e.g. {"largest_tilt": ...}).
         params: the parameters it was built from, plain values.
 
@@ -176,6 +195,7 @@ class Scene:
     sprung: tuple[Sprung, ...] = ()
     start_lift: Callable[[Float, Float], Float] = field(default=lambda offset, tilt: np.zeros(len(offset)))
     holder: Holder | None = None
+    way: Way | None = None
     analytic: dict[str, float] = field(default_factory=dict)
     params: dict[str, Any] = field(default_factory=dict)
 

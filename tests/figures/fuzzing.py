@@ -48,7 +48,7 @@ frame = "base"
 sign = "environment"
 point = [0.0, 0.0, 0.0]
 """
-SHORT = ["--world", "free", "--duration", "0.02"]
+SHORT = ["--world", "free", "--robot", "free_tool", "--duration", "0.02"]
 NUMERIC = [
     ["run", "{}/peg.skill.json", *SHORT, "--seed", "#"], ["run", "{}/peg.skill.json", *SHORT, "--rate", "#"],
     ["run", "{}/peg.skill.json", *SHORT, "--set", "start.offset_x=#"],

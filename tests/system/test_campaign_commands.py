@@ -33,7 +33,10 @@ VARY = """
 @pytest.fixture(scope="module")
 def demonstration(tmp_path_factory):
     path = tmp_path_factory.mktemp("demonstration") / "demo.npz"
-    assert run(["demonstration", "record", "--world", "valley", "--seed", "1", "--out", str(path)]) == 0
+    assert (
+        run(["demonstration", "record", "--world", "valley", "--robot", "free_tool", "--seed", "1", "--out", str(path)])
+        == 0
+    )
     return path
 
 

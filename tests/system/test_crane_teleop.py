@@ -53,6 +53,17 @@ def test_a_channel_that_cannot_be_used_is_refused_in_a_sentence_and_leaves_no_fi
 
 
 def test_options_of_machines_are_refused_for_a_robot_that_is_none(tmp_path, capsys):
-    command = ["demonstration", "record", "--world", "valley", "--angle", "0", "--out", str(tmp_path / "x.npz")]
+    command = [
+        "demonstration",
+        "record",
+        "--world",
+        "valley",
+        "--robot",
+        "free_tool",
+        "--angle",
+        "0",
+        "--out",
+        str(tmp_path / "x.npz"),
+    ]
     assert run(command) == 2
     assert "--angle: is for hydraulic machines" in capsys.readouterr().err

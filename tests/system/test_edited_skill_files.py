@@ -54,7 +54,7 @@ def judged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Any:
         where = (
             ["--world", "dual_peg", "--robot", "dual_panda"]
             if document.get("type") == "dual_arm"
-            else ["--world", "free"]
+            else ["--world", "free", "--robot", "free_tool"]
         )
         running = ["run", str(path), *where, "--duration", "0.02", "--out", str(tmp_path / "t.npz")]
         for command in (["skill", "show", str(path)], running):

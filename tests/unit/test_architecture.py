@@ -14,7 +14,7 @@ PACKAGE = ROOT / "skillframe"
 PLUGINS = sorted(p for p in (ROOT / "plugins").iterdir() if (p / "src").is_dir())
 
 FLOORS = [
-    {"errors", "paths", "frames", "config", "files", "documents", "npzfile"},
+    {"errors", "paths", "frames", "config", "files", "documents", "npzfile", "units", "fields", "homes"},
     {"demonstration", "conditioning", "skill", "records", "hookspecs"},
     {"handover", "sequence", "skillfile", "export", "robot", "registry", "skillsource"},
     {"control", "actuation"},

@@ -105,7 +105,7 @@ WRITERS: dict[str, Callable[[Path, Path], list[str]]] = {
     "a film": lambda demo, out: [*RUN, str(demo.with_name("s.json")), "--video", f"{out}.mp4"],
     "a trace": lambda demo, out: [*RUN, str(demo.with_name("s.json")), "--out", f"{out}.npz"],
 }
-RUN = ["run", "--world", "free", "--duration", "0.05"]
+RUN = ["run", "--world", "free", "--robot", "free_tool", "--duration", "0.05"]
 
 
 @pytest.fixture(scope="module")

@@ -59,7 +59,7 @@ def test_demonstrations_that_never_touch_teach_no_search(tmp_path, monkeypatch, 
 
 def test_a_search_that_never_touches_ends_with_exit_1_a_sentence_and_its_trace(document, tmp_path, capsys):
     above = ["--set", "start.offset_z=0.05", "--out", "run.npz", "--duration", "6"]
-    assert run(["run", "search.json", "--world", "peg_in_hole", *above]) == 1
+    assert run(["run", "search.json", "--world", "peg_in_hole", "--robot", "free_tool", *above]) == 1
     text = " ".join("".join(capsys.readouterr()).split())
     assert "touched no surface within" in text and "start the search nearer" in text
     assert (tmp_path / "run.npz").exists()

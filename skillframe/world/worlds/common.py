@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from skillframe.errors import InputError
 from skillframe.frames import Float, norm
-from skillframe.world.scene import Geom, State, Tool
+from skillframe.world.scene import Geom, State, Tool, Way
 
 TOOL_DOWN = (1.0, 0.0, 0.0, 0.0)
 """Attitude in the fixture frame of a tool that points down: half a turn about x (tool z = fixture -z)."""
@@ -34,6 +34,24 @@ def tilt_of(state: State) -> Float:
     """Angle (N,) [rad] between the tool's axis and the fixture's -z."""
     axis = state.tip.rotation[..., :, 2]
     return np.arctan2(norm(axis[..., :2]), -axis[..., 2])
+
+
+def insertion(depth: float, radius: float) -> Way:
+    """How deep the tip is in a hole that opens upwards at the fixture's origin.
+
+    A tip that is farther than the peg's radius from the hole's axis is beside the hole, at whatever height.
+
+    Args:
+        depth: of the hole [m].
+        radius: of the peg [m].
+    """
+
+    def reached(state: State) -> Float:
+        tip = state.tip.position
+        inside: Float = np.where(norm(tip[..., :2]) < radius, np.clip(-tip[..., 2], 0.0, None), 0.0)
+        return inside
+
+    return Way("inserted", depth, reached)
 
 
 def no_error(state: State) -> tuple[Float, Float]:

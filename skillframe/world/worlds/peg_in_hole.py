@@ -13,7 +13,7 @@ import numpy as np
 from skillframe.frames import Float, norm
 from skillframe.world.scene import Scene, State, Task
 from skillframe.world.shapes import filleted_peg, hole, shaft
-from skillframe.world.worlds.common import TOOL_DOWN, WRIST_TO_TIP, require, tilt_lift, tilt_of, tool
+from skillframe.world.worlds.common import TOOL_DOWN, WRIST_TO_TIP, insertion, require, tilt_lift, tilt_of, tool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,6 +71,7 @@ def build(params: PegParams) -> Scene:
         start_lift=tilt_lift(params.radius),
         goal=lambda state: state.tip.position[..., 2] < -params.done_depth,
         goal_error=lambda state: (distance(state), tilt_of(state)),
+        way=insertion(params.depth, params.radius),
         task=Task(
             direction=(0.0, 0.0, -1.0), aligned=TOOL_DOWN, hand="aligning",
             starts=({"start.tilt_y": float(np.deg2rad(8.0))}, {"start.tilt_y": float(np.deg2rad(-8.0))}),

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from skillframe.frames import Float, norm
 from skillframe.world.scene import Geom, Scene, State, Task
 from skillframe.world.shapes import FIXTURE_COLOUR, TOOL_COLOUR, filleted_peg, hole, shaft
-from skillframe.world.worlds.common import TOOL_DOWN, WRIST_TO_TIP, require, tilt_lift, tilt_of, tool
+from skillframe.world.worlds.common import TOOL_DOWN, WRIST_TO_TIP, insertion, require, tilt_lift, tilt_of, tool
 
 HALF_PLATE = 0.045
 WALL = 0.003  # of the rings around the pins' holes
@@ -90,6 +90,7 @@ def build(params: SocketParams) -> Scene:
         start_lift=tilt_lift(0.5 * params.spacing + params.radius),
         goal=plugged,
         goal_error=lambda state: (distance(state), tilt_of(state)),
+        way=insertion(params.depth, params.radius),
         task=Task(
             direction=(0.0, 0.0, -1.0), aligned=TOOL_DOWN, hand="aligning",
             starts=({"start.tilt_z": 0.0},), believed=(0.003, 0.003, float(np.deg2rad(5.0))),

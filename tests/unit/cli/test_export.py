@@ -50,7 +50,7 @@ def test_the_centre_of_compliance_can_be_elsewhere_than_where_it_was_learned(ski
         (["--to", "crisp", "--attitude", "1,1,0,0"], "not a unit quaternion"),
         (["--to", "crisp", "--phase", "2"], "no phase 2"),
         (["--to", "crisp", "--coc", "tpi"], "tpi"),
-        ([], "Missing '--to'"),
+        ([], "missing '--to'"),
     ],
 )
 def test_what_cannot_be_exported_is_one_sentence_and_no_file(

@@ -78,7 +78,8 @@ def test_an_interrupt_is_told_and_leaves_with_the_shell_s_code(command, capsys):
 def test_wrong_usage_is_exit_code_2(command, arguments, capsys):
     command(lambda: None)
     assert main.run(arguments) == 2
-    assert "Usage" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert said.startswith("error: ") and said.endswith(" --help)\n") and said.count("\n") == 1
 
 
 def test_an_unknown_command_is_refused_with_the_nearest_one(capsys):

@@ -1,12 +1,14 @@
+from collections import Counter
 from contextlib import redirect_stdout
 from io import StringIO
 
+import click
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from skillframe.cli.main import run
-from skillframe.cli.output import PAGE_WIDTH, progress, table
+from skillframe.cli.output import PAGE_WIDTH, laid_out, note, progress, quiet_option, table
 from skillframe.cli.reproduce import _show
 
 
@@ -30,10 +32,20 @@ WORDS = st.lists(st.text("abc-.", min_size=1, max_size=30), max_size=30).map(" "
 
 @given(
     st.lists(st.lists(WORDS, min_size=4, max_size=4), min_size=1, max_size=5), st.integers(40, 120)
-)  # headings fit in 40
-def test_a_table_of_a_width_keeps_it_in_a_pipe_and_every_cell_whole_in_its_column(
-    rows: list[list[str]], width: int
-) -> None:
+)  # "three: " and a word of 30 fit in 40
+def test_a_table_of_a_width_keeps_it_and_never_breaks_a_word(rows: list[list[str]], width: int) -> None:
+    lines = list(laid_out(("one", "two", "three", "four"), rows, width))
+    assert max(map(len, lines)) <= width
+    shown = Counter(word for line in lines[1:] for word in line.split())
+    headings = {"one:", "two:", "three:", "four:"}
+    assert Counter({w: n for w, n in shown.items() if w not in headings}) == Counter(
+        word for row in rows for cell in row for word in cell.split()
+    )
+
+
+@given(st.lists(st.lists(WORDS, min_size=4, max_size=4), min_size=1, max_size=5))
+def test_a_table_of_a_width_keeps_every_cell_in_its_column_where_its_words_fit(rows: list[list[str]]) -> None:
+    width = 4 * 30 + 3 * 2  # four words of the longest kind, and the gaps
     out = StringIO()
     with redirect_stdout(out):
         table(("one", "two", "three", "four"), rows, width)
@@ -56,3 +68,36 @@ def test_what_reproduce_says_in_a_pipe_fits_a_page(capsys: pytest.CaptureFixture
     _show(entries, as_json=False)
     assert run(["reproduce", "--list"]) == 0
     assert max(map(len, capsys.readouterr().out.splitlines())) <= PAGE_WIDTH
+
+
+@pytest.mark.parametrize("nothing_in_colour", [True, False])
+def test_headings_are_bold_on_a_terminal_unless_no_color_is_set(
+    monkeypatch: pytest.MonkeyPatch, nothing_in_colour: bool
+) -> None:
+    class Terminal(StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("NO_COLOR", "1" if nothing_in_colour else "")
+    monkeypatch.setenv("COLUMNS", "40")
+    out = Terminal()
+    with redirect_stdout(out):
+        table(("name", "what"), [["a", "some words that do not fit in a line of forty"]])
+    said = out.getvalue()
+    assert ("\x1b" in said) != nothing_in_colour
+    assert max(map(len, said.splitlines()[1:])) <= 40
+
+
+def test_quiet_work_says_nothing_of_how_far_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    @click.command()
+    @quiet_option
+    def work() -> None:
+        note("a note")
+        with progress("frames") as show:
+            show(1, 1)
+
+    work.main(["-q"], standalone_mode=False)
+    assert capsys.readouterr().err == ""
+    work.main([], standalone_mode=False)
+    assert capsys.readouterr().err == "a note\n1 of 1 frames\n"

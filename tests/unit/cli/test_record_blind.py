@@ -8,7 +8,7 @@ from skillframe.errors import InputError
 
 
 def run(*arguments):
-    return CliRunner().invoke(command, ["--teacher", "blind", "--out", "never.npz", *arguments])
+    return CliRunner().invoke(command, ["--teacher", "blind", "--robot", "free_tool", "--out", "never.npz", *arguments])
 
 
 @pytest.mark.parametrize("text", ["4,4", "a,b,c", "4,4,nan", ""])

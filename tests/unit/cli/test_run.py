@@ -13,6 +13,7 @@ from skillframe.report.sources import read_traces
 from skillframe.trace import Trace
 
 pytestmark = pytest.mark.needs_plugins
+FREE = ["--world", "free", "--robot", "free_tool"]
 
 
 @pytest.fixture
@@ -25,7 +26,7 @@ def skill(tmp_path: Path) -> str:
 def test_a_run_leaves_a_trace_a_page_and_a_film(skill: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     files = {"trace": tmp_path / "run.npz", "replay": tmp_path / "run.html", "video": tmp_path / "run.mp4"}
     options = ["--out", str(files["trace"]), "--replay", str(files["replay"]), "--video", str(files["video"])]
-    code = run(["run", skill, "--world", "free", "--duration", "0.1", *options, "--json"])
+    code = run(["run", skill, *FREE, "--duration", "0.1", *options, "--json"])
     said = json.loads(capsys.readouterr().out)
     assert code == (0 if said["success"] else 1)
     assert {what: said[what] for what in files} == {what: str(path) for what, path in files.items()}
@@ -36,7 +37,7 @@ def test_what_the_report_says_to_repeat_a_run_repeats_it(
     skill: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    options = ["--world", "free", "--coc", "wrist", "--set", "start.offset_x=0.002", "--seed", "3"]
+    options = [*FREE, "--coc", "wrist", "--set", "start.offset_x=0.002", "--seed", "3"]
     run(["run", skill, *options, "--duration", "0.3", "--rate", "50", "--out", "a.npz"])
     first = Trace.load(Path("a.npz"))
     (typed, _) = commands(read_traces([Path("a.npz")]))
@@ -70,7 +71,7 @@ def test_a_film_that_could_not_be_written_is_refused_before_the_run(
 def test_numbers_that_make_no_sense_are_refused(
     skill: str, capsys: pytest.CaptureFixture[str], options: list[str], message: str
 ) -> None:
-    assert run(["run", skill, "--world", "free", *options]) == 2
+    assert run(["run", skill, *FREE, *options]) == 2
     assert message in capsys.readouterr().err
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from skillframe.frames import Float, norm
 from skillframe.world.scene import Geom, Holder, Scene, State, Task, Tool
 from skillframe.world.shapes import TOOL_COLOUR, hole, shaft
-from skillframe.world.worlds.common import TOOL_DOWN, require, tilt_of
+from skillframe.world.worlds.common import TOOL_DOWN, insertion, require, tilt_of
 
 REACH = 0.15  # from the flange to tip and mouth [m]
 MASSES = (0.6, 0.8)  # of peg and hole with their mounts [kg]
@@ -76,6 +76,7 @@ def build(params: DualPegParams) -> Scene:
         start_quaternion=TOOL_DOWN,
         goal=inserted,
         goal_error=lambda state: (distance(state), tilt_of(state)),
+        way=insertion(params.depth, params.radius),
         task=Task(
             direction=(0.0, 0.0, -1.0), aligned=TOOL_DOWN, hand="aligning",
             starts=(_start(8.0, -0.006), _start(-8.0, 0.006)),

@@ -1,0 +1,146 @@
+"""`worlds`, `skills`, `settings`: what there is, in words and as JSON; and what a shell completes."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from skillframe.cli.main import cli, run
+from skillframe.cli.names import ROBOT
+from skillframe.homes import HOMES
+from skillframe.registry import registry
+from skillframe.world.placement import check_quantities
+from skillframe.world.quantities import QUANTITIES, VARIED
+
+
+def listed(capsys, *words):
+    capsys.readouterr()
+    assert run([*words, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_every_world_is_listed_with_its_summary_and_distribution(capsys):
+    rows = {row["name"]: row for row in listed(capsys, "worlds", "list")}
+    assert list(rows) == registry().names("world")
+    assert rows["valley"]["distribution"] == "skillframe" and rows["valley"]["summary"]
+    assert run(["worlds", "list"]) == 0
+    assert "peg_in_hole" in capsys.readouterr().out
+
+
+def test_a_world_is_shown_with_units_defaults_and_how_deep_it_is(capsys):
+    row = listed(capsys, "worlds", "show", "peg_in_hole")
+    depth = next(each for each in row["settings"] if each["name"] == "world.depth")
+    assert (depth["unit"], depth["default"], row["depth_m"]) == ("m", 0.06, 0.06)
+    assert run(["worlds", "show", "peg_in_hole"]) == 0
+    assert "inserted 60 mm is all the way" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("world", registry().names("world"))
+def test_every_world_can_be_shown(world, capsys):
+    assert listed(capsys, "worlds", "show", world)["name"] == world
+    assert run(["worlds", "show", world]) == 0
+
+
+def test_an_unknown_world_is_answered_with_the_nearest(capsys):
+    assert run(["worlds", "show", "peg_in_hold"]) == 2
+    assert "did you mean 'peg_in_hole'?" in capsys.readouterr().err
+
+
+@pytest.mark.needs_plugins
+def test_skills_and_coordinators_are_listed(capsys):
+    rows = {row["name"]: row for row in listed(capsys, "skills", "list")}
+    assert {"lmc", "policy", "search", "replay", "dmp", "gmr", "seds", "spiral", "random_walk", "dual_arm"} <= set(rows)
+    assert rows["lmc"]["learns"] is True and rows["dual_arm"]["kind"] == "coordinator"
+
+
+def test_every_setting_that_a_run_takes_is_listed_with_a_line_about_it(capsys):
+    rows = listed(capsys, "settings")
+    assert {row["name"] for row in rows if row["world"] is None} == QUANTITIES
+    worlds = {row["world"] for row in rows} - {None}
+    assert worlds == set(registry().names("world"))
+    assert all(row["about"] and "unit" in row and "default" in row for row in rows)
+    only = listed(capsys, "settings", "--world", "valley")
+    assert {row["world"] for row in only} == {None, "valley"}
+    assert next(row for row in only if row["name"] == "world.slope")["unit"] == "rad"
+
+
+def test_every_nominal_value_is_one_that_a_run_accepts():
+    for each in VARIED:
+        if each.nominal is not None:
+            check_quantities({each.name: [each.nominal]})
+
+
+def test_plugins_show_says_units(capsys):
+    assert run(["plugins", "show", "peg_in_hole"]) == 0
+    assert "--set world.clearance=0.00025 [m]\n" in capsys.readouterr().out
+
+
+def test_a_name_of_a_plugin_that_is_not_installed_comes_with_the_line_that_installs_it(
+    capsys, fresh_registry, monkeypatch
+):
+    monkeypatch.setattr("skillframe.registry._installed", lambda: [])
+    for words, line in (
+        (
+            ["learn", "x.npz", "--out", "x.json"],
+            "type: pip install -e plugins/lmc",
+        ),
+        (["segment", "x.npz", "--out", "x.json"], "type: pip install -e plugins/segmenter"),
+        (["run", "x.json", "--world", "dual_peg"], "type: pip install -e plugins/dualarm"),
+        (["learn", "x.npz", "--skill", "nothing", "--out", "x.json"], "no plug-in with a skill is installed"),
+    ):
+        assert run(words) == 2
+        assert line in capsys.readouterr().err
+    assert run(["skills", "list"]) == 0
+    assert "type: make install" in capsys.readouterr().out
+
+
+@pytest.mark.needs_plugins
+def test_every_name_that_a_plugin_of_ours_provides_has_its_home():
+    ours = {
+        each: plugin.name for plugin in registry().plugins for each in plugin.provides
+        if plugin.distribution.startswith("skillframe-") and not each.startswith("row:")
+    }  # fmt: skip
+    assert ours == {each: home for each, home in HOMES.items() if each != "skill:dual_arm"}
+
+
+def test_every_command_that_takes_a_robot_to_run_has_the_same_default():
+    for name, words in (("run", []), ("quickstart", []), ("demonstration", ["record"])):
+        command = cli.get_command(None, name)
+        for word in words:
+            command = command.get_command(None, word)
+        assert next(p for p in command.params if p.name == "robot").default == ROBOT == "panda"
+
+
+def completed(*words):
+    """What bash is told to complete the last of some words to."""
+    environment = {
+        **os.environ, "_SKILLFRAME_COMPLETE": "bash_complete", "COMP_WORDS": " ".join(["skillframe", *words]),
+        "COMP_CWORD": str(len(words)),
+    }  # fmt: skip
+    code = "from skillframe.cli.main import main; main([])"
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    return [line.partition(",")[2] for line in done.stdout.splitlines()]
+
+
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        (["plu"], ["plugins"]),
+        (["run", "x.json", "--robot", "pan"], ["panda"]),
+        (["run", "x.json", "--world", "peg"], ["peg_in_hole"]),
+        (["robots", "show", "hiab"], ["hiab_xs031"]),
+        (["worlds", "show", "val"], ["valley"]),
+        (["export", "x.json", "--to", "cri"], ["crisp"]),
+        (["worlds", "li"], ["list"]),
+    ],
+)
+def test_a_shell_completes_commands_and_names(words, names):
+    assert completed(*words) == names
+
+
+@pytest.mark.needs_plugins
+def test_a_shell_completes_what_plugins_provide():
+    assert completed("learn", "x.npz", "--skill", "dm") == ["dmp"]
+    assert completed("segment", "x.npz", "--segmenter", "wr") == ["wrench_hmm"]
