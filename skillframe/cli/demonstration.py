@@ -13,7 +13,7 @@ import click
 
 from skillframe.cli import names
 from skillframe.cli.numbers import NUMBER
-from skillframe.cli.output import emit_json
+from skillframe.cli.output import emit_json, note, quiet_option
 
 if TYPE_CHECKING:
     from skillframe.demonstration.audit import Audit
@@ -123,6 +123,7 @@ def _settings(options: dict[str, Any]) -> dict[str, Any]:
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="File to write: .npz (native) or .csv.")
 @reading_options
 @click.option("--json", "as_json", is_flag=True, help="The audit of what was written as JSON on stdout.")
+@quiet_option
 def convert(source: Path, out: Path, as_json: bool, **options: Any) -> int:
     """Read a recording of any layout and write a demonstration.
 
@@ -145,8 +146,10 @@ def convert(source: Path, out: Path, as_json: bool, **options: Any) -> int:
     demonstration = read_demonstration(source, **_settings(options))
     found = audit(demonstration)
     write_demonstration(demonstration, out)
-    for text in [*found.notes, *(f"warning: {w}" for w in found.warnings)]:
-        click.echo(text, err=True)
+    for text in found.notes:
+        note(text)
+    for text in found.warnings:
+        click.echo(f"warning: {text}", err=True)
     if as_json:
         emit_json({**found.as_json(), "written": str(out)})
     else:

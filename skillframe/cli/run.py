@@ -166,7 +166,7 @@ def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) ->
     judged = {key: _known(meta[key]) for key in JUDGED}
     for text in meta.get("notes") or []:
         note(f"note: {text}")
-    if files["trace"] is None:
+    if not any(files.values()):
         note("not saved; add --out run.npz")
     if as_json:
         named = {what: str(path) if path else None for what, path in files.items()}

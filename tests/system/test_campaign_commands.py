@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 
 import pytest
 
@@ -165,3 +166,31 @@ def test_usage_errors_exit_2(arguments, capsys, tmp_path, monkeypatch):
     captured = capsys.readouterr()
     assert captured.err
     assert "Traceback" not in captured.err
+
+
+def test_a_campaign_tells_its_outcome_as_json_names_robot_and_world_and_is_quiet_when_asked(campaign, tmp_path, capsys):
+    vary = '"fixture.offset_x" = { uniform = ["-30mm", "30mm"] }\n"start.tilt_z" = { choice = [0, "1deg"] }\n'
+    out = str(tmp_path / "results")
+    capsys.readouterr()
+    assert run(["campaign", "run", campaign(vary, trials=4), "--out", out, "--traces", "0", "--json", "-q"]) == 0
+    told = capsys.readouterr()
+    said = json.loads(told.out)
+    assert told.err == ""
+    assert (said["robot"], said["world"]) == ("free_tool", "valley")
+    assert said["results"] == str(tmp_path / "results" / "results.csv")
+    assert said["skills"].keys() == json.loads((tmp_path / "results" / "summary.json").read_text())["skills"].keys()
+    rows = table(tmp_path / "results")
+    assert all(-0.03 <= float(row["fixture.offset_x"]) < 0.03 for row in rows)
+    assert {float(row["start.tilt_z"]) for row in rows} <= {0.0, math.radians(1.0)}
+    assert run(["campaign", "resume", out, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["skills"] == said["skills"]
+    assert run(["campaign", "status", out]) == 0
+    assert "(free_tool in valley)" in capsys.readouterr().out
+    assert run(["campaign", "status", out, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["robot"] == "free_tool"
+
+
+def test_a_unit_of_another_dimension_in_a_campaign_is_refused(campaign, tmp_path, capsys):
+    path = campaign('"fixture.offset_x" = { uniform = ["-3deg", 0.1] }\n')
+    assert run(["campaign", "run", path, "--out", str(tmp_path / "results")]) == 2
+    assert "vary.fixture.offset_x.uniform[0]: expected a quantity in m, got -3deg" in capsys.readouterr().err

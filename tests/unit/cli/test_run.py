@@ -86,3 +86,53 @@ def test_a_run_that_diverges_exits_1_with_time_cause_and_trace(
     assert (tmp_path / "run.npz").exists()
     assert run(["run", skill, *light]) == 1
     assert "nan" not in capsys.readouterr().out
+
+
+@pytest.mark.slow  # a panda on a 60 mm way
+def test_a_run_names_its_robot_and_world_and_how_deep_it_got(
+    skill: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    where = ["--world", "peg_in_hole", "--set", "start.offset_x=1mm", "--duration", "1"]
+    run(["run", skill, *where, "--json"])
+    out, err = capsys.readouterr()
+    said = json.loads(out)
+    assert (said["robot"], said["world"]) == ("panda", "peg_in_hole")
+    assert (said["progress"]["word"], said["progress"]["of_m"]) == ("inserted", 0.06)
+    assert 0.0 <= said["progress"]["reached_m"] < 0.06
+    assert "not saved; add --out run.npz" in err
+    run(["run", skill, *where, "--out", str(tmp_path / "run.npz"), "--quiet"])
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert f"(panda in peg_in_hole, inserted {1000 * said['progress']['reached_m']:.0f} of 60 mm)" in out
+
+
+def test_a_run_where_nothing_is_deep_names_robot_and_world_alone(
+    skill: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run(["run", skill, *FREE, "--duration", "0.1"])
+    assert "(free_tool in free)\n" in capsys.readouterr().out
+
+
+def test_millimetres_typed_as_metres_are_warned_of_and_degrees_refused(
+    skill: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run(["run", skill, *FREE, "--duration", "0.02", "--set", "start.offset_y=8", "--quiet"])
+    assert "warning: start.offset_y is 8 m as typed; if millimetres are meant, type start.offset_y=8mm" in (
+        capsys.readouterr().err
+    )
+    assert run(["run", skill, *FREE, "--duration", "0.02", "--set", "start.tilt_y=5"]) == 2
+    assert "type start.tilt_y=5deg" in capsys.readouterr().err
+    run(["run", skill, *FREE, "--duration", "0.02", "--set", "start.offset_y=8mm", "--set", "start.tilt_y=5deg"])
+    assert "as typed" not in capsys.readouterr().err
+
+
+def test_a_report_names_robot_and_world(skill: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    trace, page = str(tmp_path / "run.npz"), str(tmp_path / "run.html")
+    run(["run", skill, *FREE, "--duration", "0.1", "--out", trace])
+    capsys.readouterr()
+    assert run(["report", trace, "--out", page]) == 0
+    assert capsys.readouterr().out.endswith(": free_tool in free\n")
+    assert run(["report", trace, "--out", page, "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["chapters"][0]["scenes"] == [{"robot": "free_tool", "world": "free"}]
+    assert (said["file"], said["bytes"]) == (page, Path(page).stat().st_size)
