@@ -173,7 +173,7 @@ def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) ->
         where = {"robot": meta["robot"], "world": meta["world"], "progress": meta["progress"]}
         click.echo(json.dumps({**outcome, **judged, **where, **named}, sort_keys=True))
         return
-    click.echo(f"{'success' if meta['success'] else 'failure: ' + meta['failure']} ({_scene(meta)})")
+    click.echo(f"success: {_scene(meta)}" if meta["success"] else f"failure: {meta['failure']}\n  {_scene(meta)}")
     ended = f"  ended after {meta['duration_s']:.2f} s ({meta['reason']})"
     if None not in outcome.values():
         missed, turned = _hundredths(meta["final_error_m"] * 1000), _hundredths(math.degrees(meta["final_error_rad"]))
