@@ -28,7 +28,9 @@ CORNERS = np.array([[2.5, 0.0, 1.0], [3.0, 0.0, 1.5], [3.5, 0.0, 1.0], [3.0, 0.0
 """The published diamond, in base [m], 5 s a leg."""
 LEG_S = 5.0
 ABOVE, PLATE, RADIUS = 0.95, 0.45, 0.05  # where the tool starts, the plate's top, the tool's sphere [m]
-LANDING_S, SLIDING_S = 4.0, 5.0
+NEAR, NEAR_S, LANDING_S, SLIDING_S = 0.02, 2.5, 3.0, 6.0
+"""The path stops so far above the plate [m], presses on from rest, and then slides [s]: a landing in full swing is above
+the machine's force limit in the simulator."""
 STROKE, SPEED = 0.4, 0.19  # along the plate [m], [m/s]
 FRICTION = 0.3
 
@@ -82,12 +84,13 @@ def diamond(time: float) -> tuple[Float, Float]:
 
 
 def press_and_slide(depth: float) -> Path:
-    """Down until the desired tool is `depth` below the plate's top [m], then to and fro along it."""
+    """Down to near the plate, on until the desired tool is `depth` below its top [m], then to and fro along it."""
+    above = ABOVE - PLATE - RADIUS - NEAR
 
     def place(time: float) -> Float:
         since = max(0.0, time - SLIDING_S)
         turn = SPEED / STROKE * (0.5 * since**2 if since < 1.0 else since - 0.5)
-        down = (PLATE + RADIUS - depth - ABOVE) * blend(time / LANDING_S)[0]
+        down = -above * blend(time / NEAR_S)[0] - (NEAR + depth) * blend((time - NEAR_S) / LANDING_S)[0]
         return np.array([STROKE * np.sin(turn), 0.0, down])
 
     def path(time: float) -> tuple[Float, Float]:
