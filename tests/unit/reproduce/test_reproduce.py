@@ -269,7 +269,7 @@ def test_the_committed_table_counts_as_passes_only_rows_that_can_fail():
 
 
 @pytest.mark.needs_plugins
-def test_each_committed_row_says_of_its_values_and_threshold_what_the_code_says(capsys):
+def test_each_committed_row_says_of_its_values_and_threshold_what_the_code_says(fresh_registry, capsys):
     assert run(["reproduce", "--list", "--json"]) == 0
     now = {each["row"]: each for each in json.loads(capsys.readouterr().out)}
     for each in json.loads(COMMITTED.read_text(encoding="utf-8")):
