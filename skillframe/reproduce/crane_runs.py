@@ -29,8 +29,8 @@ CORNERS = np.array([[2.5, 0.0, 1.0], [3.0, 0.0, 1.5], [3.5, 0.0, 1.0], [3.0, 0.0
 LEG_S = 5.0
 ABOVE, PLATE, RADIUS = 0.95, 0.45, 0.05  # where the tool starts, the plate's top, the tool's sphere [m]
 NEAR, NEAR_S, LANDING_S, SLIDING_S = 0.02, 2.5, 3.0, 6.0
-"""The path stops so far above the plate [m], presses on from rest, and then slides [s]: a landing in full swing is above
-the machine's force limit in the simulator."""
+"""The path stops so far above the plate [m], presses on from rest, and then slides [s]: a landing in full swing is
+above the machine's force limit in the simulator."""
 STROKE, SPEED = 0.4, 0.19  # along the plate [m], [m/s]
 FRICTION = 0.3
 
