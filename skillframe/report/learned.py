@@ -84,7 +84,8 @@ def _image(title: str, caption: str, svg: str) -> Markup:
 
 
 def _origin(document: Mapping[str, Any]) -> Markup:
-    sources = document.get("learned_from") or []
+    sources = document.get("learned_from")
+    sources = sources if isinstance(sources, list) else []
     names = [str(s.get("file", "?")) for s in sources if isinstance(s, Mapping)]
     if not names:
         return Markup("")

@@ -159,7 +159,8 @@ def stage_of(trace: Trace) -> Stage | None:
     """The stage of a trace, or None where it holds no drawn bodies."""
     bodies: list[dict[str, Any]] = trace.meta.get("bodies") or []
     poses = np.asarray(trace.body_position)
-    if not bodies or poses.ndim != 3 or poses.shape[:2] != (len(trace.time), len(bodies)) or not len(trace.time):
+    shapes = (len(trace.time), len(bodies), 3), (len(trace.time), len(bodies), 4)
+    if not bodies or not len(trace.time) or (poses.shape, np.shape(trace.body_quaternion)) != shapes:
         return None
     whole = tuple(tuple(m for m in map(mesh_of, body.get("geoms", ())) if len(m.faces)) for body in bodies)
     if not any(whole):

@@ -35,9 +35,9 @@ def trust_section(chapter: Chapter) -> Markup:
 
 
 def _map(chapter: Chapter, results: Results) -> Markup:
-    if not results.varied:
-        return note("Nothing varied between the trials, so there is no map.")
     ranked = influence(results)
+    if not ranked:
+        return note("Nothing varied between the trials, so there is no map.")
     limits = regions(chapter.scene, results.varied)
     pair = [name for name in results.varied if name in ranked[:2]]
     parts = [

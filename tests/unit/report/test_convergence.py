@@ -24,6 +24,14 @@ def test_the_quantity_without_influence_ranks_last(results):
     assert influence(results)[-1] == "world.friction"
 
 
+@pytest.mark.parametrize("value", ["nan", "0.1"])
+def test_a_quantity_with_fewer_than_two_values_in_the_table_is_not_drawn(tmp_path, value):
+    same = [{**row, "fixture.tilt_y": value} for row in rows(40, axes=3)]
+    write_csv(tmp_path / "results.csv", same, COLUMNS)
+    varied = ["world.friction", "fixture.tilt_y", "fixture.offset_x"]
+    assert set(influence(read_results(tmp_path / "results.csv", varied, PLAN))) == set(varied) - {"fixture.tilt_y"}
+
+
 def test_every_trial_is_in_one_cell_and_one_point(results):
     names = ["fixture.tilt_y", "fixture.offset_x"]
     drawn = cell_map(results, "peg.skill.json", names, [])

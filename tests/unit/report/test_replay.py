@@ -2,9 +2,11 @@ import base64
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from report_fakes import PLACE, trace
 
 from skillframe.frames import matrix_from_quaternion, norm, quaternion_from_matrix, rotation_matrix
+from skillframe.report.learned import _origin
 from skillframe.report.replay import MOST_FRAMES, continuous, frame_times, run_data, scene_data, scene_key
 from skillframe.report.stage import Camera, fitted, stage_of
 
@@ -80,3 +82,13 @@ def test_the_view_of_the_whole_scene_holds_all_of_it_and_wastes_little():
 
 def test_a_trace_without_bodies_has_no_stage():
     assert stage_of(trace(bodies=[])) is None
+
+
+@pytest.mark.parametrize("change", [lambda q: q[..., :3], lambda q: q[:, :-1], lambda q: q[..., 0]])
+def test_a_trace_whose_attitudes_do_not_fit_its_bodies_has_no_stage(change):
+    run = trace()
+    assert stage_of(replace(run, body_quaternion=change(run.body_quaternion))) is None
+
+
+def test_sources_of_a_skill_that_are_no_list_are_left_out():
+    assert not str(_origin({"learned_from": 2.5})) and "one" in str(_origin({"learned_from": [{"file": "a.npz"}]}))
