@@ -36,6 +36,7 @@ def fuzz(count: int, seed: str, folder: Path) -> subprocess.CompletedProcess[str
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.needs_plugins
 @pytest.mark.skipif(sys.platform != "linux", reason="forks and /proc are needed")
 def test_a_few_hundred_damaged_inputs_are_answered_with_0_1_or_2(tmp_path: Path) -> None:

@@ -4,8 +4,8 @@ from itertools import product
 
 import numpy as np
 import pytest
+from many_campaigns import IN_ORDER, KINDS, WAYS, count, seen, sobol
 from scipy.stats import binom
-from synthetic import IN_ORDER, KINDS, WAYS, count, seen, sobol
 
 from skillframe.campaign.sampling import draws
 from skillframe.campaign.spec import CampaignSpec

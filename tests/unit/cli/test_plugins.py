@@ -171,6 +171,7 @@ def test_the_core_s_own_plugin_conforms():
 
 
 @pytest.mark.needs_plugins
+@pytest.mark.slow
 def test_every_installed_plugin_conforms(fresh_registry):
     from skillframe.conformance import check_plugin
 

@@ -6,6 +6,8 @@ from skillframe.conformance import check_skill
 from skillframe.skill import per_trial
 from tests.unit.conformance.planted_skills import PLANTED, Glide, NeverEnds, Restarting, kind
 
+pytestmark = pytest.mark.slow  # each runs a check of seconds
+
 
 @pytest.fixture(autouse=True)
 def elsewhere(tmp_path, monkeypatch):

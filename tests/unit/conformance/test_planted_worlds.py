@@ -6,6 +6,8 @@ from skillframe.conformance import check_world
 from skillframe.registry import load_registry
 from tests.unit.conformance.planted_worlds import PLANTED, world
 
+pytestmark = pytest.mark.slow  # each runs a check of seconds
+
 
 @pytest.mark.parametrize("what", PLANTED)
 def test_a_world_with_a_defect_is_named_for_it(what, capsys):

@@ -26,7 +26,7 @@ def test_the_quantity_without_influence_ranks_last(results):
 
 @pytest.mark.parametrize("value", ["nan", "0.1"])
 def test_a_quantity_with_fewer_than_two_values_in_the_table_is_not_drawn(tmp_path, value):
-    same = [{**row, "fixture.tilt_y": value} for row in rows(40, axes=3)]
+    same = [[*row[:3], value, *row[4:]] for row in rows(40, axes=3)]
     write_csv(tmp_path / "results.csv", same, COLUMNS)
     varied = ["world.friction", "fixture.tilt_y", "fixture.offset_x"]
     assert set(influence(read_results(tmp_path / "results.csv", varied, PLAN))) == set(varied) - {"fixture.tilt_y"}
