@@ -80,10 +80,11 @@ def command(out: Path, robot: str, trials: int, workers: int, seed: int, as_json
     for name, _, template, _ in TASKS:
         text = template.format(trials=trials, robot=robot)
         write_whole(out / f"{name}.campaign.toml", text.encode())
-    steps, quiet = list(_steps(out, robot, workers, seed)), is_quiet()
+    steps, quiet = list[list[str]](), is_quiet()
     with redirect_stdout(sys.stderr) if as_json else nullcontext():
-        for number, step in enumerate(steps, start=1):
-            code = _type(step, number, quiet)
+        for step in _steps(out, robot, workers, seed):  # it copies files between its steps, so one at a time
+            steps.append(step)
+            code = _type(step, len(steps), quiet)
             if code:
                 return code
     spent = time.perf_counter() - began

@@ -1,0 +1,20 @@
+"""The quickstart, from an empty folder to its report, with few trials."""
+
+import json
+
+import pytest
+
+from skillframe.cli.main import run
+
+
+@pytest.mark.slow
+@pytest.mark.needs_plugins
+def test_the_quickstart_ends_in_a_report_and_tells_how_each_campaign_ended(tmp_path, capsys):
+    out = tmp_path / "demo"
+    assert run(["quickstart", "--out", str(out), "--trials", "4", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["report"] == str(out / "report.html") and (out / "report.html").is_file()
+    assert [each["world"] for each in told["campaigns"]] == ["valley", "peg_in_hole"]
+    assert all(skill["trials"] == 4 for each in told["campaigns"] for skill in each["skills"])
+    assert len(told["commands"]) == 9 and all(each.startswith("skillframe ") for each in told["commands"])
+    assert list((out / "peg" / "demonstrations").iterdir()), "the page shows what was shown"
