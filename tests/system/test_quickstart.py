@@ -15,6 +15,6 @@ def test_the_quickstart_ends_in_a_report_and_tells_how_each_campaign_ended(tmp_p
     told = json.loads(capsys.readouterr().out)
     assert told["report"] == str(out / "report.html") and (out / "report.html").is_file()
     assert [each["world"] for each in told["campaigns"]] == ["valley", "peg_in_hole"]
-    assert all(skill["trials"] == 4 for each in told["campaigns"] for skill in each["skills"])
+    assert all(skill["trials"] == 4 for each in told["campaigns"] for skill in each["skills"].values())
     assert len(told["commands"]) == 9 and all(each.startswith("skillframe ") for each in told["commands"])
     assert list((out / "peg" / "demonstrations").iterdir()), "the page shows what was shown"
