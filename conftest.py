@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import hypothesis
 import pytest
 
-from skillframe.registry import registry
+from skillframe.extend.registry import registry
 
 # A law that holds slowly on a loaded machine still holds; speed has its benchmarks.
 hypothesis.settings.register_profile("skillframe", deadline=None)

@@ -1,10 +1,12 @@
 """skillframe: teach robots compliant assembly from human demonstration, and prove the skill.
 
 The story in five files: `skillframe.demonstration.record`, the LMC plug-in's learner, `skillframe.skill`,
-`skillframe.world` and `skillframe.executor`. Importing the package loads none of the scientific libraries.
+`skillframe.world` and `skillframe.run.executor`. Importing the package loads none of the scientific libraries.
 """
 
 from typing import TYPE_CHECKING, Any
+
+from skillframe import doors
 
 __version__ = "0.1.0"
 
@@ -17,7 +19,7 @@ _PUBLIC = {
     "Skill": "skillframe.skill",
     "SkillframeError": "skillframe.errors",
     "Status": "skillframe.skill",
-    "hookimpl": "skillframe.hookspecs",
+    "hookimpl": "skillframe.extend.hookspecs",
     "per_trial": "skillframe.skill",
 }
 __all__ = ["__version__", *sorted(_PUBLIC)]
@@ -25,8 +27,8 @@ __all__ = ["__version__", *sorted(_PUBLIC)]
 if TYPE_CHECKING:
     from skillframe.demonstration.record import Demonstration as Demonstration
     from skillframe.errors import SkillframeError as SkillframeError
+    from skillframe.extend.hookspecs import hookimpl as hookimpl
     from skillframe.frames import Pose as Pose
-    from skillframe.hookspecs import hookimpl as hookimpl
     from skillframe.skill import Command as Command
     from skillframe.skill import Impedance as Impedance
     from skillframe.skill import Observation as Observation
@@ -42,3 +44,6 @@ def __getattr__(name: str) -> Any:
     from importlib import import_module
 
     return getattr(import_module(_PUBLIC[name]), name)
+
+
+doors.install()

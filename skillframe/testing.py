@@ -26,9 +26,9 @@ from skillframe.conformance.segmenters import check_segmenter
 from skillframe.conformance.skills import check_skill, example_document
 from skillframe.conformance.worlds import check_world
 from skillframe.demonstration.record import Demonstration
+from skillframe.extend.records import Document, SkillType
+from skillframe.extend.registry import registry
 from skillframe.frames import Float, Pose
-from skillframe.records import Document, SkillType
-from skillframe.registry import registry
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 
 __all__ = [
@@ -73,7 +73,7 @@ class SkillConformance:
         return registry().skill(self.skill_type)
 
     def _document(self) -> Document:
-        from skillframe.skillsource import learned
+        from skillframe.document.source import learned
 
         if self.document is not None:
             return self.document

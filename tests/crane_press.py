@@ -12,14 +12,14 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from skillframe.actuation.actuator import ActuatorSpec
-from skillframe.actuation.opening import open_actuators
-from skillframe.conditioning.momentum import Estimate, ForceEstimator
-from skillframe.control import vdc_actuator as act
-from skillframe.control.hydraulic import Measured, Terms
-from skillframe.control.vdc_reference import Task
 from skillframe.cosim.master import CosimSettings, Master
 from skillframe.cosim.plant import Motion
+from skillframe.fmu.actuator import ActuatorSpec
+from skillframe.fmu.opening import open_actuators
+from skillframe.machine.force.momentum import Estimate, ForceEstimator
+from skillframe.machine.law import vdc_actuator as act
+from skillframe.machine.law.hydraulic import Measured, Terms
+from skillframe.machine.law.vdc_reference import Task
 from skillframe.world.convert import SOLIMP, SOLREF, build_spec
 from skillframe.world.scene import Geom, Scene, Tool
 from skillframe.world.scene import Task as SceneTask

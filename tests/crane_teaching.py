@@ -12,16 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.demonstrate_machine import aimed, demonstration_of_machine, operate
 from skillframe.demonstration.record import Demonstration
+from skillframe.document.source import learned
+from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend.registry import registry
 from skillframe.frames import norm
-from skillframe.prepare import load_robot_model, load_world
-from skillframe.records import Document, LearnOptions
-from skillframe.registry import registry
 from skillframe.reproduce.crane_taught import LEARN
-from skillframe.skillsource import learned
-from skillframe.teleoperation import OperatorSettings
-from skillframe.trace import Trace
+from skillframe.run.prepare import load_robot_model, load_world
+from skillframe.run.trace import Trace
+from skillframe.teaching.machine_sessions import aimed, demonstration_of_machine, operate
+from skillframe.teaching.teleoperation import OperatorSettings
 
 SLIDE, OFF = 0.25, 0.12  # m: left to slide once landed, and from the surface at the start
 CORNER = np.array([0.5, 0.482])  # x, z of the tool in the world's corner [m]

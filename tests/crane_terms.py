@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 
-from skillframe.control.hydraulic import Terms
+from skillframe.machine.law.hydraulic import Terms
 
 
 def mass_rate_term(state):

@@ -1,7 +1,7 @@
 """The entries of `skills` in campaign.toml: "FILE.skill.json", or "TYPE:DEMO[,DEMO...][,KEY=VALUE...]".
 
-The second learns that type of skill from demonstrations on the spot. The syntax is that of `skillframe.skillsource`;
-here only the files are told apart, to be checked and copied.
+The second learns that type of skill from demonstrations on the spot. The syntax is that of
+`skillframe.document.source`; here only the files are told apart, to be checked and copied.
 """
 
 from __future__ import annotations

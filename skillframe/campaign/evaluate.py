@@ -22,13 +22,13 @@ from skillframe.campaign.rows import EXTRA, JUDGED, OUTCOME, TRACE, ChunkJob, Ro
 from skillframe.campaign.sampling import draws, trial_rngs
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.trouble import needed
-from skillframe.executor import QUANTITIES, simulate
-from skillframe.prepare import load_robot_model, load_world, prepare
-from skillframe.registry import registry
+from skillframe.document.source import load_skill
+from skillframe.extend.registry import registry
 from skillframe.robot.model import RobotModel
 from skillframe.robot.payload import with_payload
-from skillframe.skillsource import load_skill
-from skillframe.trace import Trace
+from skillframe.run.executor import QUANTITIES, simulate
+from skillframe.run.prepare import load_robot_model, load_world, prepare
+from skillframe.run.trace import Trace
 from skillframe.world.drawing import geom_json
 from skillframe.world.placement import check_quantities
 from skillframe.world.scene import Scene

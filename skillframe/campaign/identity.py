@@ -41,7 +41,7 @@ def identity(plugins: bool = True) -> Identity:
     """What this process is; with plug-ins it loads their entry modules, as any run does."""
     if not plugins:
         return Identity(environment(), platform.machine(), {}, {})
-    from skillframe.registry import registry
+    from skillframe.extend.registry import registry
 
     found: dict[str, list[Any]] = {}
     for plugin in registry().plugins:

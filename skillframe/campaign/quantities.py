@@ -14,9 +14,9 @@ from typing import Any
 
 from skillframe.campaign.axes import Axis, Value
 from skillframe.config import coerce
+from skillframe.config.fields import texts
+from skillframe.config.units import si, unit_of
 from skillframe.errors import InputError, UnknownName, suggest
-from skillframe.fields import texts
-from skillframe.units import si, unit_of
 from skillframe.world.quantities import QUANTITIES, UNITS
 
 GROUPS = ("start", "fixture", "grasp", "world", "robot", "actuator", "sensor")

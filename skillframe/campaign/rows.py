@@ -16,7 +16,7 @@ import numpy as np
 
 from skillframe.campaign.sampling import draws
 from skillframe.campaign.spec import CampaignSpec
-from skillframe.documents import shown
+from skillframe.files.documents import shown
 
 Row = dict[str, Any]
 MEASURES = ("duration_s", "peak_force_n", "final_error_m", "final_error_rad")

@@ -185,7 +185,7 @@ def flatten(table: Mapping[str, Any], where: str) -> dict[str, Any]:
 
 
 def _world_params(name: str) -> type:
-    from skillframe.registry import registry
+    from skillframe.extend.registry import registry
 
     return registry().world(name).params
 

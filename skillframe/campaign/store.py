@@ -24,9 +24,9 @@ from typing import Any
 from skillframe.campaign.rows import Row, cell, columns, decode, encode
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.verify import FIX, KEYS, KINDS, Line, check_rows, check_shape
-from skillframe.documents import parse_json
 from skillframe.errors import InputError
 from skillframe.files import write_whole
+from skillframe.files.documents import parse_json
 
 ROWS, RESULTS = "rows.jsonl", "results.csv"
 FORMAT, VERSION = "skillframe.campaign", 1

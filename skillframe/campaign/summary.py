@@ -14,8 +14,8 @@ from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.statistics import correction, holm
 from skillframe.campaign.store import FORMAT, VERSION, write_text
 from skillframe.campaign.validity import Basis, Validity, unbroken, validity_of
-from skillframe.documents import read_json
 from skillframe.errors import InputError
+from skillframe.files.documents import read_json
 
 SUMMARY = "summary.json"
 PEAKS = ("peak_force_n", "peak_force_10ms_n", "peak_force_filtered_n", "peak_torque_share", "peak_speed_share")

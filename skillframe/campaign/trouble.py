@@ -28,10 +28,10 @@ from typing import NamedTuple
 
 from skillframe.campaign.rows import ChunkJob, Row
 from skillframe.errors import InputError, MissingDependency, SkillframeError, UnknownName
-from skillframe.registry import BadPlugin, PluginConflict
+from skillframe.extend.registry import BadPlugin, PluginConflict
 
 Evaluate = Callable[[ChunkJob], list[Row]]
-FILES = frozenset(f"skillframe.actuation.{name}" for name in ("allow", "build", "extract", "foreign", "library"))
+FILES = frozenset(f"skillframe.fmu.{name}" for name in ("allow", "build", "extract", "foreign", "library"))
 """Modules that turn an FMU's file into something that runs; no draw reaches them."""
 OLD_SIGNS = (
     "no such file", "cannot be read", "MemoryError", "ImportError", "ModuleNotFoundError", "OSError", "PermissionError",
@@ -97,7 +97,7 @@ def said(error: BaseException) -> str:
 
 def is_trouble(error: BaseException) -> bool:
     """Whether an error is one of the environment; see the module."""
-    from skillframe.actuation.toolchain import CompilerFailed
+    from skillframe.fmu.toolchain import CompilerFailed
 
     always = (MemoryError, OSError, ImportError, UnknownName, MissingDependency, BadPlugin, PluginConflict, Unusable)
     if isinstance(error, (*always, CompilerFailed)):

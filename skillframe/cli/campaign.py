@@ -70,7 +70,7 @@ def run(file: Path, out: Path, as_json: bool, **settings: Any) -> int:
     from skillframe.campaign import evaluate
     from skillframe.campaign.folder import prepare
     from skillframe.campaign.spec import CampaignSpec
-    from skillframe.registry import registry
+    from skillframe.extend.registry import registry
 
     spec = CampaignSpec.from_toml(file)
     with _terminable() as code:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from skillframe.config.fields import settings_of
 from skillframe.errors import UnknownName
-from skillframe.fields import settings_of
 
 if TYPE_CHECKING:
-    from skillframe.registry import Registry
+    from skillframe.extend.registry import Registry
 
 
 def by_kind(provides: Sequence[str]) -> dict[str, list[str]]:

@@ -14,9 +14,9 @@ from skillframe.cli.output import emit_json
 from skillframe.config import parse_numbers
 
 if TYPE_CHECKING:
-    from skillframe.conditioning.kalman import WrenchModel
     from skillframe.conditioning.offline import Removed
     from skillframe.demonstration.record import Demonstration
+    from skillframe.signals.kalman import WrenchModel
 
 
 @click.command(name="condition")
@@ -54,8 +54,8 @@ def command(
       skillframe condition free_motion.npz --weight --free-air 0,6 --method none --out identified.npz
     """
     from skillframe.conditioning.offline import filter_wrench, remove_bias, smooth
-    from skillframe.demonstration.files import read_demonstration, write_demonstration
     from skillframe.demonstration.stalls import stalls
+    from skillframe.extend.reading import read_demonstration, write_demonstration
 
     demonstration = read_demonstration(file)
     for stall in stalls(demonstration):
@@ -105,8 +105,8 @@ def _model(demonstration: Demonstration, noise: tuple[float, float] | None, corn
     """The wrench model: from the recording, with what was given in its place."""
     import numpy as np
 
-    from skillframe.conditioning.kalman import WrenchModel
     from skillframe.conditioning.noise import model_of
+    from skillframe.signals.kalman import WrenchModel
 
     model, dt = model_of(demonstration), 1.0 / demonstration.rate
     corners = model.corner(dt) if corner is None else np.full(6, corner)

@@ -16,7 +16,7 @@ from skillframe.cli.numbers import NUMBER
 from skillframe.cli.output import emit_json, note, quiet_option
 
 if TYPE_CHECKING:
-    from skillframe.demonstration.audit import Audit
+    from skillframe.conditioning.audit import Audit
 
 _LAZY = {"record": "skillframe.cli.record"}
 
@@ -140,8 +140,8 @@ def convert(source: Path, out: Path, as_json: bool, **options: Any) -> int:
       skillframe demonstration convert demo.mcap --pose-topic /tool_pose --wrench-topic /ft --out demo.npz
       skillframe demonstration convert demo.bag --robot panda --wrench-topic /ft --wrench-frame tool --out demo.npz
     """
-    from skillframe.demonstration.audit import audit
-    from skillframe.demonstration.files import read_demonstration, write_demonstration
+    from skillframe.conditioning.audit import audit
+    from skillframe.extend.reading import read_demonstration, write_demonstration
 
     demonstration = read_demonstration(source, **_settings(options))
     found = audit(demonstration)
@@ -172,9 +172,9 @@ def check(files: tuple[Path, ...], as_json: bool, **options: Any) -> int:
       skillframe demonstration check demo1.npz demo2.npz
       skillframe demonstration check rim0.csv --columns t,px,py,pz,qx,qy,qz,qw,fx,fy,fz,tx,ty,tz --json
     """
-    from skillframe.demonstration.audit import audit, compared
-    from skillframe.demonstration.files import read_demonstration
+    from skillframe.conditioning.audit import audit, compared
     from skillframe.errors import SkillframeError
+    from skillframe.extend.reading import read_demonstration
 
     settings, demonstrations = _settings(options), []
     for path in files:

@@ -134,7 +134,7 @@ def _provided(provides: Sequence[str]) -> str:
 
 
 def _plugins() -> Iterator[Finding]:
-    from skillframe.registry import registry
+    from skillframe.extend.registry import registry
 
     for plugin in registry().plugins:
         fix = f"{plugin.error}; {sys.executable} -m pip install --upgrade {plugin.distribution}" if plugin.error else ""

@@ -11,7 +11,7 @@ from skillframe.cli import names
 from skillframe.cli.numbers import WHOLE
 
 if TYPE_CHECKING:
-    from skillframe.export.formats import Format
+    from skillframe.document.export import Format
     from skillframe.frames import Float
 
 
@@ -63,7 +63,7 @@ def command(
 
 def _list(as_json: bool) -> None:
     from skillframe.cli.output import emit_json, table
-    from skillframe.export.formats import FORMATS
+    from skillframe.document.export import FORMATS
 
     if as_json:
         emit_json(
@@ -79,12 +79,12 @@ def _list(as_json: bool) -> None:
 
 def _write(skill: Path, form: str, out: Path, phase: int | None, coc: str | None, attitude: str | None) -> Format:
     from skillframe.demonstration.record import resolve_point
+    from skillframe.document.export import FORMATS, settings_text
+    from skillframe.document.file import load
+    from skillframe.document.impedance import moving_impedance
     from skillframe.errors import UnknownName
-    from skillframe.export.formats import FORMATS, settings_text
-    from skillframe.export.impedance import moving_impedance
+    from skillframe.extend.registry import registry
     from skillframe.files import write_whole
-    from skillframe.registry import registry
-    from skillframe.skillfile import load
 
     if form not in FORMATS:
         raise UnknownName("format", form, list(FORMATS))

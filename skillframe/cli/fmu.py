@@ -30,7 +30,7 @@ def list_(as_json: bool) -> None:
     Example:
       skillframe fmu list --json
     """
-    from skillframe.actuation.library import built, fmu_folders
+    from skillframe.fmu.library import built, fmu_folders
 
     rows = built()
     if as_json:
@@ -53,9 +53,9 @@ def build(names: tuple[str, ...], as_json: bool) -> int:
     Example:
       skillframe fmu build hydraulic_cylinder
     """
-    from skillframe.actuation.foreign import build_from_sources
-    from skillframe.actuation.library import BuiltFmu, build_named, fmu_folders
     from skillframe.errors import SkillframeError
+    from skillframe.fmu.foreign import build_from_sources
+    from skillframe.fmu.library import BuiltFmu, build_named, fmu_folders
 
     rows: list[BuiltFmu] = []
     failed = 0
@@ -88,13 +88,13 @@ def check(file: str, as_json: bool, allow: bool) -> int:
     Example:
       skillframe fmu check actuator.fmu --json
     """
-    from skillframe.actuation.check import check_fmu
-    from skillframe.actuation.library import find_fmu
+    from skillframe.fmu.check import check_fmu
+    from skillframe.fmu.library import find_fmu
 
     path = find_fmu(file)
     found = check_fmu(path)
     if allow:
-        from skillframe.actuation.allow import allow as add
+        from skillframe.fmu.allow import allow as add
 
         click.echo(f"allowed: {add(path)}", err=True)
     if as_json:
@@ -106,9 +106,9 @@ def check(file: str, as_json: bool, allow: bool) -> int:
 
 def _print_check(path: Path, found: dict[str, Any]) -> None:
     """What was found, a line each; then what can be connected and set, with units and start values."""
-    from skillframe.actuation.check import confinement_in_words
-    from skillframe.actuation.inspection import inspect_fmu
     from skillframe.cli.output import table
+    from skillframe.fmu.check import confinement_in_words
+    from skillframe.fmu.inspection import inspect_fmu
 
     for key, value in {**found, "confinement": confinement_in_words(found["confinement"])}.items():
         text = ", ".join(map(str, value)) if isinstance(value, list) else str(value)
@@ -141,8 +141,8 @@ def simulate(
     Example:
       skillframe fmu simulate hydraulic_cylinder --set command=0.1 --stop 1 --step 0.001 --out out.csv
     """
-    from skillframe.actuation.record import simulate_to_csv
     from skillframe.config import parse_setting
+    from skillframe.fmu.record import simulate_to_csv
 
     ended = simulate_to_csv(
         file, stop, step, out, table=table, settings=dict(parse_setting(text) for text in settings), limit_s=timeout

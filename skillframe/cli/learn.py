@@ -51,11 +51,11 @@ def command(
       skillframe learn demo.npz --axes phase_start --set moving_m=0.002 --out snap.skill.json
     """
     from skillframe.config import parse_setting
-    from skillframe.demonstration.files import read_demonstration
-    from skillframe.records import LearnOptions
-    from skillframe.registry import registry
-    from skillframe.skillfile import save
-    from skillframe.skillsource import learned
+    from skillframe.document.file import save
+    from skillframe.document.source import learned
+    from skillframe.extend.reading import read_demonstration
+    from skillframe.extend.records import LearnOptions
+    from skillframe.extend.registry import registry
 
     kind = registry().behaviour(skill)
     options = LearnOptions(at=at, hand=hand, axes=axes, settings=dict(parse_setting(text) for text in settings))
@@ -74,7 +74,7 @@ def command(
 
 def _warn(demonstrations: Sequence[Demonstration]) -> None:
     """What looks wrong in the recordings, on stderr: a skill learned from a biased wrench is learned from the bias."""
-    from skillframe.demonstration.audit import audit, compared
+    from skillframe.conditioning.audit import audit, compared
 
     for found in compared(list(demonstrations), [audit(d) for d in demonstrations]):
         for text in found.warnings:

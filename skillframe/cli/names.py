@@ -39,7 +39,7 @@ def _robot_names() -> Iterable[str]:
 
 def _registered(*kinds: str) -> Callable[[], Iterable[str]]:
     def names() -> Iterable[str]:
-        from skillframe.registry import registry
+        from skillframe.extend.registry import registry
 
         return [name for kind in kinds for name in registry().names(kind)]
 
@@ -47,7 +47,7 @@ def _registered(*kinds: str) -> Callable[[], Iterable[str]]:
 
 
 def _formats() -> Iterable[str]:
-    from skillframe.export.formats import FORMATS
+    from skillframe.document.export import FORMATS
 
     return FORMATS
 

@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 from skillframe.config import LARGEST
-from skillframe.documents import LARGEST_WHOLE
+from skillframe.files.documents import LARGEST_WHOLE
 
 
 class _Finite(click.FloatRange):

@@ -15,7 +15,7 @@ from skillframe.errors import UnknownName
 
 if TYPE_CHECKING:
     from skillframe.conformance import Finding
-    from skillframe.registry import Plugin, Registry
+    from skillframe.extend.registry import Plugin, Registry
 
 
 @click.group()
@@ -41,7 +41,7 @@ def list_(as_json: bool) -> None:
     Example:
       skillframe plugins list --json
     """
-    from skillframe.registry import registry
+    from skillframe.extend.registry import registry
 
     known = registry()
     rows = distribution_rows(known)
@@ -78,7 +78,7 @@ def show(name: str, as_json: bool) -> None:
       skillframe plugins show skill:lmc --json
     """
     from skillframe.cli.catalog import found
-    from skillframe.registry import registry
+    from skillframe.extend.registry import registry
 
     row = found(registry(), name)
     if as_json:
@@ -145,7 +145,7 @@ def check(names: tuple[str, ...], as_json: bool) -> int:
       skillframe plugins check my_skill --json
     """
     from skillframe.conformance import check_plugin
-    from skillframe.registry import registry
+    from skillframe.extend.registry import registry
 
     known = registry()
     results = [(plugin, check_plugin(known, plugin)) for plugin in _chosen(known, names)]

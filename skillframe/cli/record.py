@@ -13,10 +13,10 @@ from skillframe.cli.numbers import COUNT, NOT_NEGATIVE, NUMBER, POSITIVE, SEED
 from skillframe.cli.output import note, progress, quiet_option
 
 if TYPE_CHECKING:
-    from skillframe.blind_teacher import BlindSettings
-    from skillframe.demonstrate import Recording
     from skillframe.robot.model import RobotModel
-    from skillframe.teacher import TeacherSettings
+    from skillframe.teaching.blind import BlindSettings
+    from skillframe.teaching.sessions import Recording
+    from skillframe.teaching.teacher import TeacherSettings
     from skillframe.world.scene import Scene
 
 QUIET_S = 5.0  # a recording that is over by then needs no progress
@@ -89,8 +89,8 @@ def command(
     """
     from skillframe.cli.settings import warn
     from skillframe.config import parse_setting
-    from skillframe.demonstration.files import check_writable
-    from skillframe.prepare import load_robot_model, load_world, split_settings
+    from skillframe.extend.reading import check_writable
+    from skillframe.run.prepare import load_robot_model, load_world, split_settings
 
     check_writable(out)
     given = dict(parse_setting(text) for text in settings)
@@ -124,10 +124,10 @@ def _recorded(
         given = {**operated, **dict(zip(("noise", "delay", "scale"), person, strict=True))}
         return _operated(machine, scene, teacher, given, common)
     if teacher == "blind":
-        from skillframe.demonstrate_blind import record_blind
+        from skillframe.teaching.blind_sessions import record_blind
 
         return record_blind(machine, scene, _blind(scene, *places), **common)
-    from skillframe.demonstrate import record
+    from skillframe.teaching.sessions import record
 
     return record(machine, scene, _seeing(teacher, *person), **common)
 
@@ -166,8 +166,8 @@ def _operated(
         raise InputError(
             f"--teacher {teacher}", f"nobody leads {name} by hand, it is a hydraulic machine", "use teleoperation"
         )
-    from skillframe.demonstrate_machine import aimed, record_operated
-    from skillframe.teleoperation import OperatorSettings
+    from skillframe.teaching.machine_sessions import aimed, record_operated
+    from skillframe.teaching.teleoperation import OperatorSettings
 
     angle, noise = given.pop("angle"), given.pop("noise")
     names = {"delay": "delay_s", "packet_rate": "packet_hz"}
@@ -184,7 +184,7 @@ def _given(value: object) -> bool:
 
 
 def _write(recording: Recording, out: Path, count: int) -> list[Path]:
-    from skillframe.demonstration.files import write_demonstration
+    from skillframe.extend.reading import write_demonstration
 
     files = [out] if count == 1 else [out.with_name(f"{out.stem}{i + 1}{out.suffix}") for i in range(count)]
     for path, demonstration in zip(files, recording.demonstrations, strict=True):
@@ -195,7 +195,7 @@ def _write(recording: Recording, out: Path, count: int) -> list[Path]:
 def _seeing(teacher: str, noise: float | None, delay: float | None, scale: float | None) -> TeacherSettings:
     from math import radians
 
-    from skillframe.teacher import TeacherSettings
+    from skillframe.teaching.teacher import TeacherSettings
 
     remote = teacher == "teleoperation"
     return TeacherSettings(
@@ -206,7 +206,7 @@ def _seeing(teacher: str, noise: float | None, delay: float | None, scale: float
 
 
 def _blind(scene: Scene, belief: str | None, centre: str | None) -> BlindSettings:
-    from skillframe.blind_teacher import BlindSettings
+    from skillframe.teaching.blind import BlindSettings
 
     spread = scene.task.believed if belief is None else _place(belief, "--belief")
     middle = (0.0, 0.0, 0.0) if centre is None else _place(centre, "--centre")

@@ -44,7 +44,7 @@ def command(
       skillframe reproduce 2 --set world.friction=0.3 --out rougher
     """
     from skillframe.config import parse_setting
-    from skillframe.registry import registry
+    from skillframe.extend.registry import registry
     from skillframe.reproduce.jobs import jobs_of
     from skillframe.reproduce.runner import run
 

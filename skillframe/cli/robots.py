@@ -64,7 +64,7 @@ def check(robot: str, as_json: bool) -> int:
       skillframe robots check my_robot.urdf --json
     """
     from skillframe.errors import SkillframeError
-    from skillframe.robot.audit import audit
+    from skillframe.machine.checks.audit import audit
     from skillframe.robot.spec import load_robot
 
     try:

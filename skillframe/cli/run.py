@@ -17,7 +17,7 @@ from skillframe.cli.numbers import POSITIVE, SEED
 from skillframe.cli.output import note, quiet_option
 
 if TYPE_CHECKING:
-    from skillframe.trace import Trace
+    from skillframe.run.trace import Trace
 
 LONGEST_S, RATE_HZ = 20.0, 100.0
 JUDGED = ("peak_force_filtered_n", "peak_force_10ms_n", "peak_torque_share", "peak_speed_share", "ended_by")
@@ -65,10 +65,10 @@ def command(
     from skillframe.cli.output import progress
     from skillframe.cli.settings import warn
     from skillframe.config import parse_setting
-    from skillframe.executor import simulate
-    from skillframe.prepare import load_robot_model, load_world, prepare, split_settings
+    from skillframe.document.source import load_skill
     from skillframe.robot.guesses import guess_note
-    from skillframe.skillsource import load_skill
+    from skillframe.run.executor import simulate
+    from skillframe.run.prepare import load_robot_model, load_world, prepare, split_settings
 
     if video is not None:
         from skillframe.report.video import check_film

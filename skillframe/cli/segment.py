@@ -13,7 +13,7 @@ from skillframe.cli.numbers import WHOLE
 from skillframe.cli.words import tell
 
 if TYPE_CHECKING:
-    from skillframe.records import Document
+    from skillframe.extend.records import Document
 
 
 @click.command()
@@ -58,11 +58,11 @@ def command(
       skillframe segment left.npz right.npz --set-boundary 2:1=3.45 --out valley.policy.json
     """
     from skillframe.config import parse_setting
-    from skillframe.demonstration.files import read_demonstration
-    from skillframe.records import LearnOptions
-    from skillframe.registry import registry
-    from skillframe.skillfile import save
-    from skillframe.skillsource import learned
+    from skillframe.document.file import save
+    from skillframe.document.source import learned
+    from skillframe.extend.reading import read_demonstration
+    from skillframe.extend.records import LearnOptions
+    from skillframe.extend.registry import registry
 
     registry().segmenter(segmenter)
     kind = registry().skill("policy")

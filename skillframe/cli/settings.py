@@ -9,11 +9,11 @@ import click
 
 from skillframe.cli import names
 from skillframe.cli.output import emit_json, table
-from skillframe.fields import settings_of
-from skillframe.units import doubt
+from skillframe.config.fields import settings_of
+from skillframe.config.units import doubt
 
 if TYPE_CHECKING:
-    from skillframe.records import WorldType
+    from skillframe.extend.records import WorldType
 
 
 @click.command()
@@ -29,7 +29,7 @@ def command(world: str | None, as_json: bool) -> None:
       skillframe settings --world peg_in_hole
       skillframe settings --json
     """
-    from skillframe.registry import registry
+    from skillframe.extend.registry import registry
 
     worlds = [registry().world(world)] if world is not None else list(registry().records("world"))
     rows = [*_of_trials(), *(row for record in worlds for row in of_world(record))]
@@ -64,7 +64,7 @@ def typed(value: Any) -> str:
 
 def warn(world: str, settings: Mapping[str, Any]) -> None:
     """Say on stderr which bare numbers look like millimetres or degrees."""
-    from skillframe.registry import registry
+    from skillframe.extend.registry import registry
 
     rows = {row["name"]: row for row in [*_of_trials(), *of_world(registry().world(world))]}
     for key, value in settings.items():

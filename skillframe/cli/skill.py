@@ -13,7 +13,7 @@ from skillframe.cli.output import emit_json
 from skillframe.cli.words import tell
 
 if TYPE_CHECKING:
-    from skillframe.records import Document, Illustration
+    from skillframe.extend.records import Document, Illustration
 
 _STYLE = """
 body { font: 16px/1.55 system-ui, sans-serif; color: #1d2025; background: #f6f7f9; margin: 0; }
@@ -47,8 +47,8 @@ def show(file: Path, as_json: bool) -> None:
     Example:
       skillframe skill show peg.skill.json
     """
-    from skillframe.registry import registry
-    from skillframe.skillfile import load
+    from skillframe.document.file import load
+    from skillframe.extend.registry import registry
 
     document = load(file)
     kind = registry().behaviour(document["type"])
@@ -80,9 +80,9 @@ def explain(file: Path, out: Path) -> None:
     Example:
       skillframe skill explain peg.skill.json --out peg.html
     """
+    from skillframe.document.file import load
+    from skillframe.extend.registry import registry
     from skillframe.files import write_whole
-    from skillframe.registry import registry
-    from skillframe.skillfile import load
 
     document = load(file)
     kind = registry().behaviour(document["type"])

@@ -27,7 +27,7 @@ def list_(as_json: bool) -> None:
       skillframe skills list --json
     """
     from skillframe.cli.catalog import rows_of
-    from skillframe.registry import registry
+    from skillframe.extend.registry import registry
 
     known = registry()
     rows = [*rows_of(known, "skill"), *rows_of(known, "coordinator")]

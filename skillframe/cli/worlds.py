@@ -31,7 +31,7 @@ def list_(as_json: bool) -> None:
       skillframe worlds list --json
     """
     from skillframe.cli.catalog import rows_of
-    from skillframe.registry import registry
+    from skillframe.extend.registry import registry
 
     rows = rows_of(registry(), "world")
     if as_json:
@@ -51,8 +51,8 @@ def show(world: str, as_json: bool) -> None:
       skillframe worlds show peg_in_hole
     """
     from skillframe.cli.settings import of_world, typed
-    from skillframe.registry import registry
-    from skillframe.world.catalogue import make_scene
+    from skillframe.extend.registry import registry
+    from skillframe.extend.worlds import make_scene
 
     record = registry().world(world)
     scene, settings = make_scene(record, {}), list(of_world(record))

@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.conditioning.kalman import WrenchModel, steady_gain
 from skillframe.demonstration.record import Demonstration
 from skillframe.demonstration.stalls import alive as alive_samples
 from skillframe.errors import InputError
 from skillframe.frames import Float
+from skillframe.signals.kalman import WrenchModel, steady_gain
 
 WINDOW, LEAST_SAMPLES = 0.25, 10
 FLOOR = np.repeat([1e-4, 1e-6], 3)

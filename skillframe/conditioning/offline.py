@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.conditioning.contact import first_free_air
-from skillframe.conditioning.kalman import WrenchFilter, WrenchModel
 from skillframe.conditioning.noise import LEAST_SAMPLES, model_of, noise_figures
 from skillframe.conditioning.payload import Payload, gravity_in_tool, identify_payload, refuse_absurd
 from skillframe.demonstration.record import Demonstration
@@ -17,6 +16,7 @@ from skillframe.demonstration.stalls import KEY as STALLS
 from skillframe.demonstration.stalls import alive, as_meta, stalls
 from skillframe.errors import InputError
 from skillframe.frames import Float, norm, rotate_spatial
+from skillframe.signals.kalman import WrenchFilter, WrenchModel
 
 METHODS = ("smoother", "filter", "none")
 LEAST_STRETCH = 0.2

@@ -21,8 +21,8 @@ from skillframe.conformance.play import (
     rows_of_command,
 )
 from skillframe.conformance.running import lead_of
+from skillframe.extend.records import Document, SkillType
 from skillframe.handover import asked
-from skillframe.records import Document, SkillType
 from skillframe.skill import Command, Skill, rows_of
 
 HELD_TICKS, HELD_DT = 400, (0.005, 0.01)

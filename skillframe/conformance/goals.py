@@ -10,8 +10,8 @@ import numpy as np
 
 from skillframe.conformance.play import Rows
 from skillframe.errors import SkillframeError
+from skillframe.extend.records import WorldType
 from skillframe.frames import Pose, matrix_from_quaternion, rotation_matrix
-from skillframe.records import WorldType
 
 if TYPE_CHECKING:
     from skillframe.world.scene import Scene, State, Task

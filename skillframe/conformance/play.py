@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.conformance.examples import random_observations
+from skillframe.extend.records import CoordinatorType, Document, SkillType
 from skillframe.frames import Float
 from skillframe.handover import asked
-from skillframe.records import CoordinatorType, Document, SkillType
 from skillframe.skill import Command, Observation, Skill
 
 TRIALS, TICKS, DT = 8, 25, 0.05  # 200 observations over 1.25 s

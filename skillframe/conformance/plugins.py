@@ -12,7 +12,7 @@ from skillframe.conformance.segmenters import check_segmenter
 from skillframe.conformance.skills import check_skill, skill_warnings
 from skillframe.conformance.watch import printed, watched
 from skillframe.conformance.worlds import check_world
-from skillframe.registry import Plugin, Registry
+from skillframe.extend.registry import Plugin, Registry
 
 CHECKS: Mapping[str, Callable[[Any], list[str]]] = {
     "skill": check_skill,

@@ -12,7 +12,7 @@ from skillframe.conformance.examples import example_demonstrations
 from skillframe.conformance.problems import attempt
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
-from skillframe.records import ReaderType
+from skillframe.extend.records import ReaderType
 
 ARRAYS = ("time", "position", "quaternion", "wrench")
 AGREEMENT = 1e-9  # s, m, 1, N: text that keeps fewer digits than this loses the recording's own resolution

@@ -18,9 +18,9 @@ from skillframe.conformance.loop import LateError, run
 from skillframe.conformance.play import arms_of
 from skillframe.conformance.watch import left_behind, watched
 from skillframe.errors import SkillframeError
+from skillframe.extend.records import Document, SkillType
 from skillframe.frames import Float, norm, rotation_vector
 from skillframe.handover import CommandCheck
-from skillframe.records import Document, SkillType
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 
 TRIALS, TICKS, DT = 4, 2000, 1e-3

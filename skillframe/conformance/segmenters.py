@@ -9,7 +9,7 @@ from typing import Any
 from skillframe.conformance.examples import example_demonstrations
 from skillframe.conformance.problems import attempt, json_problems
 from skillframe.demonstration.record import Demonstration
-from skillframe.records import Document, SegmenterType
+from skillframe.extend.records import Document, SegmenterType
 
 
 def check_segmenter(

@@ -28,8 +28,8 @@ from skillframe.conformance.play import (
 )
 from skillframe.conformance.problems import attempt, json_problems
 from skillframe.conformance.watch import watched
+from skillframe.extend.records import Document, SkillType
 from skillframe.frames import Float, norm, rotation_vector
-from skillframe.records import Document, SkillType
 from skillframe.skill import Command, Skill, Status, row
 
 LARGEST_STEP = (2e-3, 5e-3)  # m, rad in the first millisecond: more than any tool that starts at rest can follow
@@ -38,7 +38,7 @@ LARGEST_FEEDFORWARD = (1.0, 0.1)  # N, Nm at the first tick
 
 def example_document(skill: SkillType) -> Document:
     """A document to try a type with: its own example, or one learned from the example demonstrations."""
-    from skillframe.skillsource import learned
+    from skillframe.document.source import learned
 
     return learned(skill, example_demonstrations()) if skill.example is None else skill.example()
 

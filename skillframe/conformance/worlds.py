@@ -17,8 +17,8 @@ import numpy as np
 from skillframe.conformance import goals, trials
 from skillframe.conformance.problems import attempt
 from skillframe.conformance.watch import left_behind, watched
+from skillframe.extend.records import WorldType
 from skillframe.frames import Pose, matrix_from_quaternion
-from skillframe.records import WorldType
 
 if TYPE_CHECKING:
     from skillframe.world.scene import Geom, Scene, State, Tool

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.actuation.actuator import Actuators
 from skillframe.cosim.plant import Float
 from skillframe.errors import SkillframeError
+from skillframe.fmu.actuator import Actuators
 
 WARN, REFUSE = 0.3, 1.0
 SPEED = 1e-3  # m/s, of the trial motion

@@ -22,10 +22,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.actuation.actuator import Actuators
 from skillframe.cosim.bond import bond_work, relative_residual
 from skillframe.cosim.plant import Float, Motion, Plant
 from skillframe.errors import SkillframeError
+from skillframe.fmu.actuator import Actuators
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,10 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.files import BAG_FACTS
 from skillframe.demonstration.mcap import verify
 from skillframe.errors import InputError, MissingDependency
 
+BAG_FACTS = "metadata.yaml"
+"""What the folder of a ROS 2 bag holds beside its files."""
 MAGIC = {".bag": b"#ROSBAG V2.0\n", ".db3": b"SQLite format 3\0", ".mcap": b"\x89MCAP0\r\n"}
 TREES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 

@@ -18,8 +18,8 @@ from skillframe.demonstration.options import ReadOptions, read_options
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
 from skillframe.files import write_whole
+from skillframe.files.npz import json_member, read_arrays
 from skillframe.frames import Float
-from skillframe.npzfile import json_member, read_arrays
 
 FORMAT, VERSION = "skillframe.demonstration", 1
 

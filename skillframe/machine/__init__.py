@@ -1,5 +1,1 @@
-"""Hydraulic machines: the loop for them, its calibration in the air, their FMUs and what their traces hold."""
-
-from skillframe.machine.loop import MachineLoop, simulate_machine
-
-__all__ = ["MachineLoop", "simulate_machine"]
+"""The hydraulic machine: its cylinders, its control law, its force estimate, and what is checked before it runs."""

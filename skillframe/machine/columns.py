@@ -15,7 +15,7 @@ import numpy as np
 from skillframe.frames import Float
 
 if TYPE_CHECKING:
-    from skillframe.actuation.actuator import Actuators
+    from skillframe.fmu.actuator import Actuators
 
 __all__ = ["EnergyBill", "columns", "supply_pressures"]
 

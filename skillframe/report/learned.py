@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from skillframe.errors import SkillframeError
-from skillframe.records import SkillType
-from skillframe.registry import registry
+from skillframe.extend.records import SkillType
+from skillframe.extend.registry import registry
 from skillframe.report.markup import Markup, data_uri, escape, figure, join, note, number, table, tag
 from skillframe.report.sources import Chapter
 

@@ -9,7 +9,7 @@ import numpy as np
 from skillframe.frames import Float
 from skillframe.report.markup import Markup
 from skillframe.report.plots import Curve, events_of, time_plot
-from skillframe.trace import Trace
+from skillframe.run.trace import Trace
 
 STROKES = ("c1", "c2", "c3", "s4")
 PRESSURE_CAPTION = "Measured behind the filters; full: piston side, dashed: rod side."

@@ -15,7 +15,7 @@ from skillframe.demonstration.record import Demonstration
 from skillframe.frames import Float, matrix_from_quaternion, norm, rotation_vector
 from skillframe.report.markup import Markup, figure, join, tag
 from skillframe.report.svg import LEFT, Axes, envelope, legend, padded, picture, text
-from skillframe.trace import Trace
+from skillframe.run.trace import Trace
 
 AXES = ("x", "y", "z")
 LEAST_RANGE = {"N": 1.0, "Nm": 0.05, "mm": 0.5, "°": 0.5}

@@ -18,7 +18,7 @@ from skillframe.frames import Float, norm
 from skillframe.report.markup import Markup, tag
 from skillframe.report.shapes import Mesh
 from skillframe.report.stage import Camera, Stage
-from skillframe.trace import Trace
+from skillframe.run.trace import Trace
 
 FRAME_RATE, MOST_FRAMES = 30.0, 450
 

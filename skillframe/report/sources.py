@@ -19,10 +19,10 @@ from skillframe.campaign.validity import Plan, plan_of
 from skillframe.campaign.verify import edited_results
 from skillframe.config import read_toml
 from skillframe.demonstration.record import Demonstration
-from skillframe.documents import read_json, read_text
 from skillframe.errors import InputError, SkillframeError
+from skillframe.files.documents import read_json, read_text
 from skillframe.report.results import Results, read_results
-from skillframe.trace import Trace
+from skillframe.run.trace import Trace
 
 CAMPAIGN = ("campaign.toml", "results.csv", "summary.json")
 PARTS = (*CAMPAIGN, "skills", "traces", "demonstrations")
@@ -248,7 +248,7 @@ def read_demonstration(path: Path) -> Demonstration:
     Raises:
         InputError: no reader, or the reader refuses it.
     """
-    from skillframe.registry import registry
+    from skillframe.extend.registry import registry
 
     for record in registry().records("reader"):
         if path.name.endswith(tuple(record.suffixes)):

@@ -15,7 +15,7 @@ import numpy as np
 
 from skillframe.frames import Float, matrix_from_quaternion, norm, rotate, unit
 from skillframe.report.shapes import Mesh, merge, mesh_of, section
-from skillframe.trace import Trace
+from skillframe.run.trace import Trace
 
 CUT_NORMAL = np.array([0.0, -1.0, 0.0])
 FIXTURE = "fixture"

@@ -19,7 +19,7 @@ from skillframe.frames import Float, norm
 from skillframe.report.raster import Canvas, Image, blank, paint, picture
 from skillframe.report.shapes import Mesh
 from skillframe.report.stage import Camera, Stage, stage_of
-from skillframe.trace import Trace
+from skillframe.run.trace import Trace
 
 FRAME_RATE = 25
 FAR_WIDTH, CLOSE_WIDTH, HEIGHT, STRIP = 400, 560, 480, 80

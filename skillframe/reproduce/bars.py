@@ -9,7 +9,7 @@ a bar that is met by 54 of 60 is missed by 9 of 10 one time in three.
 from __future__ import annotations
 
 from skillframe.campaign.statistics import clopper_pearson
-from skillframe.records import Verdict
+from skillframe.extend.records import Verdict
 
 ROUNDING = 1e-9
 

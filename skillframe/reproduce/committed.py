@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from skillframe.documents import read_json
+from skillframe.files.documents import read_json
 from skillframe.paths import data_dirs
 
 FOLDER = "docs/reproduced"

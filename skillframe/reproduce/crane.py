@@ -10,11 +10,11 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from skillframe.records import RowResult, RowRun, RowType
+from skillframe.extend.records import RowResult, RowRun, RowType
 
 if TYPE_CHECKING:
-    from skillframe.executor import Result
     from skillframe.frames import Float
+    from skillframe.run.executor import Result
 
 START = (math.pi / 4, -math.pi / 2, 0.5)
 PRESSURES = {"lift": (130.0e5, 30.9148e5), "tilt": (90.0e5, 35.7169e5)}  # [Pa], published start values
@@ -138,7 +138,7 @@ def _holding(job: RowRun) -> RowResult:
     """Net piston forces at rest against those of the published pressures."""
     import numpy as np
 
-    from skillframe.robot.loops import ClosedChain
+    from skillframe.robot.chain import ClosedChain
     from skillframe.robot.model import load_model
     from skillframe.robot.payload import with_payload
     from skillframe.robot.spec import load_robot

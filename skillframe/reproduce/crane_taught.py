@@ -16,15 +16,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.demonstrate_machine import aimed, record_operated
 from skillframe.demonstration.record import Demonstration
-from skillframe.executor import Result, simulate
+from skillframe.document.source import learned
+from skillframe.extend.records import Document, Illustration, LearnOptions, RowResult, RowRun
+from skillframe.extend.registry import registry
 from skillframe.frames import Float
-from skillframe.prepare import load_robot_model, load_world, prepare
-from skillframe.records import Document, Illustration, LearnOptions, RowResult, RowRun
-from skillframe.registry import registry
-from skillframe.skillsource import learned
-from skillframe.teleoperation import OperatorSettings
+from skillframe.run.executor import Result, simulate
+from skillframe.run.prepare import load_robot_model, load_world, prepare
+from skillframe.teaching.machine_sessions import aimed, record_operated
+from skillframe.teaching.teleoperation import OperatorSettings
 from skillframe.world.placement import nominal_fixture
 
 ROBOT, WORLD = "hiab_xs031", "pallets"

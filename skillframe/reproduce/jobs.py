@@ -11,8 +11,8 @@ from typing import Any
 
 from skillframe.config import coerce
 from skillframe.errors import UnknownName
-from skillframe.records import RowType
-from skillframe.registry import Registry
+from skillframe.extend.records import RowType
+from skillframe.extend.registry import Registry
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,8 +17,8 @@ from time import perf_counter
 from typing import Any, NamedTuple
 
 from skillframe.errors import SkillframeError
-from skillframe.records import RowRun
-from skillframe.registry import registry
+from skillframe.extend.records import RowRun
+from skillframe.extend.registry import registry
 from skillframe.reproduce import store
 from skillframe.reproduce.ending import Ending, end_all, end_with_parent
 from skillframe.reproduce.jobs import Job

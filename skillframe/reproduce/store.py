@@ -11,10 +11,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from skillframe.documents import read_json
 from skillframe.errors import InputError
+from skillframe.extend.records import RowResult, RowType
 from skillframe.files import write_whole
-from skillframe.records import RowResult, RowType
+from skillframe.files.documents import read_json
 from skillframe.reproduce.jobs import Job
 
 ROWS, TABLE = "rows", "reproduce.json"

@@ -1,7 +1,7 @@
 """Can this robot be used for dynamics? The mass audit behind `skillframe robots check`.
 
 Fatal: a zero or singular mass matrix, a moving body whose inertia is impossible or too large for its size (contract:
-`robots check`). Each comes with the robot.toml lines that mend it. Everything else is a warning.
+`robots check`). Each comes with the robot.toml lines that fix it. Everything else is a warning; `skillframe.machine.checks.audit` adds those of driven machines.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from skillframe.robot.link_checks import (
     oversized_inertias,
     toy_masses,
 )
-from skillframe.robot.machine_checks import machine_warnings
 from skillframe.robot.mass_matrix import ILL_CONDITIONED, SINGULAR, joint_of, smallest_pivots
 from skillframe.robot.model import ROOT_JOINT, RobotModel, load_model
 from skillframe.robot.problems import Problem
@@ -61,7 +60,6 @@ def audit(robot: RobotSpec | RobotModel) -> Audit:
         *missing_inertias(robot, given, bodies),
         *toy_masses(robot, given),
         *joint_warnings(robot),
-        *machine_warnings(robot),
     ]
     return Audit(
         usable=not any(p.severity == "fatal" for p in problems),

@@ -24,7 +24,7 @@ from skillframe.robot.payload import published_inertia, with_payload
 if TYPE_CHECKING:
     import casadi as ca
 
-    from skillframe.robot.loops import ClosedChain
+    from skillframe.robot.chain import ClosedChain
 
 
 def loaded_inertias(robot: RobotModel, masses: Float) -> tuple[str, list[pin.Inertia]]:

@@ -11,9 +11,9 @@ import pinocchio as pin
 from skillframe.errors import SkillframeError
 from skillframe.frames import quaternion_from_matrix, rotation_vector
 from skillframe.robot.bodies import rigid_bodies
+from skillframe.robot.chain import ClosedChain
 from skillframe.robot.kinematics import tool_pose
 from skillframe.robot.link_checks import given_inertias
-from skillframe.robot.loops import ClosedChain
 from skillframe.robot.model import RobotModel
 from skillframe.robot.spec import RobotSpec
 

@@ -14,7 +14,7 @@ from typing import Literal
 from skillframe.config import build, read_toml
 from skillframe.errors import InputError, UnknownName
 from skillframe.paths import data_dirs
-from skillframe.robot.machine_spec import Actuation, Gains, Loop, Payload, Sensors, impossible
+from skillframe.robot.driven import Actuation, Gains, Loop, Payload, Sensors, impossible
 from skillframe.robot.numbers import LARGEST
 
 Vector = tuple[float, float, float]

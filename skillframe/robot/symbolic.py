@@ -19,7 +19,7 @@ import numpy as np
 import pinocchio as pin
 
 from skillframe.frames import Float
-from skillframe.robot.loops import ClosedChain, Cylinder
+from skillframe.robot.chain import ClosedChain, Cylinder
 
 ROUNDING = 1e-14
 Expression = Any  # casadi.SX

@@ -16,7 +16,7 @@ import mujoco
 import pinocchio as pin
 
 from skillframe.errors import UnknownName
-from skillframe.robot.machine_spec import Loop
+from skillframe.robot.driven import Loop
 
 TIME_CONSTANTS = 2.2  # time steps; MuJoCo refuses less than 2
 SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)

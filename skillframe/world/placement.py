@@ -10,11 +10,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from skillframe.actuation.delay import require_delay
 from skillframe.errors import InputError, UnknownName
 from skillframe.frames import Float, Pose, matrix_from_quaternion
 from skillframe.robot.kinematics import inverse_kinematics
 from skillframe.robot.model import RobotModel
+from skillframe.signals.delay import require_delay
 from skillframe.world.convert import held
 from skillframe.world.plant import displacement
 from skillframe.world.quantities import QUANTITIES

@@ -20,9 +20,9 @@ COUNT, SECONDS, WINDOW_MS = 32, 4.0, 250
 
 
 def setting():
-    from skillframe.executor import Setup
-    from skillframe.prepare import load_robot_model
     from skillframe.reproduce import crane_runs
+    from skillframe.run.executor import Setup
+    from skillframe.run.prepare import load_robot_model
 
     start = np.array([crane_runs.FIXTURE[0], 0.0, 0.7])
     scene = crane_runs.scene(start, plate=True)
@@ -31,7 +31,7 @@ def setting():
 
 def loop(count):
     """A loop after its calibration in the air."""
-    from skillframe.machine import MachineLoop
+    from skillframe.run.machine import MachineLoop
     from tests.laws.pushing import Push
 
     stiffness, damping = np.diag([1e5] * 3 + [0.0] * 3), np.diag([5e4] * 3 + [1.0] * 3)
@@ -67,23 +67,23 @@ def timed(count, seconds=SECONDS):
 def uncompiled():
     """The loop as a machine without a compiler runs it that was given a built FMU: interpreter, ctypes."""
     stack = fresh_banks()
-    stack.enter_context(mock.patch("skillframe.control.generated.build_library", return_value=None))
-    stack.enter_context(mock.patch("skillframe.actuation.driver.compiled_step", return_value=None))
+    stack.enter_context(mock.patch("skillframe.machine.law.generated.build_library", return_value=None))
+    stack.enter_context(mock.patch("skillframe.fmu.driver.compiled_step", return_value=None))
     return stack
 
 
 def reference_actuators():
     """The loop as it is without a compiler and without a built FMU: interpreter, law and reference cylinders."""
     stack = fresh_banks()
-    for module in ("build", "opening"):
-        stack.enter_context(mock.patch(f"skillframe.actuation.{module}.find_compiler", return_value=None))
+    for module in ("fmu.build", "machine.cylinder.opening"):
+        stack.enter_context(mock.patch(f"skillframe.{module}.find_compiler", return_value=None))
     return stack
 
 
 def fresh_banks():
     """Banks that were opened before count as not there, here and afterwards."""
     stack = ExitStack()
-    stack.enter_context(mock.patch("skillframe.machine.bank._KEPT", {}))
+    stack.enter_context(mock.patch("skillframe.machine.cylinder.bank._KEPT", {}))
     return stack
 
 
@@ -98,7 +98,7 @@ def second_run():
 
 def rows(show):
     """Print the crane's rows with `run.show`."""
-    from skillframe.actuation.toolchain import find_compiler
+    from skillframe.fmu.toolchain import find_compiler
 
     if find_compiler() is None:
         print("crane: no C compiler here")

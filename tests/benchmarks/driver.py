@@ -11,8 +11,8 @@ H = 1e-3
 
 def bank(facts, **options):
     """Three cylinders at rest in one bank."""
-    from skillframe.actuation.actuator import ActuatorSpec
-    from skillframe.actuation.driver import FmuBank
+    from skillframe.fmu.actuator import ActuatorSpec
+    from skillframe.fmu.driver import FmuBank
 
     made = FmuBank([ActuatorSpec(fmu="hydraulic_cylinder")] * 3, [facts] * 3, **options)
     made.u[:, 0], made.u[:, 1] = 0.05, 0.3
@@ -22,7 +22,7 @@ def bank(facts, **options):
 
 def list_interface(facts):
     """Three instances driven as fmpy's documentation does: lists in, lists out."""
-    from skillframe.actuation.bindings import Instance
+    from skillframe.fmu.bindings import Instance
 
     kind = "Real" if facts.fmi_version.startswith("2") else "Float64"
     instances = [Instance(facts, str(i)) for i in range(3)]
@@ -65,9 +65,9 @@ def swinging(facts, dead_volume):
 
     They are the very ones at which its pressures are within 10 Pa of scipy's Radau in the tests.
     """
-    from skillframe.actuation.actuator import ActuatorSpec
-    from skillframe.actuation.driver import FmuBank
-    from tests.unit.actuation.fmu_fakes import Swing
+    from skillframe.fmu.actuator import ActuatorSpec
+    from skillframe.fmu.driver import FmuBank
+    from tests.unit.fmu.fmu_fakes import Swing
 
     volumes = {"dead_volume_a": dead_volume, "dead_volume_b": dead_volume}
     bank = FmuBank([ActuatorSpec(fmu="hydraulic_cylinder", parameters=volumes)], [facts])
@@ -88,8 +88,8 @@ def swinging(facts, dead_volume):
 
 def rows(show):
     """Print the driver's rows with `run.show`."""
-    from skillframe.actuation.inspection import inspect_fmu
-    from skillframe.actuation.library import find_fmu
+    from skillframe.fmu.inspection import inspect_fmu
+    from skillframe.fmu.library import find_fmu
 
     for version in (2, 3):
         facts = inspect_fmu(find_fmu("hydraulic_cylinder", version=version))

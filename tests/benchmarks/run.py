@@ -93,11 +93,11 @@ def single(name, bound):
 
 def two_arms():
     """A batch of 32 insertions with two arms in contact, each trial against real time."""
-    from skillframe.arms import simulate_arms
     from skillframe.errors import UnknownName
-    from skillframe.executor import Setup
-    from skillframe.prepare import load_robot_model, load_world
-    from skillframe.registry import registry
+    from skillframe.extend.registry import registry
+    from skillframe.run.arms import simulate_arms
+    from skillframe.run.executor import Setup
+    from skillframe.run.prepare import load_robot_model, load_world
     from tests.laws.runs import generators
 
     try:
@@ -159,7 +159,7 @@ def memory_of_long_run():
     def note(now):
         marks[round(now)] = status("VmRSS")
 
-    from skillframe.executor import simulate
+    from skillframe.run.executor import simulate
     from tests.laws.runs import generators
 
     skill = Push(DOWN, stiffness, speed=speed, stall=False)
@@ -185,11 +185,11 @@ def command_line():
 
 
 def learning():
-    from skillframe.demonstrate import record
     from skillframe.errors import UnknownName
-    from skillframe.records import LearnOptions
-    from skillframe.registry import registry
-    from skillframe.teacher import TeacherSettings
+    from skillframe.extend.records import LearnOptions
+    from skillframe.extend.registry import registry
+    from skillframe.teaching.sessions import record
+    from skillframe.teaching.teacher import TeacherSettings
 
     try:
         learn = registry().skill("lmc").learn

@@ -70,7 +70,7 @@ def fit_seconds() -> tuple[float, str]:
 def segment_seconds() -> tuple[float, float]:
     """`skillframe segment` on three files, in a process that has imported what it needs; their mean length [s]."""
     from skillframe.cli import main
-    from skillframe.demonstration.files import write_demonstration
+    from skillframe.extend.reading import write_demonstration
 
     taught = [m.demonstration for m in quasistatic.demonstrations("valley", 7)]
     with tempfile.TemporaryDirectory() as folder, redirect_stdout(StringIO()):
@@ -84,11 +84,11 @@ def segment_seconds() -> tuple[float, float]:
 
 def step_seconds(count: int) -> float:
     """Filter and LMC of a running policy: CPU seconds per tick and trial, the ends of windows included."""
+    from skillframe.document.source import learned
+    from skillframe.extend.records import LearnOptions
+    from skillframe.extend.registry import registry
     from skillframe.frames import Pose
-    from skillframe.records import LearnOptions
-    from skillframe.registry import registry
     from skillframe.skill import Observation
-    from skillframe.skillsource import learned
 
     kind = registry().skill("policy")
     document = learned(kind, [m.demonstration for m in quasistatic.demonstrations("ls", 7)], LearnOptions())
@@ -115,7 +115,7 @@ def step_seconds(count: int) -> float:
 def measure(show: Callable[..., None]) -> None:
     """Print the figures with `show` of `run.py`, each beside its bound."""
     from skillframe.errors import UnknownName
-    from skillframe.registry import registry
+    from skillframe.extend.registry import registry
 
     try:
         registry().segmenter("wrench_hmm")

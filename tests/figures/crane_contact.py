@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from skillframe.reproduce import crane_runs
-from skillframe.robot.machine_spec import Gains, Sensors
+from skillframe.robot.driven import Gains, Sensors
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot
 from skillframe.world.scene import Geom, Sprung

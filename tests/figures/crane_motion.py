@@ -11,13 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.actuation.actuator import ActuatorSpec
-from skillframe.actuation.opening import open_actuators
-from skillframe.control import vdc_actuator as act
-from skillframe.control.hydraulic import Measured, Reference
 from skillframe.cosim import CosimSettings, Master
-from skillframe.robot.loops import ClosedChain
-from skillframe.world.coupled import CoupledPlant
+from skillframe.fmu.actuator import ActuatorSpec
+from skillframe.fmu.opening import open_actuators
+from skillframe.machine.coupled import CoupledPlant
+from skillframe.machine.law import vdc_actuator as act
+from skillframe.machine.law.hydraulic import Measured, Reference
+from skillframe.robot.chain import ClosedChain
 from skillframe.world.placement import fixture_poses
 from skillframe.world.plant import Plant
 from tests.crane_press import ENCODER, PRESSURE, SENSOR_CORNER, Filter

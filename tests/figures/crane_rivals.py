@@ -15,11 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.conditioning.rates import RateFilter
-from skillframe.control import vdc_actuator as act
-from skillframe.control.hydraulic import HydraulicGains
-from skillframe.control.hydraulic_compiled import CompiledLaw
-from skillframe.control.vdc_baselines import LADDER, ModelBased, PistonPid, tune
+from skillframe.machine.law import vdc_actuator as act
+from skillframe.machine.law.hydraulic import HydraulicGains
+from skillframe.machine.law.hydraulic_compiled import CompiledLaw
+from skillframe.machine.law.vdc_baselines import LADDER, ModelBased, PistonPid, tune
+from skillframe.signals.rates import RateFilter
 from tests.figures.crane_motion import DT, Truth, begin, believed, figures, free_reference, known, run
 from tests.laws.vdc_loop import leg, task
 

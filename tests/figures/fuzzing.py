@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from skillframe.cli.main import run as run_command
-from skillframe.demonstration.files import write_demonstration
 from skillframe.demonstration.record import Demonstration
+from skillframe.extend.reading import write_demonstration
 from skillframe.testing import example_demonstrations
 from tests.oracle.fuzz import Case
 from tests.unit.demonstration.bags_written import ENDINGS, poses, wrenches, write_bag
@@ -206,8 +206,8 @@ def campaigns(folder: Path, skill: bytes) -> list[Case]:
 
 def rows_of_papers(folder: Path) -> list[Case]:
     """A row as the store keeps it; damaged, it is shown or computed again, which is cut."""
-    from skillframe.records import RowResult
-    from skillframe.registry import registry
+    from skillframe.extend.records import RowResult
+    from skillframe.extend.registry import registry
     from skillframe.reproduce import store
     from skillframe.reproduce.jobs import jobs_of
 
@@ -227,7 +227,7 @@ def fmus() -> list[Case]:
     """An FMU that is checked; without a C compiler there is none."""
     if shutil.which("cc") is None:
         return []
-    from skillframe.actuation.library import find_fmu
+    from skillframe.fmu.library import find_fmu
 
     content = Path(find_fmu("hydraulic_cylinder")).read_bytes()
     return [

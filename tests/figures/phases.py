@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from skillframe.demonstration.record import Demonstration
-from skillframe.records import Document, LearnOptions
-from skillframe.registry import registry
+from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend.registry import registry
 
 MISSED_S, FALSE_S = 0.30, 0.35
 Interval = tuple[float, float]

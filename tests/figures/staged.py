@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from skillframe.demonstrate import record
 from skillframe.demonstration.record import Demonstration
 from skillframe.frames import Float, matrix_from_quaternion, rotation_vector
-from skillframe.prepare import load_robot_model, load_world
-from skillframe.teacher import TeacherSettings
+from skillframe.run.prepare import load_robot_model, load_world
+from skillframe.teaching.sessions import record
+from skillframe.teaching.teacher import TeacherSettings
 
 MOVED_M, TURNED_RAD = 1e-3, float(np.deg2rad(1.0))
 

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.demonstrate import record
 from skillframe.demonstration.record import Demonstration
+from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend.registry import registry
 from skillframe.frames import Float
-from skillframe.prepare import load_robot_model, load_world
-from skillframe.records import Document, LearnOptions
-from skillframe.registry import registry
-from skillframe.teacher import TeacherSettings
+from skillframe.run.prepare import load_robot_model, load_world
+from skillframe.teaching.sessions import record
+from skillframe.teaching.teacher import TeacherSettings
 from skillframe.world.sensors import SensorSettings
 
 SEED = 20261121

@@ -9,8 +9,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from skillframe.actuation.toolchain import find_compiler
-from skillframe.control.hydraulic import HydraulicGains
+from skillframe.fmu.toolchain import find_compiler
+from skillframe.machine.law.hydraulic import HydraulicGains
 from skillframe.reproduce import crane_runs
 from tests.figures.crane_contact import ENCODER, precise, pressed, true_path
 from tests.figures.crane_motion import DT, Truth, figures, run

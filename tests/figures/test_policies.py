@@ -16,13 +16,13 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from skillframe.demonstrate import record
-from skillframe.executor import Result, simulate
-from skillframe.prepare import load_robot_model, load_world, prepare
-from skillframe.records import Document, LearnOptions
-from skillframe.registry import registry
-from skillframe.skillsource import learned
-from skillframe.teacher import TeacherSettings
+from skillframe.document.source import learned
+from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend.registry import registry
+from skillframe.run.executor import Result, simulate
+from skillframe.run.prepare import load_robot_model, load_world, prepare
+from skillframe.teaching.sessions import record
+from skillframe.teaching.teacher import TeacherSettings
 
 pytestmark = [pytest.mark.needs_plugins]
 POLICIES, STARTS, EACH = 6, 9, 3

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from skillframe.executor import Result, simulate
-from skillframe.prepare import load_robot_model, load_world, prepare
-from skillframe.records import Document, LearnOptions
-from skillframe.registry import registry
-from skillframe.skillsource import learned
+from skillframe.document.source import learned
+from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend.registry import registry
+from skillframe.run.executor import Result, simulate
+from skillframe.run.prepare import load_robot_model, load_world, prepare
 from tests.figures.teaching import SEED, row, taught
 
 pytestmark = [pytest.mark.figures, pytest.mark.needs_plugins]

@@ -17,9 +17,9 @@ from skillframe_segmenter.model import from_document
 from skillframe_segmenter.observer import follow
 from skillframe_segmenter.windows import cut_all
 
-from skillframe.demonstration.files import read_demonstration
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
+from skillframe.extend.reading import read_demonstration
 from skillframe.frames import Float
 from skillframe.paths import recordings_dir
 from tests.figures import quasistatic as made

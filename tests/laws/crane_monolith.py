@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from skillframe.actuation import equations as eq
-from skillframe.actuation.library import fmu_folders
-from skillframe.actuation.table import read_table, rows
+from skillframe.fmu.library import fmu_folders
+from skillframe.fmu.table import read_table, rows
+from skillframe.machine.cylinder import equations as eq
 from tests.laws.crane_plants import crane
 
 TOLERANCES = [1e-12] * 3 + [1e-11] * 3 + [1e-11] * 3 + [1e-9] * 3 + [1e-2] * 9 + [1e-14] * 3

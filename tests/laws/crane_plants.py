@@ -6,14 +6,14 @@ from functools import cache
 
 import numpy as np
 
-from skillframe.actuation.actuator import ActuatorSpec
-from skillframe.actuation.opening import open_actuators
 from skillframe.cosim import CosimSettings, Master, Motion
-from skillframe.robot.loops import ClosedChain
+from skillframe.extend.worlds import make_scene, world_types
+from skillframe.fmu.actuator import ActuatorSpec
+from skillframe.fmu.opening import open_actuators
+from skillframe.machine.coupled import CoupledPlant
+from skillframe.robot.chain import ClosedChain
 from skillframe.robot.model import attach_payload, load_model
 from skillframe.robot.spec import load_robot
-from skillframe.world.catalogue import make_scene, world_types
-from skillframe.world.coupled import CoupledPlant
 from skillframe.world.placement import fixture_poses
 from skillframe.world.plant import Plant
 

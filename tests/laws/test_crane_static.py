@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from skillframe.actuation.toolchain import find_compiler
+from skillframe.fmu.toolchain import find_compiler
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.laws.crane_exudyn import Crane
 from tests.laws.crane_plants import START, ChainPlant, areas, coupled, crane, cylinders, simulated, tooled

@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from skillframe.control import vdc
-from skillframe.control.vdc_adaptation import projected_rate
-from skillframe.control.vdc_body import mass_matrix, regressor
-from skillframe.control.vdc_flows import power_flows
-from skillframe.control.vdc_reference import Path, Task, required_motion
 from skillframe.errors import InputError
+from skillframe.machine.law import vdc
+from skillframe.machine.law.vdc_adaptation import projected_rate
+from skillframe.machine.law.vdc_body import mass_matrix, regressor
+from skillframe.machine.law.vdc_flows import power_flows
+from skillframe.machine.law.vdc_reference import Path, Task, required_motion
 from skillframe.robot.model import load_model
 from skillframe.robot.payload import with_payload
 from skillframe.robot.spec import load_robot
@@ -103,7 +103,7 @@ def test_virtual_power_flows_cancel_at_every_cut(seed):
 
 
 def test_without_the_eyes_forces_the_flows_do_not_cancel(monkeypatch):
-    monkeypatch.setattr("skillframe.control.vdc_flows.eye_forces", lambda *_: np.zeros((2, 3)))
+    monkeypatch.setattr("skillframe.machine.law.vdc_flows.eye_forces", lambda *_: np.zeros((2, 3)))
     with pytest.raises(AssertionError):
         assert_flows_cancel(flows(0))
 

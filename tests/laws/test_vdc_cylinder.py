@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from skillframe.control import vdc
-from skillframe.control import vdc_actuator as act
-from skillframe.control.vdc_adaptation import projected_rate, relative_bounds
-from skillframe.control.vdc_reference import required_motion
 from skillframe.errors import InputError
+from skillframe.machine.law import vdc
+from skillframe.machine.law import vdc_actuator as act
+from skillframe.machine.law.vdc_adaptation import projected_rate, relative_bounds
+from skillframe.machine.law.vdc_reference import required_motion
 from skillframe.robot.spec import load_robot
 from tests.laws.vdc_loop import START, crane, growth, leg, runge_kutta, task
 

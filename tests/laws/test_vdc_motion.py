@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from skillframe.control.vdc_baselines import ModelBased, PistonPid, tune
-from skillframe.control.vdc_reference import Path
 from skillframe.errors import InputError
+from skillframe.machine.law.vdc_baselines import ModelBased, PistonPid, tune
+from skillframe.machine.law.vdc_reference import Path
 from tests.laws.vdc_loop import START, crane, task
 from tests.laws.vdc_motion import Vdc, believed, diamond, figures, run
 

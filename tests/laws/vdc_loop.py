@@ -4,10 +4,10 @@ from functools import cache
 
 import numpy as np
 
-from skillframe.control import vdc
-from skillframe.control.vdc_adaptation import projected_rate, relative_bounds
-from skillframe.control.vdc_reference import Path, Task, required_motion
-from skillframe.robot.loops import ClosedChain
+from skillframe.machine.law import vdc
+from skillframe.machine.law.vdc_adaptation import projected_rate, relative_bounds
+from skillframe.machine.law.vdc_reference import Path, Task, required_motion
+from skillframe.robot.chain import ClosedChain
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot
 

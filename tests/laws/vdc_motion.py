@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.control.vdc import VdcController, VdcGains
-from skillframe.control.vdc_baselines import ModelBased, PistonPid
-from skillframe.control.vdc_reference import Path, required_motion
-from skillframe.robot.feasibility import capacity
-from skillframe.robot.loops import ClosedChain, step
+from skillframe.machine.checks.feasibility import capacity
+from skillframe.machine.law.vdc import VdcController, VdcGains
+from skillframe.machine.law.vdc_baselines import ModelBased, PistonPid
+from skillframe.machine.law.vdc_reference import Path, required_motion
+from skillframe.robot.chain import ClosedChain, step
 from tests.laws.vdc_loop import CORNERS, crane, leg, task
 
 DT = 1e-3

@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from skillframe.actuation.build import build_fmu
-from skillframe.registry import registry
+from skillframe.document.file import save
+from skillframe.document.source import learned
+from skillframe.extend.registry import registry
+from skillframe.fmu.build import build_fmu
 from skillframe.robot.spec import load_robot
-from skillframe.skillfile import save
-from skillframe.skillsource import learned
 from skillframe.testing import example_demonstrations
 
 CRANE = load_robot("hiab_xs031").folder

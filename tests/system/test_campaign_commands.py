@@ -7,7 +7,7 @@ import math
 import pytest
 
 from skillframe.cli.main import run
-from skillframe.trace import Trace
+from skillframe.run.trace import Trace
 
 pytestmark = pytest.mark.needs_plugins
 

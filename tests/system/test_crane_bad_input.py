@@ -4,12 +4,12 @@ import re
 
 import pytest
 
-from skillframe.actuation.toolchain import find_compiler
 from skillframe.cli.main import run
-from skillframe.trace import Trace
+from skillframe.fmu.toolchain import find_compiler
+from skillframe.run.trace import Trace
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.system.crane_fakes import MISCHIEF, crane, driven_by, fake_cylinder, skill
-from tests.unit.actuation.fmu_fakes import repacked
+from tests.unit.fmu.fmu_fakes import repacked
 
 pytestmark = [
     pytest.mark.slow,

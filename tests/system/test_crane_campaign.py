@@ -6,12 +6,12 @@ import json
 import numpy as np
 import pytest
 
-from skillframe.actuation.toolchain import find_compiler
 from skillframe.cli.main import run
-from skillframe.executor import Setup
-from skillframe.machine import MachineLoop
-from skillframe.prepare import load_robot_model, load_world
+from skillframe.fmu.toolchain import find_compiler
 from skillframe.reproduce.crane_runs import MOVING, Follow, diamond
+from skillframe.run.executor import Setup
+from skillframe.run.machine import MachineLoop
+from skillframe.run.prepare import load_robot_model, load_world
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.system.worn_cylinder import campaign
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from skillframe.conditioning.momentum import ForceEstimator
+from skillframe.machine.force.momentum import ForceEstimator
 from tests.crane_press import DT, LANDED, Press, crane, cylinders, replay
 from tests.crane_scores import case, score, window
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from skillframe.cli.main import run
-from skillframe.demonstration.files import read_demonstration
+from skillframe.extend.reading import read_demonstration
 from tests.crane_teaching import LEARN, margin
 
 CRANE = ["demonstration", "record", "--world", "pallets", "--robot", "hiab_xs031", "--teacher", "teleoperation"]

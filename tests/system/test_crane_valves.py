@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from skillframe.executor import Setup
-from skillframe.machine import MachineLoop
-from skillframe.prepare import load_robot_model, load_world
 from skillframe.reproduce.crane_runs import MOVING, Follow
+from skillframe.run.executor import Setup
+from skillframe.run.machine import MachineLoop
+from skillframe.run.prepare import load_robot_model, load_world
 
 pytestmark = pytest.mark.slow
 WORN = {

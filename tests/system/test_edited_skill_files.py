@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from skillframe.cli.main import run
-from skillframe.registry import registry
-from skillframe.skillsource import learned
+from skillframe.document.source import learned
+from skillframe.extend.registry import registry
 from skillframe.testing import example_demonstrations
 from tests.oracle import edits
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from skillframe.actuation.toolchain import find_compiler
+from skillframe.fmu.toolchain import find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "how-to" / "own-fmu.md").read_text(encoding="utf-8")

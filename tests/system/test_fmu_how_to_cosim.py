@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from skillframe.actuation.toolchain import find_compiler
+from skillframe.fmu.toolchain import find_compiler
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "how-to" / "co-simulation.md").read_text(encoding="utf-8")
 

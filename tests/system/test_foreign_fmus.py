@@ -7,17 +7,17 @@ import re
 import numpy as np
 import pytest
 
-from skillframe.actuation.actuator import ActuatorSpec
-from skillframe.actuation.child import SandboxLimits
-from skillframe.actuation.library import find_fmu
-from skillframe.actuation.opening import open_actuators
-from skillframe.actuation.sandbox import SandboxBank
-from skillframe.actuation.toolchain import find_compiler
 from skillframe.cli.main import run
 from skillframe.cosim import CosimSettings, Master, Motion
+from skillframe.fmu.actuator import ActuatorSpec
+from skillframe.fmu.child import SandboxLimits
+from skillframe.fmu.library import find_fmu
+from skillframe.fmu.opening import open_actuators
+from skillframe.fmu.sandbox import SandboxBank
+from skillframe.fmu.toolchain import find_compiler
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.system.foreign_fmus import by_fmpy, container, shipped, winch
-from tests.unit.actuation.fmu_fakes import make, repacked
+from tests.unit.fmu.fmu_fakes import make, repacked
 
 pytestmark = pytest.mark.slow
 SHIPPED = [
@@ -210,7 +210,7 @@ def test_an_fmu_that_misbehaves_ends_simulate_with_one_sentence_and_keeps_what_w
 
 @pytest.mark.parametrize("kind", ["crash", "hang", "nan", "refuse", "leave", "leak"])
 def test_check_finds_every_kind_of_misbehaviour_and_survives_it(built, capfd, monkeypatch, kind):
-    monkeypatch.setattr("skillframe.actuation.check.LIMITS", SandboxLimits(start_s=4.0))
+    monkeypatch.setattr("skillframe.fmu.check.LIMITS", SandboxLimits(start_s=4.0))
     code, text, _ = said(capfd, "check", built(kind), "--json")
     problems = json.loads(text)["problems"]
     assert code == 1 and len(problems) == 1 and "\n" not in problems[0], problems

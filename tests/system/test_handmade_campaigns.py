@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from skillframe.cli.main import run
-from skillframe.registry import registry
-from skillframe.skillfile import save
-from skillframe.skillsource import learned
+from skillframe.document.file import save
+from skillframe.document.source import learned
+from skillframe.extend.registry import registry
 from skillframe.testing import example_demonstrations
 
 pytestmark = pytest.mark.needs_plugins

@@ -13,8 +13,8 @@ import zipfile
 import numpy as np
 import pytest
 
-from skillframe.actuation.toolchain import find_compiler
 from skillframe.cli.main import run
+from skillframe.fmu.toolchain import find_compiler
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.oracle import fmus
 from tests.oracle.attacks import processes

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from skillframe.cli.main import run
-from skillframe.skillfile import save
+from skillframe.document.file import save
 from skillframe.testing import example_demonstrations
 
 LINK = """<link name="{}"><inertial><origin xyz="0 0 .1"/><mass value="1"/>
@@ -98,8 +98,8 @@ def test_a_robot_toml_with_a_byte_order_mark_is_read(robot: Path) -> None:
 def test_a_robot_that_no_simulator_can_hold_is_refused_by_run_too(
     robot: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], how: str
 ) -> None:
-    from skillframe.registry import registry
-    from skillframe.skillsource import learned
+    from skillframe.document.source import learned
+    from skillframe.extend.registry import registry
 
     skill, trace = tmp_path / "s.skill.json", tmp_path / "t.npz"
     save(learned(registry().skill("lmc"), example_demonstrations()), skill)

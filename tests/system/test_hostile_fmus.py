@@ -14,13 +14,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from skillframe.actuation.actuator import ActuatorSpec
-from skillframe.actuation.build import build_fmu
-from skillframe.actuation.child import Child, SandboxLimits
-from skillframe.actuation.inspection import inspect_fmu
-from skillframe.actuation.sandbox import SandboxBank
-from skillframe.actuation.toolchain import find_compiler
-from skillframe.trace import Trace
+from skillframe.fmu.actuator import ActuatorSpec
+from skillframe.fmu.build import build_fmu
+from skillframe.fmu.child import Child, SandboxLimits
+from skillframe.fmu.inspection import inspect_fmu
+from skillframe.fmu.sandbox import SandboxBank
+from skillframe.fmu.toolchain import find_compiler
+from skillframe.run.trace import Trace
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.oracle import fmus
 from tests.oracle.attacks import ATTACKS, SECRET, processes, written
@@ -30,7 +30,7 @@ pytestmark = [pytest.mark.skipif(find_compiler() is None, reason="no C compiler"
 LIMIT_S = 3.0
 PATIENCE_S = 90.0  # far above any time limit here: what is not done by then hangs
 COMMANDS = {
-    "check": "import sys; from skillframe.actuation import check as c; from skillframe.cli.main import run;"
+    "check": "import sys; from skillframe.fmu import check as c; from skillframe.cli.main import run;"
     f"c.LIMITS = type(c.LIMITS)(start_s={LIMIT_S}); sys.exit(run(['fmu', 'check', *sys.argv[1:]]))",
     "simulate": "import sys; from skillframe.cli.main import run;"
     f"sys.exit(run(['fmu', 'simulate', *sys.argv[1:], '--stop', '0.02', '--step', '0.001', '--timeout', '{LIMIT_S}',"

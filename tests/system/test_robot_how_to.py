@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from skillframe.control.vdc_actuator import cylinders
 from skillframe.errors import InputError
-from skillframe.robot.audit import audit
-from skillframe.robot.machine_spec import Actuation, Gains, Sensors
+from skillframe.machine.checks.audit import audit
+from skillframe.machine.law.vdc_actuator import cylinders
+from skillframe.robot.driven import Actuation, Gains, Sensors
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot, robot_names
 

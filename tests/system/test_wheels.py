@@ -16,7 +16,7 @@ PACKAGES = ["skillframe", *(f"skillframe_{plugin.name}" for plugin in PLUGINS)]
 SCRIPT = """
 from pathlib import Path
 from skillframe import Command, Demonstration, Observation, Pose, Skill
-from skillframe.demonstration.files import read_demonstration
+from skillframe.extend.reading import read_demonstration
 from skillframe_lmc.settings import Settings
 
 def length(demonstration: Demonstration) -> float:

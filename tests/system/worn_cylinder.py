@@ -9,11 +9,11 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from skillframe.actuation.build import build_fmu
-from skillframe.actuation.library import fmu_folders
 from skillframe.campaign.sampling import draws
 from skillframe.campaign.spec import CampaignSpec
-from skillframe.machine.bank import instance_parameters
+from skillframe.fmu.build import build_fmu
+from skillframe.fmu.library import fmu_folders
+from skillframe.machine.cylinder.bank import instance_parameters
 from skillframe.robot.spec import load_robot
 from tests.crane_corner import SKILL
 

@@ -12,8 +12,8 @@ import click
 import pytest
 
 import skillframe
-from skillframe import hookspecs
-from skillframe.registry import KINDS, Plugin, load_registry
+from skillframe.extend import hookspecs
+from skillframe.extend.registry import KINDS, Plugin, load_registry
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 HOOKS = (DOCS / "reference" / "hooks.md").read_text(encoding="utf-8")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from skillframe.registry import KINDS, registry
+from skillframe.extend.registry import KINDS, registry
 
 PLUGINS = sorted(p for p in (Path(__file__).resolve().parents[2] / "plugins").iterdir() if (p / "src").is_dir())
 ALL_PLUGINS = ",".join(plugin.name for plugin in PLUGINS)
@@ -40,7 +40,7 @@ def test_an_entry_module_of_a_plugin_loads_nothing_heavy():
 
 
 CALL_EVERY_HOOK = """
-from skillframe.registry import registry
+from skillframe.extend.registry import registry
 found = [each for plugin in registry().plugins for each in plugin.provides]
 assert not registry().not_installed and len(registry().plugins) == {count} and len(found) >= {least}, found
 """

@@ -10,12 +10,12 @@ from skillframe_baselines import align, gmm, seds
 from skillframe_baselines.dmp import STEP
 
 from plugins.baselines.tests.demonstrations import GOAL, UPSIDE, approach, both_sides
+from skillframe.document.source import learned
 from skillframe.errors import InputError, MissingDependency
+from skillframe.extend.records import LearnOptions
+from skillframe.extend.registry import registry
 from skillframe.frames import Pose, norm, rotation_matrix, rotation_vector
-from skillframe.records import LearnOptions
-from skillframe.registry import registry
 from skillframe.skill import Observation, Status
-from skillframe.skillsource import learned
 from skillframe.testing import SkillConformance, play
 
 KINDS = ("dmp", "gmr", "seds")
@@ -121,7 +121,7 @@ def test_the_wrench_profile_is_what_the_person_s_tool_exerted(documents, kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_skill_file_carries_what_was_learned(documents, kind, tmp_path):
-    from skillframe.skillfile import load, save
+    from skillframe.document.file import load, save
 
     save(documents[kind], tmp_path / "x.skill.json")
     back, start = load(tmp_path / "x.skill.json"), start_of(approach(-1.0))

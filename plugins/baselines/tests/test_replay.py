@@ -5,7 +5,10 @@ import pytest
 from skillframe_baselines.document import RATE, SETTLE, resampled
 
 from skillframe.demonstration.record import Demonstration
+from skillframe.document.source import learned
 from skillframe.errors import InputError
+from skillframe.extend.records import LearnOptions
+from skillframe.extend.registry import registry
 from skillframe.frames import (
     Pose,
     move_twist,
@@ -15,10 +18,7 @@ from skillframe.frames import (
     rotation_matrix,
     rotation_vector,
 )
-from skillframe.records import LearnOptions
-from skillframe.registry import registry
 from skillframe.skill import Observation, Status
-from skillframe.skillsource import learned
 from skillframe.testing import SkillConformance, example_demonstrations, play, random_observations
 
 DT = 0.005

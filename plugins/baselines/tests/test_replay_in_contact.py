@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from skillframe.demonstrate import record
-from skillframe.executor import simulate
-from skillframe.prepare import load_robot_model, load_world, prepare
-from skillframe.records import LearnOptions
-from skillframe.registry import registry
-from skillframe.skillsource import learned
-from skillframe.teacher import TeacherSettings
+from skillframe.document.source import learned
+from skillframe.extend.records import LearnOptions
+from skillframe.extend.registry import registry
+from skillframe.run.executor import simulate
+from skillframe.run.prepare import load_robot_model, load_world, prepare
+from skillframe.teaching.sessions import record
+from skillframe.teaching.teacher import TeacherSettings
 
 TILT = np.deg2rad(8.0)  # of the world's first demonstration
 TILTS = np.array([TILT, -TILT])

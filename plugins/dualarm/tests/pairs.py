@@ -5,7 +5,7 @@ from functools import cache
 from skillframe_dualarm.document import Arm, Phase, configured, relative
 from skillframe_dualarm.dual_peg import DualPegParams, build
 
-from skillframe.prepare import load_robot_model
+from skillframe.run.prepare import load_robot_model
 
 SCENE = build(DualPegParams())
 TIP = SCENE.tool.frames["tip"]

@@ -8,7 +8,7 @@ from skillframe_dualarm.document import CONFIGURATIONS, Arm, Phase, body, config
 from skillframe_dualarm.dual_peg import DualPegParams, build
 
 from skillframe.errors import InputError, UnknownName
-from skillframe.registry import registry
+from skillframe.extend.registry import registry
 from skillframe.testing import WorldConformance
 
 TIP = (0.0, 0.0, 0.15)

@@ -8,14 +8,14 @@ from pairs import SCENE, robot
 from skillframe_dualarm.document import read_phase
 from skillframe_dualarm.learner import learn
 
-from skillframe.demonstrate import record
+from skillframe.document.file import load, new_document, save
 from skillframe.errors import InputError, UnknownName
-from skillframe.executor import simulate
-from skillframe.prepare import prepare
-from skillframe.records import LearnOptions
-from skillframe.registry import registry
-from skillframe.skillfile import load, new_document, save
-from skillframe.teacher import TeacherSettings
+from skillframe.extend.records import LearnOptions
+from skillframe.extend.registry import registry
+from skillframe.run.executor import simulate
+from skillframe.run.prepare import prepare
+from skillframe.teaching.sessions import record
+from skillframe.teaching.teacher import TeacherSettings
 
 pytestmark = pytest.mark.needs_plugins
 

@@ -8,8 +8,8 @@ from skillframe_dualarm.document import CONFIGURATIONS, Arm, Phase, configured, 
 from skillframe_dualarm.outcome import classify
 from skillframe_dualarm.runtime import DualArm, stiffnesses
 
-from skillframe.arms import ArmsResult
 from skillframe.frames import Pose, rotation_matrix
+from skillframe.run.arms import ArmsResult
 from skillframe.skill import Observation, Status, no_reasons
 
 TIP = (0.0, 0.0, 0.15)

@@ -13,8 +13,8 @@ from skillframe_lmc.settings import Settings
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError, UnknownName
+from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, rotation_matrix
-from skillframe.records import Document, LearnOptions
 
 GRID = 1.5  # degrees: the finest cells of the search are 1.6 wide, the last step inside a disc removes most of that
 DOWN = np.array([0.0, 0.0, -1.0])

@@ -13,11 +13,11 @@ from skillframe_lmc.learner import learn
 from synthetic import valley
 
 from skillframe.cli.main import run
-from skillframe.demonstration.files import write_demonstration
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
+from skillframe.extend.reading import write_demonstration
+from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, cross, unit
-from skillframe.records import Document, LearnOptions
 
 RATE, SPEED = 200.0, 0.08
 

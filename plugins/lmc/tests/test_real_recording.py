@@ -8,10 +8,10 @@ from skillframe_lmc.describe import describe
 from skillframe_lmc.explain import explain
 from skillframe_lmc.learner import learn
 
-from skillframe.demonstration.files import read_demonstration
 from skillframe.demonstration.record import Demonstration
+from skillframe.extend.reading import read_demonstration
+from skillframe.extend.records import Document, LearnOptions
 from skillframe.paths import recordings_dir
-from skillframe.records import Document, LearnOptions
 
 PHASES = {"approach": (0.0, 7.07), "alignment": (7.08, 15.38), "insertion": (15.385, 16.32), "mating": (16.33, 18.5)}
 

@@ -13,8 +13,8 @@ from skillframe_lmc.learner import learn
 from skillframe_lmc.runtime import build
 
 from skillframe.errors import InputError
+from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, Pose, norm, rotation_matrix, rotation_vector, unit
-from skillframe.records import Document, LearnOptions
 from skillframe.skill import Command, Observation, Skill, Status
 
 DT = 1e-3

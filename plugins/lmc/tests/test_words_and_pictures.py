@@ -10,10 +10,10 @@ from skillframe_lmc.learner import learn
 from skillframe_lmc.projection import Plane
 from skillframe_lmc.words import axis_words, direction_words, listed
 
+from skillframe.document.source import learned
+from skillframe.extend.records import Document, LearnOptions, SkillType
+from skillframe.extend.registry import registry
 from skillframe.frames import norm, unit
-from skillframe.records import Document, LearnOptions, SkillType
-from skillframe.registry import registry
-from skillframe.skillsource import learned
 from skillframe.testing import SkillConformance
 
 NOISE = syn.Recipe(noise_m=5e-5, noise_n=0.3)

@@ -4,9 +4,9 @@ from functools import cache
 
 import numpy as np
 
-from skillframe.registry import registry
+from skillframe.document.file import new_document
+from skillframe.extend.registry import registry
 from skillframe.sequence import Fallback, Part, Sequence
-from skillframe.skillfile import new_document
 
 TIP = [0.0, 0.0, 0.2]
 DEEP_M = 0.040  # less than this is a stall: the hole's goal is 45 mm deep, a search ends 3 mm deep

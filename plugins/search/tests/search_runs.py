@@ -7,7 +7,7 @@ from skillframe_search import trials
 from skillframe_search.published import FILLET_M
 from skillframe_search.trials import FOUND_M, Task, starts
 
-from skillframe.prepare import load_robot_model
+from skillframe.run.prepare import load_robot_model
 
 __all__ = ["FOUND_M", "PARAMS", "PEG", "demonstrations", "document", "goals", "robot", "scene", "search", "starts"]
 PEG = {"fillet": FILLET_M, "done_depth": FOUND_M}

@@ -11,11 +11,11 @@ from skillframe_search.phase import read_phase
 from skillframe_search.plan import area, exerted, keyed, plan
 
 from skillframe.demonstration.record import Demonstration
+from skillframe.document.source import learned
 from skillframe.errors import InputError, UnknownName
+from skillframe.extend.records import LearnOptions
+from skillframe.extend.registry import registry
 from skillframe.frames import matrix_from_quaternion, norm, quaternion_from_matrix, rotation_matrix
-from skillframe.records import LearnOptions
-from skillframe.registry import registry
-from skillframe.skillsource import learned
 
 
 def learn(demonstrations, kind="search", axes="base", at=None, **settings):

@@ -4,9 +4,9 @@ import pytest
 from skillframe_search.example import example, searching
 
 from skillframe.cli.main import run
-from skillframe.demonstration.files import write_demonstration
+from skillframe.document.file import save
+from skillframe.extend.reading import write_demonstration
 from skillframe.robot.spec import load_robot
-from skillframe.skillfile import save
 
 TIP = [0.0, 0.0, 0.2]
 

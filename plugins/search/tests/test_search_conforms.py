@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from skillframe.registry import registry
+from skillframe.extend.registry import registry
 from skillframe.skill import rows_of
 from skillframe.testing import SkillConformance, random_observations
 

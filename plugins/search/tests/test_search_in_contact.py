@@ -7,12 +7,12 @@ import pytest
 from search_runs import PARAMS, document, goals, robot, scene, search
 from skillframe_search.example import example
 
-from skillframe.blind_teacher import BlindSettings
-from skillframe.demonstrate_blind import record_blind
 from skillframe.errors import InputError
-from skillframe.executor import simulate
-from skillframe.prepare import load_world, prepare
+from skillframe.run.executor import simulate
+from skillframe.run.prepare import load_world, prepare
 from skillframe.skill import Status
+from skillframe.teaching.blind import BlindSettings
+from skillframe.teaching.blind_sessions import record_blind
 
 PLANE = (0.004, 0.004, 0.0)
 

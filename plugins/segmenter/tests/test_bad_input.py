@@ -12,10 +12,10 @@ from skillframe_segmenter.learning import relabelled
 from skillframe_segmenter.segmentation import refitted
 
 from skillframe.cli import main
-from skillframe.demonstration.files import write_demonstration
 from skillframe.errors import InputError, SkillframeError
-from skillframe.records import LearnOptions
-from skillframe.registry import registry
+from skillframe.extend.reading import write_demonstration
+from skillframe.extend.records import LearnOptions
+from skillframe.extend.registry import registry
 from tests.figures import quasistatic as made
 
 Z = np.array([0.0, 0.0, 1.0])

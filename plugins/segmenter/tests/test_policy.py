@@ -8,11 +8,11 @@ from skillframe_segmenter.document import skill_of
 from skillframe_segmenter.learning import _alike, _as_phase, pieces
 
 from skillframe.cli import main
+from skillframe.document.source import learned
+from skillframe.extend.records import LearnOptions
+from skillframe.extend.registry import registry
 from skillframe.frames import Pose, matrix_from_quaternion
-from skillframe.records import LearnOptions
-from skillframe.registry import registry
 from skillframe.skill import Observation, Status
-from skillframe.skillsource import learned
 from tests.figures import quasistatic as made
 
 DT = 1e-3

@@ -11,7 +11,7 @@ from skillframe_segmenter.rounds import going_round, rounds
 from skillframe_segmenter.segmentation import prepare, segment
 from skillframe_segmenter.settings import Settings
 
-from skillframe.demonstration.files import read_demonstration
+from skillframe.extend.reading import read_demonstration
 from skillframe.frames import quaternion_from_matrix, rotation_matrix
 from skillframe.paths import recordings_dir
 from tests.figures import quasistatic as made

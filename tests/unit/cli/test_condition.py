@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from skillframe.cli.main import run
 from skillframe.demonstration.convention import weight_wrench
-from skillframe.demonstration.files import read_demonstration, write_demonstration
 from skillframe.demonstration.record import Demonstration
+from skillframe.extend.reading import read_demonstration, write_demonstration
 from skillframe.frames import rotate_spatial
 
 

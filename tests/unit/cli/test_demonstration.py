@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from skillframe.cli.main import run
-from skillframe.demonstration.files import read_demonstration, write_demonstration
 from skillframe.demonstration.record import Demonstration
+from skillframe.extend.reading import read_demonstration, write_demonstration
 from skillframe.frames import quaternion_from_matrix, rotation_matrix
 
 HEADER = "t,px,py,pz,qx,qy,qz,qw,fx,fy,fz,tx,ty,tz"

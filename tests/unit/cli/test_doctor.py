@@ -75,7 +75,7 @@ def test_a_recordings_folder_that_is_not_there_is_told(monkeypatch, tmp_path):
 
 
 def test_a_broken_plugin_is_told_with_its_error(monkeypatch, fresh_registry):
-    from skillframe.registry import registry
+    from skillframe.extend.registry import registry
 
     registry().plugins[0].error = "ValueError: oh"
     assert "ValueError: oh" in next(doctor._plugins()).fix

@@ -6,7 +6,7 @@ import yaml
 
 from skillframe.cli.main import run
 from skillframe.conformance.examples import example_demonstrations
-from skillframe.demonstration.files import write_demonstration
+from skillframe.extend.reading import write_demonstration
 
 pytestmark = pytest.mark.needs_plugins
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from skillframe.actuation.toolchain import find_compiler
 from skillframe.cli.main import run
+from skillframe.fmu.toolchain import find_compiler
 from tests.fmu_cache import own_cache  # noqa: F401
 
 TABLE = Path(__file__).resolve().parents[3] / "fmus" / "hydraulic_cylinder" / "fmu.toml"

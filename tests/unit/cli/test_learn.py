@@ -7,8 +7,8 @@ import pytest
 
 from skillframe.cli.main import run
 from skillframe.conformance.examples import example_demonstrations
-from skillframe.demonstration.files import read_demonstration, write_demonstration
-from skillframe.skillfile import load
+from skillframe.document.file import load
+from skillframe.extend.reading import read_demonstration, write_demonstration
 
 pytestmark = pytest.mark.needs_plugins
 

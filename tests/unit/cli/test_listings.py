@@ -9,8 +9,8 @@ import pytest
 
 from skillframe.cli.main import cli, run
 from skillframe.cli.names import ROBOT
-from skillframe.homes import HOMES
-from skillframe.registry import registry
+from skillframe.extend.homes import HOMES
+from skillframe.extend.registry import registry
 from skillframe.world.placement import check_quantities
 from skillframe.world.quantities import QUANTITIES, VARIED
 
@@ -80,7 +80,7 @@ def test_plugins_show_says_units(capsys):
 def test_a_name_of_a_plugin_that_is_not_installed_comes_with_the_line_that_installs_it(
     capsys, fresh_registry, monkeypatch
 ):
-    monkeypatch.setattr("skillframe.registry._installed", lambda: [])
+    monkeypatch.setattr("skillframe.extend.registry._installed", lambda: [])
     for words, line in (
         (
             ["learn", "x.npz", "--out", "x.json"],

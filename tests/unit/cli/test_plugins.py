@@ -8,13 +8,13 @@ import pytest
 from skillframe.cli.main import run
 from skillframe.cli.template import plugin_name
 from skillframe.errors import InputError
-from skillframe.records import SkillType
-from skillframe.registry import Plugin, Registry, load_registry, registry
+from skillframe.extend.records import SkillType
+from skillframe.extend.registry import Plugin, Registry, load_registry, registry
 from skillframe.testing import HoldSkill
 
 BROKEN = """
 from skillframe import hookimpl
-from skillframe.records import SkillType
+from skillframe.extend.records import SkillType
 @hookimpl
 def skillframe_skills():
     yield SkillType(name="nothing", summary="does nothing", build=lambda document: None, example=dict)
@@ -231,7 +231,7 @@ SPOILED = """
 from pathlib import Path
 import numpy as np
 from skillframe import hookimpl
-from skillframe.records import SkillType
+from skillframe.extend.records import SkillType
 from skillframe.testing import HoldSkill
 class Chatty(HoldSkill):
     def step(self, observation):
@@ -249,7 +249,7 @@ def skillframe_skills():
 ODD = """
 from dataclasses import dataclass, replace
 from skillframe import hookimpl
-from skillframe.records import WorldType
+from skillframe.extend.records import WorldType
 from skillframe.world.scene import Geom
 from skillframe.world.worlds import valley
 @hookimpl

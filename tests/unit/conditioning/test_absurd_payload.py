@@ -11,9 +11,9 @@ import pytest
 from skillframe.cli.main import run
 from skillframe.conditioning.offline import remove_bias
 from skillframe.demonstration.convention import weight_wrench
-from skillframe.demonstration.files import write_demonstration
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
+from skillframe.extend.reading import write_demonstration
 from skillframe.frames import quaternion_from_matrix, rotate_spatial, rotation_matrix
 
 MASS, COM = 0.93, np.array([0.0, 0.01, 0.044])

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from skillframe.conditioning.contact import contact_intervals, first_free_air, free_air_level
-from skillframe.conditioning.kalman import WrenchFilter
 from skillframe.conditioning.noise import detrended_std, estimate_model, model_of, noise_figures
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
+from skillframe.signals.kalman import WrenchFilter
 
 SCATTER = np.array([0.035, 0.021, 0.075, 0.002, 0.003, 0.0005])
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from skillframe.extend.records import SkillType
 from skillframe.frames import Pose
-from skillframe.records import SkillType
 from skillframe.skill import Impedance, Skill
 from skillframe.testing import HoldSkill
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from skillframe.extend.records import WorldType
 from skillframe.frames import norm
-from skillframe.records import WorldType
 from skillframe.world.scene import Geom, Scene, Task, Tool
 
 DOWN = (1.0, 0.0, 0.0, 0.0)

@@ -3,8 +3,8 @@
 import numpy as np
 
 from skillframe.conformance import check_skill
+from skillframe.extend.records import CoordinatorType
 from skillframe.frames import Pose
-from skillframe.records import CoordinatorType
 from skillframe.skill import Command, Impedance, Skill, no_reasons
 
 

@@ -9,8 +9,8 @@ from skillframe.conformance import check_reader, check_segmenter, check_world
 from skillframe.conformance.readers import differences
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
-from skillframe.records import ReaderType, SegmenterType, WorldType
-from skillframe.registry import load_registry
+from skillframe.extend.records import ReaderType, SegmenterType, WorldType
+from skillframe.extend.registry import load_registry
 from skillframe.testing import ReaderConformance, WorldConformance, example_demonstrations
 
 CORE = load_registry()

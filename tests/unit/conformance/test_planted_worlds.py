@@ -3,7 +3,7 @@
 import pytest
 
 from skillframe.conformance import check_world
-from skillframe.registry import load_registry
+from skillframe.extend.registry import load_registry
 from tests.unit.conformance.planted_worlds import PLANTED, world
 
 pytestmark = pytest.mark.slow  # each runs a check of seconds

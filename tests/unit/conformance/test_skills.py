@@ -7,8 +7,8 @@ from skillframe.conformance import check_skill
 from skillframe.conformance.examples import example_demonstrations, random_observations
 from skillframe.conformance.skills import CHECKS
 from skillframe.errors import InputError
+from skillframe.extend.records import Illustration, SkillType
 from skillframe.frames import Pose
-from skillframe.records import Illustration, SkillType
 from skillframe.skill import Impedance
 from skillframe.testing import HoldSkill, SkillConformance
 

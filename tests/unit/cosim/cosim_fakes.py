@@ -6,10 +6,10 @@ import math
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from skillframe.actuation import equations as eq
-from skillframe.actuation.library import fmu_folders
-from skillframe.actuation.table import read_table, rows
 from skillframe.cosim import Motion
+from skillframe.fmu.library import fmu_folders
+from skillframe.fmu.table import read_table, rows
+from skillframe.machine.cylinder import equations as eq
 
 GRAVITY = 9.81
 CYLINDER = {

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from cosim_fakes import CYLINDER, Boom, monolithic
 
-from skillframe.actuation.actuator import ActuatorSpec
-from skillframe.actuation.opening import open_actuators
 from skillframe.cosim import CosimSettings, Master, bond_work, coupling_numbers, require_stable
 from skillframe.cosim.coupling import StepTooLarge
 from skillframe.errors import SkillframeError
+from skillframe.fmu.actuator import ActuatorSpec
+from skillframe.fmu.opening import open_actuators
 
 HOLD, ALL = 5, ("command", "position", "velocity", "acceleration")
 COMMANDS = [0.35 * math.sin(2 * math.pi * 1.2 * k * HOLD * 1e-3) for k in range(60)]

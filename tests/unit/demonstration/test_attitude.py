@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
-from skillframe.demonstration.files import read_demonstration
 from skillframe.demonstration.join import slerp
 from skillframe.errors import InputError
+from skillframe.extend.reading import read_demonstration
 from skillframe.frames import matrix_from_quaternion
 
 Write = Callable[..., Path]

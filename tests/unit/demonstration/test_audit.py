@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from skillframe.demonstration.audit import audit, compared
+from skillframe.conditioning.audit import audit, compared
 from skillframe.demonstration.convention import weight_wrench
 from skillframe.demonstration.record import Demonstration
 from skillframe.frames import Float, quaternion_from_matrix, rotate_spatial, rotation_matrix

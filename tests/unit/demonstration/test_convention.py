@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from skillframe.demonstration.convention import weight_wrench
-from skillframe.demonstration.files import read_demonstration
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
+from skillframe.extend.reading import read_demonstration
 from skillframe.frames import Float, cross, norm, rotate, rotate_spatial
 
 Write = Callable[..., Path]
@@ -59,7 +59,7 @@ def test_settings_win_over_metadata(demo: Demonstration, rows: list[list[str]], 
 def test_a_converted_file_is_not_converted_again(
     demo: Demonstration, rows: list[list[str]], write: Write, tmp_path: Path
 ) -> None:
-    from skillframe.demonstration.files import write_demonstration
+    from skillframe.extend.reading import write_demonstration
 
     first = read_demonstration(write(rows), wrench_frame="tool", wrench_point="0,0,0.1", wrench_sign="teacher")
     write_demonstration(first, tmp_path / "first.csv")

@@ -13,10 +13,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from skillframe.demonstration.files import check_writable, read_demonstration, write_demonstration
 from skillframe.demonstration.metafile import toml_text
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
+from skillframe.extend.reading import check_writable, read_demonstration, write_demonstration
 from skillframe.frames import norm
 
 finite = st.floats(-1e6, 1e6, allow_nan=False, width=64)

@@ -14,9 +14,9 @@ import pytest
 
 from skillframe.cli.main import run
 from skillframe.demonstration.csv import demonstration_columns
-from skillframe.demonstration.files import read_demonstration
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
+from skillframe.extend.reading import read_demonstration
 
 META = json.dumps({"format": "skillframe.demonstration", "version": 1})
 

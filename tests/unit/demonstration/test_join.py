@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from skillframe.demonstration.files import read_demonstration
 from skillframe.errors import InputError
+from skillframe.extend.reading import read_demonstration
 from skillframe.frames import norm, rotation_vector
 
 Write = Callable[..., Path]

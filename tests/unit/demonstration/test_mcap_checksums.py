@@ -12,9 +12,9 @@ import pytest
 
 from skillframe.cli.main import run
 from skillframe.demonstration.assemble import NOTES
-from skillframe.demonstration.files import read_demonstration
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
+from skillframe.extend.reading import read_demonstration
 from tests.unit.demonstration.conftest import make
 
 pytest.importorskip("rosbags", reason="rosbags is not installed (pip install rosbags)")

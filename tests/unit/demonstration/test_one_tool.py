@@ -10,7 +10,7 @@ import pytest
 
 from skillframe.cli.main import run
 from skillframe.conformance.examples import example_demonstrations
-from skillframe.demonstration.files import write_demonstration
+from skillframe.extend.reading import write_demonstration
 
 pytestmark = pytest.mark.needs_plugins
 KINDS = ["lmc", "dmp", "gmr", "seds", "search", "spiral", "random_walk", "dual_arm"]

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from skillframe.demonstration.audit import audit
-from skillframe.demonstration.files import read_demonstration, write_demonstration
+from skillframe.conditioning.audit import audit
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
+from skillframe.extend.reading import read_demonstration, write_demonstration
 from skillframe.paths import recordings_dir
 
 POSE, WRENCH = "t,px,py,pz,roll,pitch,yaw", "t,fx,fy,fz,tx,ty,tz"

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from skillframe.demonstration.files import read_demonstration, write_demonstration
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError, SkillframeError, UnknownName
+from skillframe.extend.reading import read_demonstration, write_demonstration
 
 Cells = list[list[str]]
 Write = Callable[..., Path]

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from skillframe.cli.main import run
+from skillframe.conditioning.audit import audit
 from skillframe.conditioning.noise import estimate_model
 from skillframe.conditioning.offline import remove_bias, smooth
-from skillframe.demonstration.audit import audit
-from skillframe.demonstration.files import read_demonstration, write_demonstration
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
+from skillframe.extend.reading import read_demonstration, write_demonstration
 from skillframe.frames import quaternion_from_matrix, rotate_spatial, rotation_matrix
 
 NOISE = np.repeat([0.05, 0.003], 3)

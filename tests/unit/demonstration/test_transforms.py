@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from skillframe.cli.main import run
-from skillframe.demonstration.files import read_demonstration
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError, UnknownName
+from skillframe.extend.reading import read_demonstration
 from skillframe.frames import Pose, quaternion_from_matrix, rotation_matrix, rotation_vector
 from tests.unit.demonstration.conftest import make
 

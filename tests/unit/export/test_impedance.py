@@ -4,9 +4,9 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from skillframe.document.export import FORMATS, settings_text
+from skillframe.document.impedance import moving_impedance, per_axis
 from skillframe.errors import InputError
-from skillframe.export.formats import FORMATS, settings_text
-from skillframe.export.impedance import moving_impedance, per_axis
 from skillframe.frames import rotation_matrix, unit
 
 STOP = {"lead_force_n": 20.0, "lead_torque_nm": 2.0, "time_limit_s": 20.0}

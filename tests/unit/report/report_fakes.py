@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from skillframe.frames import quaternion_from_matrix, rotation_matrix
-from skillframe.trace import Trace
+from skillframe.run.trace import Trace
 
 RADIUS, LENGTH, DEPTH, HOLE = 0.0165, 0.08, 0.06, 0.01675
 PLACE = np.array([0.5, 0.0, 0.1])

@@ -8,7 +8,7 @@ from report_fakes import campaign, skill_document, trace
 
 from skillframe.cli.main import run
 from skillframe.errors import InputError
-from skillframe.records import Illustration, SkillType
+from skillframe.extend.records import Illustration, SkillType
 from skillframe.report.learned import skill_block
 from skillframe.report.page import MOST_BYTES, render, write_report
 from skillframe.report.sources import read_chapters

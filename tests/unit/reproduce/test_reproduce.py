@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from skillframe.cli.main import run
-from skillframe.records import Illustration, RowResult, RowType
-from skillframe.registry import Plugin, Registry
+from skillframe.extend.records import Illustration, RowResult, RowType
+from skillframe.extend.registry import Plugin, Registry
 from skillframe.reproduce import committed, document, page, store
 from skillframe.reproduce.jobs import jobs_of
 
@@ -23,7 +23,7 @@ PLUGIN = """
     import os, pathlib, time
     from skillframe import hookimpl
     from skillframe.errors import InputError
-    from skillframe.records import RowResult, RowType
+    from skillframe.extend.records import RowResult, RowType
 
     def double(job):
         print("noise on stdout")

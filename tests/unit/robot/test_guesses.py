@@ -184,7 +184,7 @@ def test_a_demonstration_that_is_never_recorded_names_the_guessed_masses(tmp_pat
 @pytest.mark.parametrize("guessed", [True, False])
 def test_a_run_and_a_campaign_that_fail_name_the_guessed_masses(tmp_path, capsys, guessed):
     from skillframe.conformance.examples import example_demonstrations
-    from skillframe.demonstration.files import write_demonstration
+    from skillframe.extend.reading import write_demonstration
 
     folder = guessed_panda(tmp_path, guessed)
     write_demonstration(example_demonstrations()[0], tmp_path / "left.npz")

@@ -5,9 +5,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+from skillframe.extend.worlds import make_scene, world_types
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot
-from skillframe.world.catalogue import make_scene, world_types
 from skillframe.world.placement import fixture_poses, start_configurations
 from skillframe.world.plant import Plant
 

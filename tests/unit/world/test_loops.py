@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from skillframe.robot.loops import ClosedChain, step
+from skillframe.robot.chain import ClosedChain, step
 from skillframe.robot.model import attach_payload
 from skillframe.world.convert import build_spec
 from skillframe.world.layout import Layout

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from skillframe.errors import InputError, SkillframeError, UnknownName
+from skillframe.extend.worlds import world_types
 from skillframe.frames import Pose, rotation_matrix, rotation_vector
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot
-from skillframe.world.catalogue import world_types
 from skillframe.world.placement import check_quantities, fixture_poses, nominal_fixture, start_poses
 from skillframe.world.rates import ratio
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from skillframe.errors import InputError
+from skillframe.extend.worlds import make_scene, world_types
 from skillframe.frames import Pose, matrix_from_quaternion, rotation_matrix
-from skillframe.world.catalogue import make_scene, world_types
 from skillframe.world.scene import State
 
 RECORD = {record.name: record for record in world_types()}["socket"]

@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 
 from skillframe.errors import InputError
+from skillframe.extend.worlds import make_scene, world_types
 from skillframe.frames import norm
-from skillframe.world.catalogue import make_scene, world_types
 from skillframe.world.drawing import drawn_bodies
 from skillframe.world.placement import fixture_poses
 from skillframe.world.plant import Plant

@@ -21,8 +21,8 @@ from skillframe.config import build
 from skillframe.demonstration.record import Demonstration
 from skillframe.demonstration.together import common_frames
 from skillframe.errors import InputError
+from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, Pose, norm, rotation_matrix, rotation_vector
-from skillframe.records import Document, LearnOptions
 from skillframe_baselines.document import Stiffness, Stop, frame_of
 
 LARGEST_TURN = 2.5  # rad from the goal's attitude; beyond it a rotation vector is a poor coordinate

@@ -21,8 +21,8 @@ import numpy as np
 from skillframe.config import build as configured
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError, MissingDependency
+from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, Pose, move_wrench, norm, rotation_matrix, rotation_vector
-from skillframe.records import Document, LearnOptions
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 from skillframe_baselines import align
 from skillframe_baselines.common import (
@@ -249,8 +249,8 @@ def describe(document: Document) -> list[str]:
 
 def example() -> Document:
     """A primitive of two seconds without forcing, 50 mm below where the example demonstrations start."""
-    from skillframe.registry import registry
-    from skillframe.skillfile import new_document
+    from skillframe.document.file import new_document
+    from skillframe.extend.registry import registry
     from skillframe.testing import example_demonstrations
 
     demonstrations, count = example_demonstrations()[:1], 3

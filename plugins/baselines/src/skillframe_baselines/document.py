@@ -15,8 +15,8 @@ import numpy as np
 from skillframe.config import build
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
+from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, norm
-from skillframe.records import Document, LearnOptions
 
 RATE = 100.0  # Hz
 SETTLE = 0.3  # s held after the last sample, before it calls itself done
@@ -177,8 +177,8 @@ def describe(document: Document) -> list[str]:
 
 def example() -> Document:
     """A replay of the first example demonstration."""
-    from skillframe.registry import registry
-    from skillframe.skillsource import learned
+    from skillframe.document.source import learned
+    from skillframe.extend.registry import registry
     from skillframe.testing import example_demonstrations
 
     return learned(registry().skill("replay"), example_demonstrations()[:1])

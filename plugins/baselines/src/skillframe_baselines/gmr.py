@@ -19,8 +19,8 @@ import numpy as np
 from skillframe.config import build as configured
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
+from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, quaternion_from_matrix
-from skillframe.records import Document, LearnOptions
 from skillframe.skill import Skill
 from skillframe_baselines import align, gmm
 from skillframe_baselines.common import (

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from skillframe.errors import InputError
+from skillframe.extend.records import Document
 from skillframe.frames import (
     Float,
     Pose,
@@ -30,7 +31,6 @@ from skillframe.frames import (
     rotation_matrix,
     rotation_vector,
 )
-from skillframe.records import Document
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 from skillframe_baselines.document import phase_of
 

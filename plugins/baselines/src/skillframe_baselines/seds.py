@@ -20,8 +20,8 @@ import numpy as np
 from skillframe.config import build as configured
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
+from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, Pose, move_twist, norm, rotation_matrix, rotation_vector
-from skillframe.records import Document, LearnOptions
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 from skillframe_baselines import align
 from skillframe_baselines.common import (

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from skillframe import hookimpl
-from skillframe.records import CoordinatorType, Document, LearnOptions, RowType, WorldType
+from skillframe.extend.records import CoordinatorType, Document, LearnOptions, RowType, WorldType
 
 if TYPE_CHECKING:
     from skillframe.demonstration.record import Demonstration

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from skillframe.records import Document
+from skillframe.extend.records import Document
 from skillframe_dualarm.document import Arm, Phase, Vector, read_phase
 
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from skillframe.config import build
 from skillframe.errors import InputError, UnknownName
+from skillframe.extend.records import Document
 from skillframe.frames import norm
-from skillframe.records import Document
 
 Vector = tuple[float, float, float]
 Mode = Literal["independent", "relative"]

@@ -14,11 +14,11 @@ from itertools import product
 import numpy as np
 import pinocchio as pin
 
-from skillframe.arms import ArmsResult, simulate_arms
 from skillframe.errors import UnknownName
-from skillframe.executor import Setup
 from skillframe.frames import rotate
 from skillframe.robot.model import RobotModel
+from skillframe.run.arms import ArmsResult, simulate_arms
+from skillframe.run.executor import Setup
 from skillframe.world.placement import nominal_fixture
 from skillframe.world.scene import Scene
 from skillframe_dualarm.document import Phase

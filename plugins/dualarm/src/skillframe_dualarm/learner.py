@@ -16,9 +16,9 @@ import numpy as np
 from skillframe.config import build
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
+from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend.registry import registry
 from skillframe.frames import norm
-from skillframe.records import Document, LearnOptions
-from skillframe.registry import registry
 from skillframe_dualarm.document import Arm, Mode, Phase, Vector, body, configured, relative
 
 PRIMITIVE = "lmc"

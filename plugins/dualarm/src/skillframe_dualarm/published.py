@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from skillframe.records import Lazy, RowType
+from skillframe.extend.records import Lazy, RowType
 
 SOURCE = "Suomalainen, Calinon, Pignat, Kyrki, ICRA 2019"
 SETTINGS = {"robot.joint_friction": 0.5, "world.friction": 0.2, "lead_force_n": 30.0, "speed": 0.02}

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from skillframe.prepare import load_robot_model, load_world
-from skillframe.records import Illustration, RowResult, RowRun
+from skillframe.extend.records import Illustration, RowResult, RowRun
+from skillframe.run.prepare import load_robot_model, load_world
 from skillframe_dualarm.document import Arm, Phase, configured, relative
 from skillframe_dualarm.experiment import POSTURES, PUBLISHED, Row, insert, largest
 

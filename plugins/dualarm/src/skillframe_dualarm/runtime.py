@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.control.impedance import pose_error
+from skillframe.extend.records import Document
 from skillframe.frames import Float, Pose, rotate
-from skillframe.records import Document
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 from skillframe_dualarm.document import Arm, Phase, read_phase
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.records import Document
+from skillframe.extend.records import Document
 from skillframe_lmc.phase import Part, Phase, read_phase
 from skillframe_lmc.words import axis_words, direction_words, exact_words, listed
 

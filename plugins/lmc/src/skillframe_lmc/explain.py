@@ -7,7 +7,7 @@ from collections.abc import Callable
 from math import degrees
 from typing import TYPE_CHECKING, Any
 
-from skillframe.records import Document, Illustration
+from skillframe.extend.records import Document, Illustration
 from skillframe_lmc import pictures
 from skillframe_lmc.phase import Part, read_phase
 

@@ -26,8 +26,8 @@ from skillframe.config import build
 from skillframe.demonstration.record import Demonstration, resolve_point
 from skillframe.demonstration.together import common_frames
 from skillframe.errors import InputError
+from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, norm, unit
-from skillframe.records import Document, LearnOptions
 from skillframe_lmc import evidence, intervals
 from skillframe_lmc.axes import CompliantAxes, compliant_axes, straightness
 from skillframe_lmc.directions import Choice, choose

@@ -10,8 +10,8 @@ import numpy as np
 
 from skillframe.config import build, coerce
 from skillframe.errors import InputError
+from skillframe.extend.records import Document
 from skillframe.frames import Float, norm
-from skillframe.records import Document
 from skillframe_lmc.kept import check_evidence
 
 Vector = tuple[float, float, float]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from skillframe.records import Lazy, RowType
+from skillframe.extend.records import Lazy, RowType
 
 SEED = "the overview paper (Suomalainen), section on learning from force"
 PAPER_6 = "Suomalainen, Calinon, Pignat, Kyrki, ICRA 2019"

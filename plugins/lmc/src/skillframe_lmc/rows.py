@@ -12,17 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.demonstrate import record
 from skillframe.demonstration.record import Demonstration
-from skillframe.executor import simulate
+from skillframe.document.file import new_document
+from skillframe.document.source import learned
+from skillframe.extend.records import Document, Illustration, LearnOptions, RowResult, RowRun
+from skillframe.extend.registry import registry
 from skillframe.frames import Float
-from skillframe.prepare import load_robot_model, load_world, prepare
-from skillframe.records import Document, Illustration, LearnOptions, RowResult, RowRun
-from skillframe.registry import registry
 from skillframe.reproduce.bars import reached
-from skillframe.skillfile import new_document
-from skillframe.skillsource import learned
-from skillframe.teacher import TeacherSettings
+from skillframe.run.executor import simulate
+from skillframe.run.prepare import load_robot_model, load_world, prepare
+from skillframe.teaching.sessions import record
+from skillframe.teaching.teacher import TeacherSettings
 
 DOWN, X, Y = np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 SHARE = 0.95

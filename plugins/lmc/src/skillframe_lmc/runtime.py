@@ -18,8 +18,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.extend.records import Document
 from skillframe.frames import Float, Pose, rotate, rotation_matrix, rotation_vector
-from skillframe.records import Document
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons, rows_of
 from skillframe_lmc.phase import Part, Phase, read_phase
 from skillframe_lmc.stall import StallWatch

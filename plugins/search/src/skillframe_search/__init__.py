@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from skillframe.hookspecs import hookimpl
-from skillframe.records import Document, Illustration, LearnOptions, RowType, SkillType
+from skillframe.extend.hookspecs import hookimpl
+from skillframe.extend.records import Document, Illustration, LearnOptions, RowType, SkillType
 
 if TYPE_CHECKING:
     from skillframe.demonstration.record import Demonstration

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from skillframe.demonstration.record import Demonstration
+from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float
-from skillframe.records import Document, LearnOptions
 
 RATE, SECONDS = 100.0, 20.0
 PUSH, FRICTION = 10.0, 0.2
@@ -14,8 +14,8 @@ PUSH, FRICTION = 10.0, 0.2
 
 def example(kind: str) -> Document:
     """A document of a kind, learned from a made-up search of a plane."""
-    from skillframe.registry import registry
-    from skillframe.skillsource import learned
+    from skillframe.document.source import learned
+    from skillframe.extend.registry import registry
 
     settings = {"speed": 0.015, "time": 4.0}
     return learned(registry().skill(kind), [searching()], LearnOptions(settings=settings))

@@ -12,8 +12,8 @@ from skillframe.config import build
 from skillframe.demonstration.record import Demonstration, resolve_point
 from skillframe.demonstration.together import common_frames
 from skillframe.errors import InputError
+from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, norm
-from skillframe.records import Document, LearnOptions
 from skillframe_search import forces
 from skillframe_search.contact import Samples, in_contact, push_direction, samples, surface_axes
 from skillframe_search.exploration import Exploration, coordinates_of, explored

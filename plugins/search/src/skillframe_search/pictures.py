@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
+from skillframe.extend.records import Document, Illustration
 from skillframe.frames import Float, norm
-from skillframe.records import Document, Illustration
 from skillframe_search.contact import surface_axes
 from skillframe_search.describe import NAMES
 from skillframe_search.exploration import COORDINATES

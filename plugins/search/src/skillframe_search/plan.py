@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from skillframe.extend.records import Document
 from skillframe.frames import Float, norm
-from skillframe.records import Document
 from skillframe_search.contact import surface_axes
 from skillframe_search.ergodic import ergodic
 from skillframe_search.exploration import COORDINATES, CUT, LEVER

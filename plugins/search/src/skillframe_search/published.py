@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from skillframe.records import Lazy, RowType
+from skillframe.extend.records import Lazy, RowType
 
 SOURCE = "Ehlers, Suomalainen, Lundell, Kyrki, ICRA 2019 (abstract), and the overview paper"
 FILLET_M = 0.0008  # of the part; its size sets how hard the search is

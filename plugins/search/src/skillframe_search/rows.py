@@ -11,8 +11,8 @@ from math import radians
 from typing import Any, NamedTuple
 
 from skillframe.campaign.statistics import clopper_pearson
+from skillframe.extend.records import Document, Illustration, RowResult, RowRun
 from skillframe.frames import Float
-from skillframe.records import Document, Illustration, RowResult, RowRun
 from skillframe.reproduce.bars import reached
 from skillframe_search.trials import NOBODY_KNEW, Task, demonstrations, document, goals, search, share
 

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.extend.records import Document
 from skillframe.frames import Float, Pose, move_wrench, rotate, rotate_spatial, rotation_matrix
-from skillframe.records import Document
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons, rows_of
 from skillframe_search.phase import Phase, read_phase
 from skillframe_search.plan import NUMBERS, keyed, plan

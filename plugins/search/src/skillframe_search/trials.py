@@ -12,16 +12,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from skillframe.blind_teacher import CUT, BlindSettings
-from skillframe.demonstrate_blind import record_blind
 from skillframe.demonstration.record import Demonstration
-from skillframe.executor import Result, simulate
+from skillframe.document.source import learned
+from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend.registry import registry
 from skillframe.frames import Float
-from skillframe.prepare import load_robot_model, load_world, prepare
-from skillframe.records import Document, LearnOptions
-from skillframe.registry import registry
 from skillframe.robot.model import RobotModel
-from skillframe.skillsource import learned
+from skillframe.run.executor import Result, simulate
+from skillframe.run.prepare import load_robot_model, load_world, prepare
+from skillframe.teaching.blind import CUT, BlindSettings
+from skillframe.teaching.blind_sessions import record_blind
 from skillframe.world.scene import Scene
 
 FOUND_M = 0.0025

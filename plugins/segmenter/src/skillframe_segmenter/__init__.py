@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from skillframe.hookspecs import hookimpl
-from skillframe.records import Document, Illustration, LearnOptions, RowType, SegmenterType, SkillType
+from skillframe.extend.hookspecs import hookimpl
+from skillframe.extend.records import Document, Illustration, LearnOptions, RowType, SegmenterType, SkillType
 
 if TYPE_CHECKING:
     from skillframe.demonstration.record import Demonstration

@@ -9,7 +9,7 @@ from pathlib import PurePath
 from typing import NamedTuple
 
 from skillframe.errors import InputError, UnknownName
-from skillframe.records import Document
+from skillframe.extend.records import Document
 
 OPTION = "--set-boundary"
 

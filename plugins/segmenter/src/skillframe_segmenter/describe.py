@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from skillframe.records import Document, Illustration
-from skillframe.registry import registry
+from skillframe.extend.records import Document, Illustration
+from skillframe.extend.registry import registry
 from skillframe_segmenter.document import PolicyDocument, read
 from skillframe_segmenter.pictures import cuts
 from skillframe_segmenter.policy import successor_words

@@ -9,9 +9,9 @@ import numpy as np
 
 from skillframe.config import coerce
 from skillframe.errors import InputError
+from skillframe.extend.records import Document
+from skillframe.extend.registry import registry
 from skillframe.frames import Float
-from skillframe.records import Document
-from skillframe.registry import registry
 from skillframe_segmenter.model import PhaseModel, from_document
 
 FOLLOWED = ("wrench_hmm", "pose_hmm")

@@ -22,9 +22,9 @@ import numpy as np
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
+from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend.registry import registry
 from skillframe.frames import norm
-from skillframe.records import Document, LearnOptions
-from skillframe.registry import registry
 from skillframe_segmenter.agreement import check_agreement
 from skillframe_segmenter.boundaries import Move, moved, parse_move
 from skillframe_segmenter.segmentation import refitted

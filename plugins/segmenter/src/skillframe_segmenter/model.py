@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from skillframe.config import coerce
 from skillframe.errors import InputError
+from skillframe.extend.records import Document
 from skillframe.frames import Float
-from skillframe.records import Document
 from skillframe_segmenter.emission import DIMENSIONS, Phases
 from skillframe_segmenter.features import Scales
 from skillframe_segmenter.gate import Gate

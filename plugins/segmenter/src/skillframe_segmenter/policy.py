@@ -18,9 +18,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from skillframe.extend.records import Document
+from skillframe.extend.registry import registry
 from skillframe.frames import Float
-from skillframe.records import Document
-from skillframe.registry import registry
 from skillframe.sequence import END, Composition, Part
 from skillframe.skill import Command, Observation, Skill, Status
 from skillframe_segmenter.document import PolicyDocument, read

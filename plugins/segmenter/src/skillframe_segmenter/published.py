@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from skillframe.records import Lazy, RowType
+from skillframe.extend.records import Lazy, RowType
 
 HAGOS = "Hagos, Suomalainen, Kyrki, IROS 2018 (abstract), and the overview paper"
 SETTINGS = {"teacher.aim_noise_deg": 8.0, "world.friction": 0.2, "table.moved": 0.03}

@@ -15,14 +15,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.demonstrate import record
 from skillframe.demonstration.record import Demonstration
+from skillframe.extend.records import Document, Illustration, LearnOptions, RowResult, RowRun
+from skillframe.extend.registry import registry
 from skillframe.frames import Float, matrix_from_quaternion, rotation_vector
-from skillframe.prepare import load_robot_model, load_world
-from skillframe.records import Document, Illustration, LearnOptions, RowResult, RowRun
-from skillframe.registry import registry
 from skillframe.reproduce.bars import judged, reached, undecided
-from skillframe.teacher import TeacherSettings
+from skillframe.run.prepare import load_robot_model, load_world
+from skillframe.teaching.sessions import record
+from skillframe.teaching.teacher import TeacherSettings
 from skillframe_segmenter.model import from_document
 from skillframe_segmenter.observer import follow
 

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from skillframe.config import build
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
+from skillframe.extend.records import Document
 from skillframe.frames import Float, norm, rotation_vector
-from skillframe.records import Document
 from skillframe_segmenter import changepoints, em, gate, merge, model, pose_gate, runs
 from skillframe_segmenter.boundaries import OPTION
 from skillframe_segmenter.features import Features, Scales, features, scales, typical_scales

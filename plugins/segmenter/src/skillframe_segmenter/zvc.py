@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from skillframe.config import build
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
+from skillframe.extend.records import Document
 from skillframe.frames import Float, norm
-from skillframe.records import Document
 from skillframe_segmenter import runs
 from skillframe_segmenter.features import typical_speeds
 from skillframe_segmenter.segmentation import rows_of, successors

@@ -1,1 +1,0 @@
-"""Learned skills as settings and messages of controllers that others wrote."""

@@ -1,0 +1,53 @@
+"""The six hooks a plug-in can implement; each yields records and runs once per process, never in the loop.
+
+A plug-in is a distribution with an entry point in the group `skillframe` that names a module::
+
+    from skillframe import hookimpl
+    from skillframe.extend.records import SkillType
+
+    @hookimpl
+    def skillframe_skills():
+        yield SkillType(name="my_skill", summary="...", build=build)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import pluggy
+
+from skillframe.extend.records import CoordinatorType, ReaderType, RowType, SegmenterType, SkillType, WorldType
+
+GROUP = "skillframe"
+hookspec = pluggy.HookspecMarker(GROUP)
+hookimpl = pluggy.HookimplMarker(GROUP)
+
+
+@hookspec
+def skillframe_skills() -> Iterable[SkillType]:  # type: ignore[empty-body]
+    """Kinds of skill: how they are learned, built, described and explained."""
+
+
+@hookspec
+def skillframe_segmenters() -> Iterable[SegmenterType]:  # type: ignore[empty-body]
+    """Ways of cutting demonstrations into phases."""
+
+
+@hookspec
+def skillframe_coordinators() -> Iterable[CoordinatorType]:  # type: ignore[empty-body]
+    """Skills for several arms."""
+
+
+@hookspec
+def skillframe_worlds() -> Iterable[WorldType]:  # type: ignore[empty-body]
+    """Worlds to run in."""
+
+
+@hookspec
+def skillframe_readers() -> Iterable[ReaderType]:  # type: ignore[empty-body]
+    """Demonstration file formats."""
+
+
+@hookspec
+def skillframe_rows() -> Iterable[RowType]:  # type: ignore[empty-body]
+    """Published results and how ours are computed: rows of `skillframe reproduce`."""

@@ -1,0 +1,68 @@
+"""The demonstration formats that ship with the core; a reader's module is imported when a file of its kind is read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from skillframe.errors import InputError
+from skillframe.extend.records import ReaderType
+
+if TYPE_CHECKING:
+    from skillframe.demonstration.bags import ToolPoses
+    from skillframe.demonstration.record import Demonstration
+
+BAG_OPTIONS = ("pose_topic", "pose_frames", "wrench_topic", "robot")
+
+
+def _reader(module: str, function: str) -> Callable[[Path, Mapping[str, Any]], Demonstration]:
+    def read(path: Path, options: Mapping[str, Any]) -> Demonstration:
+        for name in BAG_OPTIONS:
+            if options.get(name) is not None:
+                raise InputError(path, "is no ROS bag", f"leave --{name.replace('_', '-')} away")
+        result: Demonstration = getattr(import_module(f"skillframe.demonstration.{module}"), function)(path, options)
+        return result
+
+    return read
+
+
+def _writer(module: str, function: str) -> Callable[[Demonstration, Path], None]:
+    def write(demonstration: Demonstration, path: Path) -> None:
+        getattr(import_module(f"skillframe.demonstration.{module}"), function)(demonstration, path)
+
+    return write
+
+
+def _bag_reader(tool_poses: ToolPoses) -> Callable[[Path, Mapping[str, Any]], Demonstration]:
+    def read(path: Path, options: Mapping[str, Any]) -> Demonstration:
+        from skillframe.demonstration.bags import read_bag
+
+        return read_bag(path, options, tool_poses)
+
+    return read
+
+
+def reader_types(tool_poses: ToolPoses) -> Iterable[ReaderType]:
+    """The core's formats: native npz, CSV, delimited text, ROS bags.
+
+    Args:
+        tool_poses: forward kinematics for recorded joint states.
+    """
+    yield ReaderType(
+        name="npz", summary="native form: named arrays and JSON metadata", suffixes=(".npz",),
+        read=_reader("npz", "read_npz"), write=_writer("npz", "write_npz"),
+    )  # fmt: skip
+    yield ReaderType(
+        name="csv", summary="CSV with a header, metadata in NAME.meta.toml", suffixes=(".csv",),
+        read=_reader("csv", "read_csv"), write=_writer("csv", "write_csv"),
+    )  # fmt: skip
+    yield ReaderType(
+        name="delimited", summary="delimited text of any layout, with --columns", suffixes=(".dat", ".txt", ".tsv"),
+        read=_reader("delimited", "read_delimited"),
+    )  # fmt: skip
+    yield ReaderType(
+        name="rosbag", summary="ROS 1 and ROS 2 bags, with --pose-topic and --wrench-topic",
+        suffixes=(".bag", ".db3", ".mcap"), read=_bag_reader(tool_poses),
+    )  # fmt: skip

@@ -1,0 +1,1 @@
+"""The hydraulic cylinder: its equations, their integration, and banks of cylinders."""

@@ -1,0 +1,64 @@
+"""The actuators of a machine's trials: kept between runs, and the parameters that differ from trial to trial."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from skillframe.errors import InputError
+from skillframe.fmu.actuator import Actuators, ActuatorSpec
+from skillframe.frames import Float
+from skillframe.machine.checks.figures import CYLINDER, completed
+from skillframe.machine.cylinder.opening import open_cylinders
+from skillframe.robot.spec import RobotSpec
+
+_KEPT: dict[tuple[Any, ...], Actuators] = {}
+KEPT_AT_MOST = 2
+
+
+def banks(spec: RobotSpec, trials: int) -> Actuators:
+    """A bank of a robot's actuators for so many trials; the same one again if it was the last asked for.
+
+    Opening FMUs takes some tenths of a second, resetting them none to speak of, so a campaign's chunks share a bank.
+
+    Raises:
+        InputError, UnknownName, MissingDependency, InstanceFailed: an actuator cannot be opened.
+    """
+    specs = [
+        ActuatorSpec(fmu=a.fmu, parameters=completed(a), inputs=dict(a.inputs), outputs=dict(a.outputs), name=a.joint)
+        for a in spec.actuation
+    ]
+    key = (str(spec.folder), repr(specs), trials)
+    if key not in _KEPT:
+        while len(_KEPT) >= KEPT_AT_MOST:
+            _KEPT.pop(next(iter(_KEPT))).close()
+        _KEPT[key] = open_cylinders(specs, trials, spec.folder)
+    return _KEPT[key]
+
+
+def instance_parameters(spec: RobotSpec, draws: Mapping[str, Float], hold: Float) -> list[dict[str, float]]:
+    """Parameters of every instance, trial by trial: `actuator.*` draws, and equilibrium with holding forces (N, k)."""
+    result = []
+    for trial, forces in enumerate(hold):
+        for actuation, force in zip(spec.actuation, forces, strict=True):
+            held = actuation.initial_force or ("initial_force" if actuation.fmu == CYLINDER else "")
+            result.append(_drawn(completed(actuation), draws, trial) | ({held: float(force)} if held else {}))
+    return result
+
+
+def _drawn(parameters: Mapping[str, Any], draws: Mapping[str, Float], trial: int) -> dict[str, float]:
+    changed = {
+        name: float(np.asarray(draws[f"actuator.{name}"])[trial])
+        for name in ("supply_pressure", "deadband")
+        if f"actuator.{name}" in draws
+    }
+    if "actuator.friction_scale" in draws:
+        scale = float(np.asarray(draws["actuator.friction_scale"])[trial])
+        frictions = [n for n in ("coulomb_friction", "viscous_friction", "static_friction") if n in parameters]
+        if not frictions:
+            text = "no actuator parameter is called coulomb_friction, viscous_friction or static_friction"
+            raise InputError("actuator.friction_scale", text, "vary something that the FMU has under that name")
+        changed |= {name: scale * float(parameters[name]) for name in frictions}
+    return changed

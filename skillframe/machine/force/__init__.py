@@ -1,0 +1,1 @@
+"""The contact force of a hydraulic machine, estimated from its pressures."""

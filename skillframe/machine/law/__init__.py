@@ -1,0 +1,1 @@
+"""The control law of hydraulic machines: virtual decomposition control, readable and compiled."""

@@ -1,0 +1,208 @@
+r"""Virtual Decomposition Control, one hydraulic cylinder: from a required piston force to a valve command.
+
+    f_pr = f_cr + Y_f theta_f,    Y_f = (y, xd_r),    theta_f' = rho_f Y_f^T (xd_r - xd) within bounds
+    y = z + c (tanh(xd_r / v_s) - z),    z' = (xd_r - |xd_r| z) / z_ss,    c = f^2 / (f^2 + f_0^2)
+    u_f = k_x (xd_r - xd) + k_f (f_pr - f_p) + f_pr'/B + A_a xd/(V_a/A_a + x) + A_b xd/(V_b/A_b + s - x)
+          + c_l (1/(V_a/A_a + x) + 1/(V_b/A_b + s - x)) (p_a - p_b),    f_p = A_a p_a - A_b p_b
+    u_e = u_f / (c sqrt(p_S - p_a)/(V_a/A_a + x) + c sqrt(p_b - p_R)/(V_b/A_b + s - x))    for u_f > 0,
+    u_e = u_f / (c sqrt(p_S - p_b)/(V_b/A_b + s - x) + c sqrt(p_a - p_R)/(V_a/A_a + x))    for u_f < 0,
+    u = (1 - b) u_e + b tanh(u_e / w)
+
+J. Koivumaki and J. Mattila's cylinder subsystem as published with the data set of Petrovic and Mattila, Mech. Mach.
+Theory 170 (2022) 104680. With the exact inverse, (f_pr - f_p)'/B = -k_x (xd_r - xd) - k_f (f_pr - f_p), so
+(f_pr - f_p)^2 / (2 B k_x) + (theta_f - theta_f^)^2 / (2 rho_f) is the accompanying function of a cylinder. Pressure
+drops below `laminar_pressure` are raised to it (our choice): the published inverse divides by a root that vanishes. The
+last line steps over the spool's overlap b; it is ours, and smooth over w = 0.2 % of the travel, because there the noise
+of u_e would throw a spool to and fro (an exact inverse has a step of 2 b).
+
+Where no force is fed back (c = 0) friction has a bristle's state z, as published (Zhu and Piedboeuf, 2005): a piston
+that stops keeps the friction it had, and turns it round over z_ss. Where one is, it is a flat function of the required
+velocity (our choice): there xd_r hangs on the estimated force f, which a bristle answers a quarter of a period late and
+a steep tanh too strongly, so that the machine swung by 1 kN where it should have stood. f_0 is small, so that the two
+do not change places while a tool lands: with 1 kN it hopped.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from skillframe.errors import InputError
+from skillframe.frames import Float
+from skillframe.robot.driven import Actuation
+
+_SLIDING = 5e-3  # m/s at which friction without a state has risen to tanh(1)
+ACROSS = 2e-3  # w, share of the valve's travel
+_NAMES = (
+    "bore", "rod", "stroke", "dead_volume_a", "dead_volume_b", "bulk_modulus", "rated_flow", "rated_pressure_drop",
+    "leakage", "coulomb_friction", "viscous_friction", "supply_pressure", "return_pressure",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cylinders:
+    """Parameters of n cylinders as the controller knows them, arrays (n,), SI, names of the contract.
+
+    Attributes:
+        area_a, area_b: piston and rod side [m^2]; edge: conductance of a valve edge [m^3/(s sqrt(Pa))].
+        arm_a, arm_b: dead volume over area [m]. deadband: nominal overlap b of the spool, share of its travel.
+        presliding_length: z_ss [m].
+    """
+
+    area_a: Float
+    area_b: Float
+    arm_a: Float
+    arm_b: Float
+    stroke: Float
+    edge: Float
+    bulk_modulus: Float
+    leakage: Float
+    coulomb_friction: Float
+    viscous_friction: Float
+    supply_pressure: Float
+    return_pressure: Float
+    laminar_pressure: Float
+    deadband: Float
+    presliding_length: Float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CylinderGains:
+    """Velocity gain k_x and force gain k_f per cylinder (n,); published: 5e-3 and 2e-8, extension 1e-3 and 8e-9."""
+
+    velocity: Float
+    force: Float
+
+
+def cylinders(actuation: Sequence[Actuation], where: object = "robot.toml") -> Cylinders:
+    """The controller's cylinders from a robot's `[[actuation]]`.
+
+    Raises:
+        InputError: a parameter is missing.
+    """
+    rows = [a.known for a in actuation]
+    for a in actuation:
+        missing = [name for name in _NAMES if name not in a.known]
+        if missing:
+            text = f"the cylinder on {a.joint} has no {', '.join(missing)}"
+            raise InputError(where, text, "add it to parameters or nominal of its [[actuation]]")
+    p = {name: np.array([row[name] for row in rows], dtype=float) for name in _NAMES}
+    area_a = math.pi / 4 * p["bore"] ** 2
+    area_b = area_a - math.pi / 4 * p["rod"] ** 2
+    per_edge = np.array([1.0 if row.get("rated_drop_is_per_edge", True) else 0.5 for row in rows])
+    kept = ("stroke", "bulk_modulus", "leakage", "coulomb_friction", "viscous_friction")
+    pressures = ("supply_pressure", "return_pressure")
+    return Cylinders(
+        area_a=area_a, area_b=area_b, arm_a=p["dead_volume_a"] / area_a, arm_b=p["dead_volume_b"] / area_b,
+        edge=p["rated_flow"] / np.sqrt(per_edge * p["rated_pressure_drop"]),
+        laminar_pressure=np.array([row.get("laminar_pressure", 1e5) for row in rows], dtype=float),
+        deadband=np.array([row.get("deadband", 0.0) for row in rows], dtype=float),
+        presliding_length=np.array([row.get("presliding_length", 5e-4) for row in rows], dtype=float),
+        **{name: p[name] for name in (*kept, *pressures)},
+    )  # fmt: skip
+
+
+def pressure_force(c: Cylinders, pressure_a: Float, pressure_b: Float) -> Float:
+    """f_p (..., n) of chamber pressures [N]."""
+    return np.asarray(c.area_a * pressure_a - c.area_b * pressure_b)
+
+
+def friction(c: Cylinders, velocity: Float) -> Float:
+    """Coulomb and viscous friction (..., n) against a sliding piston [N]."""
+    return np.asarray(c.coulomb_friction * np.tanh(velocity / _SLIDING) + c.viscous_friction * velocity)
+
+
+def friction_parameters(c: Cylinders) -> Float:
+    """theta_f (2, n) of the friction law: F_C [N] and F_v [N s/m], as the controller knows them."""
+    return np.stack([c.coulomb_friction, c.viscous_friction])
+
+
+def friction_regressor(velocity: Float, shape: Float | None = None) -> Float:
+    """Y_f (..., 2, n) of velocities (..., n): friction is the sum of Y_f theta_f over the second axis from the end.
+
+    shape: y (..., n); tanh(v / 5 mm/s) where it is not given.
+    """
+    return np.stack([np.tanh(velocity / _SLIDING) if shape is None else shape, velocity], axis=-2)
+
+
+def bristle_after(c: Cylinders, bristle: Float, velocity: Float, dt: float) -> Float:
+    """Bristles z (..., n) after a sample of dt [s] at one velocity, exactly."""
+    way = np.sign(velocity)
+    return np.asarray(way + (bristle - way) * np.exp(-np.abs(velocity) * dt / c.presliding_length))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactFriction:
+    """From which force on it is that of contact, f_0 [N], and how flat it then is, v_s [m/s]."""
+
+    force: float = 500.0
+    sliding: float = 1e-2
+
+
+def coulomb_shape(bristle: Float, velocity: Float, force: Float, contact: ContactFriction) -> Float:
+    """Shape y (..., n) of bristles and required velocities (..., n), and the force (..., 2) on the tool."""
+    square = np.sum(np.square(force), axis=-1, keepdims=True)
+    share = square / (square + contact.force**2)
+    return np.asarray(bristle + share * (np.tanh(velocity / contact.sliding) - bristle))
+
+
+def pressure_rates(
+    c: Cylinders, pressures: tuple[Float, Float], x: Float, xd: Float, command: Float
+) -> tuple[Float, Float]:
+    """Rates of both chamber pressures with a valve that follows at once; the model that the law inverts."""
+    p_a, p_b = pressures
+    out, u_e = command > 0.0, opening(c.deadband, command)
+    q_a = u_e * c.edge * np.sqrt(np.where(out, _drop(c, c.supply_pressure - p_a), _drop(c, p_a - c.return_pressure)))
+    q_b = u_e * c.edge * np.sqrt(np.where(out, _drop(c, p_b - c.return_pressure), _drop(c, c.supply_pressure - p_b)))
+    leak = c.leakage * (p_a - p_b)
+    rate_a = c.bulk_modulus / (c.area_a * (c.arm_a + x)) * (q_a - leak - c.area_a * xd)
+    rate_b = c.bulk_modulus / (c.area_b * (c.arm_b + c.stroke - x)) * (leak + c.area_b * xd - q_b)
+    return rate_a, rate_b
+
+
+def flow_demand(
+    c: Cylinders, gains: CylinderGains, motion: tuple[Float, Float, Float], force: tuple[Float, Float],
+    pressures: tuple[Float, Float],
+) -> Float:  # fmt: skip
+    """u_f (..., n).
+
+    Args:
+        c: the cylinders.
+        gains: k_x and k_f.
+        motion: piston position, velocity and required velocity.
+        force: required pressure force f_pr and its rate [N, N/s].
+        pressures: of both chambers [Pa].
+    """
+    (x, xd, xd_r), (f_pr, rate), (p_a, p_b) = motion, force, pressures
+    a, b = 1.0 / (c.arm_a + x), 1.0 / (c.arm_b + c.stroke - x)
+    feedback = gains.velocity * (xd_r - xd) + gains.force * (f_pr - pressure_force(c, p_a, p_b))
+    leak = c.leakage * (a + b) * (p_a - p_b)
+    return np.asarray(feedback + rate / c.bulk_modulus + (c.area_a * a + c.area_b * b) * xd + leak)
+
+
+def inverse_valve(
+    c: Cylinders, demand: Float, x: Float, pressures: tuple[Float, Float], supply: Float | None = None
+) -> Float:  # fmt: skip
+    """Opening u_e (..., n) of the edges, not limited, that makes the flow demand; supply: p_S, nominal if not given."""
+    (p_a, p_b), high = pressures, c.supply_pressure if supply is None else supply
+    a, b = 1.0 / (c.arm_a + x), 1.0 / (c.arm_b + c.stroke - x)
+    extend = np.sqrt(_drop(c, high - p_a)) * a + np.sqrt(_drop(c, p_b - c.return_pressure)) * b
+    retract = np.sqrt(_drop(c, high - p_b)) * b + np.sqrt(_drop(c, p_a - c.return_pressure)) * a
+    return np.asarray(demand / (c.edge * np.where(demand > 0.0, extend, retract)))
+
+
+def opening(deadband: Float, command: Float) -> Float:
+    """u_e (..., n) that a command opens; the overlap opens nothing."""
+    return np.asarray(np.copysign(np.maximum(np.abs(command) - deadband, 0.0) / (1.0 - deadband), command))
+
+
+def across_deadband(deadband: Float, opening: Float) -> Float:
+    """Command u (..., n) that opens a valve of overlap b as wanted, u_e."""
+    return np.asarray((1.0 - deadband) * opening + deadband * np.tanh(opening / ACROSS))
+
+
+def _drop(c: Cylinders, drop: Float) -> Float:
+    return np.maximum(drop, c.laminar_pressure)

@@ -1,0 +1,115 @@
+"""What robot.toml says of a machine beyond an arm: loops, actuators, payload, sensors, and the gains of its law."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+LEAST_CORNER, LARGEST_CORNER = 5.0, 0.08
+"""Of filters: [Hz]; share of the control rate (from 0.13 on a `RateFilter` is unstable). Ours: 5 Hz lag by 64 ms."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Loop:
+    """A closed chain: the origins of two frames of the tree coincide."""
+
+    frame_a: str
+    frame_b: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Payload:
+    """What a machine carries: `mass` [kg] of load in the inertia of a link, and `rating`, the most it may be [kg]."""
+
+    link: str
+    mass: float
+    rating: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Actuation:
+    """An actuator (an FMU) on a joint.
+
+    Attributes:
+        parameters: of the FMU, by its names; inputs, outputs: our names to the FMU's.
+        nominal: what the controller takes the cylinder for, by our names, where the FMU is not told so in `parameters`.
+        initial_force: the FMU's parameter for the force [N] that it holds at the start; "" if it has none.
+        velocity_gain, force_gain: k_x [m] and k_f [m^2/(N s)] of its piston (`skillframe.machine.law.vdc_actuator`).
+    """
+
+    joint: str
+    fmu: str
+    parameters: dict[str, Any] = field(default_factory=dict)
+    inputs: dict[str, str] = field(default_factory=dict)
+    outputs: dict[str, str] = field(default_factory=dict)
+    nominal: dict[str, Any] = field(default_factory=dict)
+    initial_force: str = ""
+    velocity_gain: float = 5e-3
+    force_gain: float = 4e-9
+
+    @property
+    def known(self) -> dict[str, Any]:
+        """Parameters of the cylinder as the controller knows them, by our names."""
+        return {**self.parameters, **self.nominal}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sensors:
+    """Of a hydraulic machine: white noise at every sample, standard deviations, then a filter of two equal poles.
+
+    The defaults are those published with the data set of Petrovic and Mattila, Mech. Mach. Theory 170 (2022) 104680,
+    whose noise powers are per sample of a millisecond.
+
+    Attributes:
+        encoder: of each minimal coordinate [rad or m], a step over the square root of 12 if steps are all its noise.
+        pressure: of each chamber [Pa]; corner_hz: of the filters [Hz].
+    """
+
+    encoder: float = 1e-4
+    pressure: float = 0.22e5
+    corner_hz: float = 24.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gains:
+    """Gains of the law of a hydraulic machine that are the same for all of it; ours.
+
+    Attributes:
+        body: K_A of every body [N s/m, N m s/rad]; the published 5 damps nothing, and a tool that lands on something
+            hard hops.
+        force_corner_hz: of the filter that gives the required piston forces' rate [Hz]; published: 8.
+    """
+
+    body: float = 1000.0
+    force_corner_hz: float = 16.0
+
+
+def impossible(actuation: tuple[Actuation, ...], sensors: Sensors, gains: Gains) -> Iterator[tuple[str, str, str]]:
+    """What the types allow and no machine has: key, what is wrong with it, and the cure."""
+    for drive in actuation:
+        for key in ("velocity_gain", "force_gain"):
+            value = getattr(drive, key)
+            if not 0.0 < value < math.inf:
+                yield f"actuation of {drive.joint}: {key}", f"is {value:g}", "give a positive, finite number"
+    figures = (
+        ("sensors.encoder", sensors.encoder, 0.0, 0.1, "rad (m), a standard deviation"),
+        ("sensors.pressure", sensors.pressure, 0.0, 1e7, "Pa, a standard deviation"),
+        ("sensors.corner_hz", sensors.corner_hz, LEAST_CORNER, math.inf, "Hz"),
+        ("gains.body", gains.body, 0.0, math.inf, "N s/m"),
+        ("gains.force_corner_hz", gains.force_corner_hz, LEAST_CORNER, math.inf, "Hz"),
+    )
+    for key, value, low, high, unit in figures:
+        if not low <= value <= high or not math.isfinite(value):
+            allowed = f"{low:g} to {high:g} {unit}" if math.isfinite(high) else f"{low:g} {unit} or more"
+            yield key, f"is {value:g}", f"give {allowed}"
+
+
+def fast_filters(sensors: Sensors, gains: Gains, rate_hz: float) -> Iterator[tuple[str, str]]:
+    """Filters that a control rate [Hz] is too low for: what is wrong, and the cure."""
+    corners = {"sensors.corner_hz": sensors.corner_hz, "gains.force_corner_hz": gains.force_corner_hz}
+    for key, corner in corners.items():
+        if corner > LARGEST_CORNER * rate_hz:
+            problem = f"{key} is {corner:g}, too fast a filter for control.rate_hz of {rate_hz:g}"
+            yield problem, f"give {LARGEST_CORNER * rate_hz:g} Hz at most, or raise control.rate_hz"

@@ -1,0 +1,1 @@
+"""Signals in the loop: delay lines, rate filters and Kalman filters."""

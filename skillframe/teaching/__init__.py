@@ -1,0 +1,1 @@
+"""Simulated people who demonstrate: hand on the tool, blindfolded, or at a teleoperation station."""

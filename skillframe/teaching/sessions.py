@@ -1,0 +1,192 @@
+"""Record demonstrations from the simulated teacher: the same world, sensors and executor as a run, then one file each.
+
+A demonstration that fails (jams, breaks a limit, runs out of time) is redrawn with the next seed of its slot and
+counted; the count is part of the result and of the file's metadata.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from skillframe.demonstration.convention import STANDARD
+from skillframe.demonstration.record import Demonstration
+from skillframe.errors import SkillframeError
+from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, rotate
+from skillframe.robot.guesses import guess_note
+from skillframe.robot.model import RobotModel
+from skillframe.run.executor import Result, Setup, simulate
+from skillframe.run.trace import Trace
+from skillframe.teaching.blind import BlindSettings
+from skillframe.teaching.staged import teacher_for
+from skillframe.teaching.teacher import TeacherSettings
+from skillframe.teaching.teleoperation import OperatorSettings
+from skillframe.world.placement import fixture_poses
+from skillframe.world.scene import Scene
+from skillframe.world.sensors import SensorSettings
+
+MOST_ATTEMPTS = 20
+Watch = Callable[[float, float], None]
+"""Told how many seconds are simulated, and of how many at most."""
+ESTIMATED = SensorSettings(force_noise=1.0, torque_noise=0.07)
+"""A teleoperated machine's wrench is often an estimate: 0.4 to 2.3 N of noise are seen on such recordings."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recording:
+    """Demonstrations in order, and how many attempts failed on the way, with their reasons."""
+
+    demonstrations: list[Demonstration]
+    rejected: list[str]
+
+
+def record(
+    robot: RobotModel,
+    scene: Scene,
+    settings: TeacherSettings,
+    *,
+    count: int,
+    seed: int,
+    draws: Mapping[str, float] | None = None,
+    rate_hz: float = 500.0,
+    duration_s: float = 12.0,
+    sensors: SensorSettings | None = None,
+    progress: Callable[[str], None] | None = None,
+    watch: Watch | None = None,
+) -> Recording:
+    """Demonstrate a scene `count` times; the starts of the scene's task are taken in turn.
+
+    Args:
+        robot: who is taught.
+        scene: what is taught.
+        settings: the person.
+        count: demonstrations wanted.
+        seed: everything random follows from it.
+        draws: quantities that hold for every demonstration (`start.*` is added to the task's own start).
+        rate_hz: sample rate of the files.
+        duration_s: longest demonstration.
+        sensors: noise of the sensors; a wrist sensor's if not given, an estimate's for teleoperation.
+        progress: told in words what happens.
+        watch: told now and then how many seconds are simulated, and of how many at most.
+
+    Raises:
+        SkillframeError: a slot still fails after 20 attempts; says with what.
+    """
+    sensors = sensors or (ESTIMATED if settings.kind == "teleoperation" else SensorSettings())
+
+    def attempt(slots: list[int], number: int) -> Result:
+        return _attempt(robot, scene, settings, slots, number, seed, draws or {}, rate_hz, duration_s, sensors, watch)
+
+    def keep(trace: Trace, slot: int, number: int) -> Demonstration:
+        return demonstration_from(trace, scene, settings, sensors, seed=seed, slot=slot, attempt=number)
+
+    return collect(robot, scene, count, attempt, keep, progress)
+
+
+def collect(
+    robot: RobotModel,
+    scene: Scene,
+    count: int,
+    attempt: Callable[[list[int], int], Result],
+    keep: Callable[[Trace, int, int], Demonstration],
+    progress: Callable[[str], None] | None,
+) -> Recording:
+    """Let a teacher attempt what is still missing until every slot has its demonstration.
+
+    Args:
+        robot: for the messages.
+        scene: for the messages.
+        count: slots to be filled.
+        attempt: runs the slots, the so many-th time.
+        keep: makes the demonstration of a slot from its trace and the number of the attempt.
+        progress: told in words what happens.
+
+    Raises:
+        SkillframeError: a slot still fails after 20 attempts; says with what.
+    """
+    done: dict[int, Demonstration] = {}
+    rejected: list[str] = []
+    if progress is not None:
+        progress(beginning(robot, scene, count))
+    for number in range(MOST_ATTEMPTS):
+        slots = [slot for slot in range(count) if slot not in done]
+        result = attempt(slots, number)
+        assert result.traces is not None
+        for slot, good, failure, trace in zip(slots, result.success, result.failure, result.traces, strict=True):
+            if good:
+                done[slot] = keep(trace, slot, number)
+            else:
+                rejected.append(f"demonstration {slot}, attempt {number}: {failure}")
+        if progress is not None:
+            progress(f"{len(done)} of {count} demonstrations recorded, {len(rejected)} rejected")
+            if rejected and (note := guess_note(robot.spec)):
+                progress(f"note: {note}")
+        if len(done) == count:
+            return Recording(demonstrations=[done[slot] for slot in range(count)], rejected=rejected)
+    raise SkillframeError(
+        f"world {scene.name}: the teacher failed {MOST_ATTEMPTS} times for one demonstration "
+        f"(last: {rejected[-1]}); lower the noise or choose another start"
+        + (f"; {note}" if (note := guess_note(robot.spec)) else "")
+    )
+
+
+def beginning(robot: RobotModel, scene: Scene, count: int) -> str:
+    """Said once nothing speaks against the recording any more."""
+    return f"{robot.spec.name} in {scene.name}: recording {count} demonstration{'s' * (count != 1)} ..."
+
+
+def _attempt(
+    robot: RobotModel, scene: Scene, settings: TeacherSettings, slots: list[int], attempt: int, seed: int,
+    draws: Mapping[str, float], rate_hz: float, duration_s: float, sensors: SensorSettings | None,
+    watch: Watch | None,
+) -> Result:  # fmt: skip
+    columns = start_columns(scene, slots, draws)
+    teacher = teacher_for(scene, fixture_poses(robot, columns, len(slots)), settings)
+    last = (scene.task, *scene.task.then)[-1]
+    setup = Setup(
+        robot=robot, scene=scene, center_of_compliance=np.array(scene.tool.frames[scene.tool.hand]),
+        sensors=sensors or SensorSettings(), filter_wrench=False, stop_when=last.done or scene.goal,
+    )  # fmt: skip
+    rngs = [np.random.default_rng([seed, slot, attempt]) for slot in slots]
+    told = told_of(watch, duration_s)
+    return simulate(teacher, setup, columns, rngs, duration_s=duration_s, trace_hz=rate_hz, progress=told)
+
+
+def told_of(watch: Watch | None, duration_s: float) -> Callable[[float], None] | None:
+    """What a simulation of so many seconds at most tells; None where nobody watches."""
+    return None if watch is None else lambda now: watch(now, duration_s)
+
+
+def start_columns(scene: Scene, slots: Sequence[int], draws: Mapping[str, float]) -> dict[str, Float]:
+    """Quantities (N,) of the slots: the task's starts in turn, `start.*` draws added to them, others as given."""
+    starts = [{**scene.task.starts[slot % len(scene.task.starts)]} for slot in slots]
+    for start in starts:
+        for key, value in draws.items():
+            start[key] = start.get(key, 0.0) + value if key.startswith("start.") else value
+    keys = sorted({key for start in starts for key in start})
+    return {key: np.array([start.get(key, 0.0) for start in starts]) for key in keys}
+
+
+def demonstration_from(
+    trace: Trace, scene: Scene, settings: TeacherSettings | BlindSettings | OperatorSettings,
+    sensors: SensorSettings | None = None,
+    **provenance: int,
+) -> Demonstration:  # fmt: skip
+    """A demonstration at the tool point out of a trace taken at the handle; the wrench is as sensed, not filtered."""
+    pose = Pose(trace.position, matrix_from_quaternion(trace.quaternion))
+    handle: Float = np.array(trace.meta["center_of_compliance"])
+    noise = sensors or SensorSettings()
+    meta = {
+        "task": scene.name, "teacher": settings.kind, "rate": float(1.0 / np.median(np.diff(trace.time))),
+        "frames": {name: list(point) for name, point in scene.tool.frames.items()}, "hand": scene.tool.hand,
+        "contact": bool(scene.fixture), "simulated": {**asdict(settings), **provenance},
+        "robot": trace.meta["robot"], "world": {"name": scene.name, "params": scene.params},
+        "sensor": {"force_noise": noise.force_noise, "torque_noise": noise.torque_noise},
+        "stages": [time for time, _ in trace.meta["events"]], "wrench": dict(STANDARD),
+    }  # fmt: skip
+    return Demonstration(
+        time=trace.time.copy(), position=pose.at(-handle).position, quaternion=trace.quaternion.copy(),
+        wrench=move_wrench(trace.wrench, rotate(pose.rotation, -handle)), meta=meta, source=scene.name,
+    )  # fmt: skip

@@ -1,0 +1,220 @@
+r"""A simulated person who demonstrates: a compliant hand that holds the tool at a handle, pushes and turns it.
+
+The teacher is a skill whose centre of compliance is the handle, run by the one executor in the same world, with the
+same sensors, as any run. It knows the task (`Scene.task`) and sees the fixture; the learner never does. The hand is a
+Maxwell element (all figures ours, chosen so that demonstrations look and feel like recorded ones):
+
+    d = unit(d_0 + o),  do = -o dt / 0.5 s + sigma sqrt(2 dt / 0.5 s) N(0, 1)     where the person aims
+    x_h += v_h d dt;  x_h -= e_perp dt / tau;  push capped at F_max               e = x_h - x(t - delay)
+    F = K_h (x_h - x) + B_h (v_h d - v) + tremor
+
+A person softens to align a part and stiffens to slide it, hence one hand per task. Teleoperation adds a one-way delay
+to what the person sees and to what arrives, and scales the person's tremor by the motion scale.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from skillframe.errors import UnknownName
+from skillframe.frames import Float, Pose, matrix_from_quaternion, norm, rotate, rotation_matrix, rotation_vector, unit
+from skillframe.signals.delay import require_delay
+from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
+from skillframe.world.scene import Task
+
+AIM_TIME, TREMOR_TIME = 0.5, 0.1  # correlation times of aim and tremor [s]
+BLOCK = 500
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hand:
+    """How the hand holds: translation stiffness [N/m], damping [Ns/m], relaxation time [s]; rotation alike.
+
+    `speed` [m/s] is how fast it pushes on, `turn_rate` [rad/s] how fast an active hand turns the part, and
+    `torque_max` [Nm] how hard. At its largest push a hand that `gives_way` goes back as far as it is pushed back; one
+    that does not slows down as its push grows, stops at the largest, and stays as stiff as before.
+    """
+
+    stiffness: float
+    damping: float
+    relaxation: float
+    turn_stiffness: float
+    turn_damping: float
+    speed: float = 0.02
+    turn_rate: float = 0.0
+    torque_max: float = 1.5
+    gives_way: bool = True
+
+
+HANDS = {
+    "sliding": Hand(stiffness=1000.0, damping=60.0, relaxation=1.0, turn_stiffness=20.0, turn_damping=1.0),
+    "aligning": Hand(
+        stiffness=400.0, damping=40.0, relaxation=0.3, turn_stiffness=3.0, turn_damping=0.3, turn_rate=0.15,
+        speed=0.03,
+    ),
+    "lever": Hand(
+        stiffness=400.0, damping=40.0, relaxation=0.3, turn_stiffness=15.0, turn_damping=0.8, turn_rate=0.25,
+        torque_max=3.0,
+    ),
+    "hold": Hand(stiffness=1000.0, damping=60.0, relaxation=1.0, turn_stiffness=20.0, turn_damping=1.0),
+    "master": Hand(
+        stiffness=1200.0, damping=25.0, relaxation=0.25, turn_stiffness=20.0, turn_damping=1.0, gives_way=False
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TeacherSettings:
+    """How well the person aims, and through what.
+
+    Attributes:
+        kind: "kinesthetic" (the hand is on the robot) or "teleoperation" (delay and scale apply).
+        aim_noise: standard deviation of the pushing direction per axis [rad].
+        speed: of the push [m/s]; None for the hand's own. force_max: [N].
+        tremor_force: [N]; tremor_torque: [Nm].
+        delay_s: one-way delay of teleoperation [s].
+        scale: motion of the robot over motion of the master.
+    """
+
+    kind: str = "kinesthetic"
+    aim_noise: float = 0.13962634015954636
+    speed: float | None = None
+    force_max: float = 15.0
+    tremor_force: float = 0.5
+    tremor_torque: float = 0.03
+    delay_s: float = 0.0
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("kinesthetic", "teleoperation"):
+            raise UnknownName("teacher", self.kind, ["kinesthetic", "teleoperation"])
+        require_delay(self.delay_s, "teacher: delay_s")
+
+
+class Teacher(Skill):
+    """The person's hand on N tools.
+
+    Args:
+        task: what the person knows, in the fixture frame.
+        fixture: true pose of the fixture per trial, (N, 3) and (N, 3, 3).
+        settings: how well the person aims.
+        hand: how the person holds; the task's if None.
+    """
+
+    def __init__(self, task: Task, fixture: Pose, settings: TeacherSettings, hand: Hand | None = None) -> None:
+        if task.hand not in HANDS:
+            raise UnknownName("hand", task.hand, HANDS)
+        self._task, self._hand, self._settings, self._fixture = task, hand or HANDS[task.hand], settings, fixture
+
+    def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
+        """Take hold of the tool where it is."""
+        count, hand = len(rngs), self._hand
+        self._rngs, self._next = list(rngs), BLOCK
+        self._noise = np.zeros((count, BLOCK, 9))
+        self._aim, self._tremor = np.zeros((count, 3)), np.zeros((count, 6))
+        self._position = observation.pose.position.copy()
+        self._rotation = observation.pose.rotation.copy()
+        self._impedance = Impedance(
+            np.diag([hand.stiffness] * 3 + [hand.turn_stiffness] * 3),
+            np.diag([hand.damping] * 3 + [hand.turn_damping] * 3),
+        )
+        turned = self._fixture.rotation
+        task = self._task
+        self._direction = None if task.direction is None else rotate(turned, np.array(task.direction))
+        self._aligned = None if task.aligned is None else turned @ matrix_from_quaternion(task.aligned)
+        self._turn = None if task.turn is None else rotate(turned, np.array(task.turn))
+        self._delay = _Delay(round(self._settings.delay_s / observation.dt))
+        self._arrival = _Delay(round(self._settings.delay_s / observation.dt))
+
+    def take_over(self, other: Teacher, observation: Observation) -> None:
+        """Go on where another hand of the same person leaves off: as hard a push, the same aim, tremor and delays."""
+        self.start(observation, other._rngs)
+        self._noise, self._next, self._aim, self._tremor = other._noise, other._next, other._aim, other._tremor
+        self._delay, self._arrival = other._delay, other._arrival
+        lead = other._position - observation.pose.position
+        self._position = observation.pose.position + lead * (other._hand.stiffness / self._hand.stiffness)
+        turned = rotation_vector(other._rotation @ np.swapaxes(observation.pose.rotation, -1, -2))
+        scale = other._hand.turn_stiffness / self._hand.turn_stiffness
+        self._rotation = rotation_matrix(scale * turned) @ observation.pose.rotation
+
+    def step(self, observation: Observation) -> Command:
+        """Move the hand one tick on and hold the tool with it."""
+        noise = self._draw()
+        seen_position, seen_rotation = self._delay.push(observation.pose.position, observation.pose.rotation)
+        velocity = self._push(noise[:, :3], seen_position, observation.dt)
+        turning = self._turn_hand(seen_rotation, observation.dt)
+        tremor = self._shake(noise[:, 3:], observation.dt)
+        position, rotation, twist = self._arrival.push(
+            self._position.copy(), self._rotation, np.concatenate([velocity, turning], axis=-1)
+        )
+        count = len(self._rngs)
+        return Command(
+            Pose(position, rotation), twist, self._impedance, tremor, np.full(count, Status.RUNNING), no_reasons(count)
+        )
+
+    def _draw(self) -> Float:
+        if self._next == BLOCK:
+            for i, rng in enumerate(self._rngs):
+                self._noise[i] = rng.standard_normal((BLOCK, 9))
+            self._next = 0
+        self._next += 1
+        sample: Float = self._noise[:, self._next - 1]
+        return sample
+
+    def _push(self, noise: Float, seen: Float, dt: float) -> Float:
+        """Advance the hand's position; returns its velocity (N, 3)."""
+        settings, hand = self._settings, self._hand
+        error = self._position - seen
+        if self._direction is None:
+            self._position = self._position - error * (dt / hand.relaxation)
+            return np.zeros_like(error)
+        self._aim += -self._aim * (dt / AIM_TIME) + settings.aim_noise * np.sqrt(2.0 * dt / AIM_TIME) * noise
+        direction = unit(self._direction + self._aim)
+        along = (error * direction).sum(-1, keepdims=True)
+        sideways = error - along * direction
+        excess = np.maximum(along - settings.force_max / hand.stiffness, 0.0)
+        velocity: Float = (hand.speed if settings.speed is None else settings.speed) * direction
+        if not hand.gives_way:
+            left = 1.0 - along * (hand.stiffness / settings.force_max)
+            velocity, excess = np.clip(left, 0.0, 1.0) * velocity, np.zeros_like(excess)
+        self._position = self._position + velocity * dt - sideways * (dt / hand.relaxation) - excess * direction
+        return velocity
+
+    def _turn_hand(self, seen: Float, dt: float) -> Float:
+        """Advance the hand's attitude; returns its angular velocity (N, 3)."""
+        hand = self._hand
+        if self._aligned is not None:
+            remaining = rotation_vector(self._aligned @ np.swapaxes(self._rotation, -1, -2))
+            rate = unit(remaining) * np.minimum(hand.turn_rate, norm(remaining) / dt)[..., None]
+        elif self._turn is not None:
+            rate = hand.turn_rate * self._turn
+        else:
+            return np.zeros((len(seen), 3))
+        turned = rotation_matrix(rate * dt) @ self._rotation
+        lead = rotation_vector(turned @ np.swapaxes(seen, -1, -2))
+        most = hand.torque_max / hand.turn_stiffness
+        held = lead * np.minimum(1.0, most / np.maximum(norm(lead), 1e-12))[..., None]
+        self._rotation = rotation_matrix(held) @ seen
+        return np.zeros_like(rate)
+
+    def _shake(self, noise: Float, dt: float) -> Float:
+        settings = self._settings
+        level = np.array([settings.tremor_force] * 3 + [settings.tremor_torque] * 3) * settings.scale
+        self._tremor += -self._tremor * (dt / TREMOR_TIME) + level * np.sqrt(2.0 * dt / TREMOR_TIME) * noise
+        return self._tremor.copy()
+
+
+class _Delay:
+    """Hands back what was pushed `ticks` ago; the first value until then."""
+
+    def __init__(self, ticks: int) -> None:
+        self._ticks, self._line = ticks, list[tuple[Float, ...]]()
+
+    def push(self, *values: Float) -> tuple[Float, ...]:
+        if not self._ticks:
+            return values
+        self._line.append(tuple(v.copy() for v in values))
+        return self._line.pop(0) if len(self._line) > self._ticks else self._line[0]

@@ -1,0 +1,138 @@
+"""Closed forms at rest: areas, equilibrium, held loads, holding without creep, bulk modulus, rated flow."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from skillframe.fmu.library import fmu_folders
+from skillframe.fmu.table import read_table, rows
+from skillframe.machine.cylinder import equations as eq
+from tests.unit.fmu.fmu_fakes import bank
+
+FREE = {"coulomb_friction": 0.0, "static_friction": 0.0, "viscous_friction": 0.0}
+FORCE, PA, PB = 0, 3, 4
+
+
+def parameters(**changes):
+    table = read_table(fmu_folders()["hydraulic_cylinder"])
+    values = {r.name: r.entry.start for r in rows(table) if r.causality == "parameter"}
+    return eq.derive(values | changes)
+
+
+@pytest.mark.parametrize("load", [-4e4, 0.0, 5.5e4])
+def test_the_pressures_at_the_start_hold_the_load_to_rounding(cylinder, load):
+    b = bank(cylinder, FREE | {"initial_force": load})
+    b.start()
+    area_a, area_b = math.pi / 4 * 0.08**2, math.pi / 4 * (0.08**2 - 0.045**2)
+    assert b.y[0, FORCE] == pytest.approx(load, rel=1e-10, abs=1e-10 * 1e5)  # 1e-10 of the forces that cancel
+    assert area_a * b.y[0, PA] - area_b * b.y[0, PB] == pytest.approx(load, rel=1e-10, abs=1e-5)
+    assert min(b.y[0, PA], b.y[0, PB]) == 30e5
+    b.close()
+
+
+def test_a_closed_valve_without_leakage_holds_its_load_for_a_minute_without_creep(cylinder2):
+    b = bank(cylinder2, {"initial_force": 5.5e4, "leakage": 0.0})
+    b.start()
+    first = b.y.copy()
+    for k in range(60_000):
+        assert b.step(k * 1e-3, 1e-3)
+    # nothing moves, so nothing may change: the tolerance is that of the equilibrium's own rounding
+    np.testing.assert_allclose(b.y[0, [FORCE, PA, PB]], first[0, [FORCE, PA, PB]], rtol=1e-10)
+    b.close()
+
+
+def test_friction_holds_a_push_within_the_presliding_length_and_gives_it_back(cylinder2):
+    b = bank(cylinder2, {"leakage": 0.0})
+    b.start()
+    stiffness = 4000 / 5e-4
+    for k, v in enumerate([1e-4] * 100 + [0.0] * 500):  # 10 um in, then standing still
+        b.u[0, 1:4] = 0.3 + 1e-4 * 1e-3 * min(k, 100), v, 0.0
+        b.step(k * 1e-3, 1e-3)
+    p = parameters()
+    oil = sum(
+        8e8 * a * a / volume for a, volume in ((p.area_a, 3e-3 + p.area_a * 0.3), (p.area_b, 3e-3 + p.area_b * 0.29))
+    )
+    held = -(stiffness + oil) * 1e-5
+    # z relaxes by z/z_ss = 2 % over 10 um of sliding, so the force is within 2 % of the springs'
+    assert b.y[0, FORCE] == pytest.approx(held, rel=0.02)
+    b.close()
+
+
+def test_the_valve_passes_the_rated_flow_at_the_rated_drop(cylinder):
+    per_edge = {"supply_pressure": 100e5, "initial_pressure": 30e5, "return_pressure": 0.0, "laminar_pressure": 1e3}
+    whole = per_edge | {"rated_drop_is_per_edge": False}
+    b = bank(cylinder, per_edge, whole)
+    b.u[:, 0] = 1.0
+    b.start()
+    # the laminar transition takes (dp_tr/dp)^2/4 of the flow
+    np.testing.assert_allclose(b.y[:, 5], [100 / 60e3, math.sqrt(2) * 100 / 60e3], rtol=1e-8)
+    b.close()
+
+
+def test_overlap_opens_nothing_and_full_travel_opens_everything(cylinder2):
+    b = bank(cylinder2, *({"deadband": 0.1, "initial_pressure": 30e5} for _ in range(3)))
+    b.u[:, 0] = 0.1, 0.55, 1.0
+    b.start()
+    flows = b.y[:, 5] / b.y[2, 5]
+    np.testing.assert_allclose(flows, [0.0, 0.5, 1.0], atol=1e-12)
+    b.close()
+
+
+@given(st.floats(0, 400e5), st.floats(0, 0.05), st.floats(4e8, 2e9))
+@settings(max_examples=60, deadline=None)
+def test_the_bulk_modulus_is_minus_volume_times_slope_of_the_mixture(pressure, air, oil):
+    p = parameters(air_fraction=air, bulk_modulus=oil)
+
+    def volume(gauge):  # liquid of constant mass, air on a polytrope, per unit at ambient pressure
+        liquid = (1 - air) * (1 - (gauge - pressure) / oil)
+        return liquid + air * (eq.AMBIENT / (gauge + eq.AMBIENT)) ** (1 / eq.POLYTROPIC)
+
+    d = 10.0
+    slope = (volume(pressure + d) - volume(pressure - d)) / (2 * d)
+    # central differences over 20 Pa of a volume of one: 1e-16 / 20 Pa against a slope of 1e-9 / Pa
+    assert float(eq.bulk_modulus(pressure, p)) == pytest.approx(-volume(pressure) / slope, rel=1e-5)
+
+
+def test_relief_and_check_keep_a_blocked_cylinder_between_their_pressures(cylinder2):
+    b = bank(cylinder2, {"leakage": 0.0}, {"leakage": 0.0, "air_fraction": 0.01})
+    b.u[:, 2] = 0.1
+    b.start()
+    for k in range(1500):  # 0.15 m against a closed valve
+        b.u[:, 1] = 0.3 + 0.1 * k * 1e-3
+        assert b.step(k * 1e-3, 1e-3)
+    area_a, area_b = math.pi / 4 * 0.08**2, math.pi / 4 * (0.08**2 - 0.045**2)
+    relief, check = 250e5 + area_b * 0.1 / 1.7e-9, 10e5 - area_a * 0.1 / 8e-9
+    np.testing.assert_allclose(b.y[:, PB], relief, rtol=1e-6)
+    np.testing.assert_allclose(b.y[:, PA], check, rtol=1e-6)
+    b.close()
+
+
+def test_the_supply_sags_by_the_droop_at_full_pump_flow(cylinder2):
+    b = FmuSag(cylinder2)
+    # steady: the pump gives what the cylinder takes, on the pump's line
+    assert b.pressure == pytest.approx(190e5 - 5e5 * b.flow / 5e-4, rel=1e-6)
+    assert b.pressure < 189e5
+
+
+class FmuSag:
+    """A piston that runs at a steady speed which the valve feeds, until the supply has settled."""
+
+    def __init__(self, facts):
+        from skillframe.fmu.actuator import ActuatorSpec
+        from skillframe.fmu.driver import FmuBank
+
+        outputs = {"force": "force", "pressure_supply": "pressure_supply", "flow_supply": "flow_supply"}
+        inputs = {n: n for n in ("command", "position", "velocity")}
+        spec = ActuatorSpec(fmu="x", parameters={"pump_flow": 5e-4}, inputs=inputs, outputs=outputs)
+        b = FmuBank([spec], [facts])
+        b.u[0, :3] = 0.25, 0.1, 0.05
+        b.start()
+        for k in range(4000):
+            b.u[0, 1] = 0.1 + 0.05 * k * 1e-3
+            assert b.step(k * 1e-3, 1e-3)
+        self.pressure = b.y[0, b.outputs.index("pressure_supply")]
+        self.flow = b.y[0, b.outputs.index("flow_supply")]
+        b.close()

@@ -1,0 +1,84 @@
+"""Overlap and supply pressure of valves, from steady flows through edges whose overlap, supply and lag are known."""
+
+import numpy as np
+import pytest
+
+from skillframe.errors import SkillframeError
+from skillframe.machine.force.valve import ValveIdentification, ValveSettings
+from skillframe.machine.law.hydraulic import Measured, Terms
+from skillframe.machine.law.vdc_actuator import cylinders, opening
+from skillframe.robot.spec import load_robot
+
+CYLINDERS = cylinders(load_robot("hiab_xs031").actuation)
+DT, SECONDS = 1e-3, 6.0
+OVERLAP, SUPPLY = np.array([[0.0, 0.01, 0.03], [0.02, 0.005, 0.0]]), np.array([[150e5], [205e5]])
+NOISE = 1e-3  # m/s of the piston rates, as of the crane's lift and tilt behind their filters
+
+
+def machine(x, velocity, pressures):
+    nothing = np.zeros((len(x), 1))
+    measured = Measured(nothing, nothing, *pressures, nothing, nothing)
+    return measured, Terms(*(nothing for _ in range(5)), x, velocity, nothing, nothing)
+
+
+def steady(valve, overlap, supply):
+    """(velocity, p_a, p_b) of a piston without load that follows its valve at once: both edges pass what it moves."""
+    c, u, extends = CYLINDERS, opening(overlap, valve), valve > 0.0
+    into, out = np.where(extends, c.area_a, c.area_b), np.where(extends, c.area_b, c.area_a)
+    pushed = 20e5 * c.area_a  # a load, so that the pressures differ
+    load = np.where(extends, pushed, -pushed)
+    share = (out / into) ** 2  # p_out - p_R over p_S - p_in
+    filled = (np.abs(load) + out * (c.return_pressure + share * supply)) / (into + out * share)
+    drained = c.return_pressure + share * (supply - filled)
+    velocity = np.sign(u) * np.abs(u) * c.edge * np.sqrt(supply - filled) / into
+    return velocity, np.where(extends, filled, drained), np.where(extends, drained, filled)
+
+
+def found(lag=0, overlap=OVERLAP, size=0.15, seed=0, **settings):
+    """Slow swings of the valves, seen `lag` ticks late, rates noisy."""
+    rng, known = np.random.default_rng(seed), ValveIdentification(CYLINDERS, 2, DT, ValveSettings(**settings))
+    times = np.arange(round(SECONDS / DT)) * DT
+    valve = size * np.sin(2 * np.pi * times[:, None, None] / 3.0 + np.arange(3)) * np.ones((1, 2, 1))
+    x = np.full((2, 3), 0.3)
+    for k in range(1, len(times)):
+        velocity, p_a, p_b = steady(valve[max(0, k - 1 - lag)], overlap, SUPPLY)
+        seen = velocity + NOISE * rng.normal(size=(2, 3))
+        known.step(valve[k - 1], *machine(x, seen, (p_a, p_b)))
+    known.solve()
+    return known
+
+
+@pytest.mark.parametrize("lag", [0, 20])
+def test_overlap_supply_and_lag_are_found_from_noisy_flows(lag):
+    """Overlap to 4 deviations and 2e-3 of the travel; the command's filter lags 13 ms by itself."""
+    known = found(lag)
+    error = np.abs(known.overlap - OVERLAP)
+    assert np.all(error < 4.0 * known.overlap_deviation)
+    assert error.max() < 2e-3
+    assert known.overlap_deviation.max() < 2e-3
+    np.testing.assert_allclose(known.supply, np.tile(SUPPLY, 3), atol=2e5)
+    assert np.all(np.abs(known.lag - max(0.0, 1e-3 * lag - 0.013)) <= 0.008)
+
+
+def test_what_is_compensated_lies_a_deviation_below_what_was_found_and_never_below_zero():
+    known = found(overlap=0.0 * OVERLAP)
+    assert np.all(known.compensated >= 0.0)
+    assert np.all(known.compensated <= np.maximum(known.overlap, 0.0))
+
+
+def test_valves_that_hardly_open_say_nothing_and_leave_what_is_nominal():
+    known = found(size=0.015)
+    np.testing.assert_allclose(known.overlap, np.tile(CYLINDERS.deadband, (2, 1)))
+    np.testing.assert_allclose(known.overlap_deviation, known.settings.overlap)
+    np.testing.assert_allclose(known.supply, np.tile(CYLINDERS.supply_pressure, (2, 1)))
+
+
+def test_a_supply_far_from_the_nominal_one_is_not_believed():
+    known = found(reach=0.05)
+    np.testing.assert_allclose(known.supply[0], 0.95 * CYLINDERS.supply_pressure)
+
+
+@pytest.mark.parametrize("name", ["period", "drop", "overlap"])
+def test_a_setting_that_is_not_positive_is_refused(name):
+    with pytest.raises(SkillframeError, match=f"{name} must be positive"):
+        ValveSettings(**{name: 0.0})
