@@ -19,10 +19,10 @@ from skillframe.fmu.opening import open_actuators
 from skillframe.machine.force.momentum import Estimate, ForceEstimator
 from skillframe.machine.law import vdc_actuator as act
 from skillframe.machine.law.hydraulic import Measured, Terms
-from skillframe.machine.law.vdc_reference import Task
+from skillframe.machine.law.vdc_reference import ToolTask
 from skillframe.world.convert import SOLIMP, SOLREF, build_spec
 from skillframe.world.scene import Geom, Scene, Tool
-from skillframe.world.scene import Task as SceneTask
+from skillframe.world.scene import ToolTask as SceneTask
 from tests.crane_terms import terms
 from tests.laws.vdc_loop import crane, quintic
 
@@ -211,7 +211,7 @@ class Press:
     def __init__(self, case, seeds, settings=None):
         self.rngs, count = [np.random.default_rng(seed) for seed in seeds], len(seeds)
         self.plant, self.law = Cranes(case), Law(count, case.damping)
-        z = Task(crane(), (0, 2), ("extension",)).solve(crane(), START, np.array([0.8, -1.6, 0.5]))
+        z = ToolTask(crane(), (0, 2), ("extension",)).solve(crane(), START, np.array([0.8, -1.6, 0.5]))
         self.plant.reset(z)
         spec = [
             ActuatorSpec(

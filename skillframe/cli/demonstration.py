@@ -16,7 +16,7 @@ from skillframe.cli.numbers import NUMBER
 from skillframe.cli.output import emit_json, note, quiet_option
 
 if TYPE_CHECKING:
-    from skillframe.conditioning.audit import Audit
+    from skillframe.conditioning.audit import DemonstrationAudit
 
 _LAZY = {"record": "skillframe.cli.record"}
 
@@ -195,7 +195,7 @@ def check(files: tuple[Path, ...], as_json: bool, **options: Any) -> int:
     return 0 if all(found.usable for found in audits) else 1
 
 
-def _show(found: Audit) -> None:
+def _show(found: DemonstrationAudit) -> None:
     """One audit for people: degrees and millimetres, with their units."""
     degrees = math.degrees(found.turned_rad)
     click.echo(found.file)
@@ -227,7 +227,7 @@ WRENCH_WORDS: dict[str, Callable[[Any], str]] = {
 }  # fmt: skip
 
 
-def _declared(found: Audit) -> str:
+def _declared(found: DemonstrationAudit) -> str:
     """What the metadata say about the wrench, as it is after reading."""
     frames = f"; points {', '.join(found.frames)}" if found.frames else ""
     words = [say(found.wrench[key]) for key, say in WRENCH_WORDS.items() if key in found.wrench]
@@ -245,11 +245,11 @@ def counted(count: int, what: str) -> str:
     return f"{count} {what}{'s' * (count != 1)}"
 
 
-def _stalls(found: Audit) -> str:
+def _stalls(found: DemonstrationAudit) -> str:
     return ", ".join(f"{s['what']} {s['start']:.2f}-{s['stop']:.2f} s" for s in found.stalls)
 
 
-def _contacts(found: Audit) -> str:
+def _contacts(found: DemonstrationAudit) -> str:
     late = dict.fromkeys(found.onsets_unseen, ", onset not seen")
     spans = [f"{c[0]:.2f}-{c[1]:.2f} s (peak {c[2]:.1f} N{late.get(c[0], '')})" for c in found.contacts[:8]]
     more = f" and {len(found.contacts) - 8} more" if len(found.contacts) > 8 else ""

@@ -22,7 +22,7 @@ LOWEST_PYTHON = (3, 11)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
+class Check:
     """One thing that skillframe uses.
 
     Attributes:
@@ -64,7 +64,7 @@ def command(as_json: bool) -> int:
     return int(any(finding.required and finding.fix for finding in findings))
 
 
-def examine() -> Iterator[Finding]:
+def examine() -> Iterator[Check]:
     """Everything that skillframe uses, the required first."""
     yield _python()
     yield from _libraries()
@@ -74,14 +74,14 @@ def examine() -> Iterator[Finding]:
     yield from _plugins()
 
 
-def _python() -> Finding:
+def _python() -> Check:
     version = ".".join(map(str, sys.version_info[:3]))
     old = sys.version_info[:2] < LOWEST_PYTHON
     fix = f"install Python {'.'.join(map(str, LOWEST_PYTHON))} or newer, then: make install" if old else ""
-    return Finding(name="python", found=version, needed_for="everything", required=True, fix=fix)
+    return Check(name="python", found=version, needed_for="everything", required=True, fix=fix)
 
 
-def _libraries() -> Iterator[Finding]:
+def _libraries() -> Iterator[Check]:
     """The declared dependencies, optional ones too, against what is installed; nothing is imported."""
     for requirement in metadata.requires("skillframe") or []:
         match = re.match(r"([\w.-]+)\s*(?:>=\s*([\d.]+))?", requirement)
@@ -96,35 +96,35 @@ def _libraries() -> Iterator[Finding]:
         fix = "" if enough else f"{sys.executable} -m pip install '{name}>={lowest}'"
         extra = re.search(r"extra == ['\"]([\w-]+)", requirement)
         purpose = f"the optional part {extra.group(1)}" if extra else "the core"
-        yield Finding(name=name, found=found, needed_for=purpose, required=extra is None, fix=fix)
+        yield Check(name=name, found=found, needed_for=purpose, required=extra is None, fix=fix)
 
 
 def _numbers(version: str) -> tuple[int, ...]:
     return tuple(int(part) for part in re.findall(r"\d+", version)[:3])
 
 
-def _compiler() -> Finding:
+def _compiler() -> Check:
     path = next((found for name in COMPILERS if (found := shutil.which(name))), "")
     if not path and find_spec("ziglang") is not None:
         path = "ziglang"
     fix = "" if path else "sudo apt install build-essential (or: pip install ziglang)"
-    return Finding(name="C compiler", found=path, needed_for="building FMUs", fix=fix)
+    return Check(name="C compiler", found=path, needed_for="building FMUs", fix=fix)
 
 
-def _browser() -> Finding:
+def _browser() -> Check:
     path = next((found for name in BROWSERS if (found := shutil.which(name))), "")
     fix = "" if path else "sudo apt install chromium (only the tests that open reports need it)"
-    return Finding(name="browser", found=path, needed_for="tests that open reports", fix=fix)
+    return Check(name="browser", found=path, needed_for="tests that open reports", fix=fix)
 
 
-def _recordings() -> Finding:
+def _recordings() -> Check:
     setting = os.environ.get("SKILLFRAME_RECORDINGS", "")
     found = setting if setting and os.path.isdir(setting) else ""
     problem = f"{setting} is no folder; " if setting and not found else ""
     fix = (
         "" if found else f"{problem}export SKILLFRAME_RECORDINGS=FOLDER (only tests on third-party recordings need it)"
     )
-    return Finding(name="recordings", found=found, needed_for="tests on real recordings", fix=fix)
+    return Check(name="recordings", found=found, needed_for="tests on real recordings", fix=fix)
 
 
 def _provided(provides: Sequence[str]) -> str:
@@ -133,12 +133,12 @@ def _provided(provides: Sequence[str]) -> str:
     return ", ".join(f"{count} {kind}{'s' * (count != 1)}" for kind, count in counts.items()) or "nothing"
 
 
-def _plugins() -> Iterator[Finding]:
+def _plugins() -> Iterator[Check]:
     from skillframe.extend.registry import registry
 
     for plugin in registry().plugins:
         fix = f"{plugin.error}; {sys.executable} -m pip install --upgrade {plugin.distribution}" if plugin.error else ""
-        yield Finding(
+        yield Check(
             name=f"plug-in {plugin.name}",
             found=f"{plugin.distribution} {plugin.version}",
             needed_for=_provided(plugin.provides),

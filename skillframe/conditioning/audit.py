@@ -33,7 +33,7 @@ LEAST_PATH, LEAST_TURN = 1e-4, np.deg2rad(0.1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Audit:
+class DemonstrationAudit:
     """Figures and warnings of one demonstration.
 
     Attributes:
@@ -91,7 +91,7 @@ class Audit:
         return dataclasses.asdict(self)
 
 
-def audit(demonstration: Demonstration) -> Audit:
+def audit(demonstration: Demonstration) -> DemonstrationAudit:
     """Look through a demonstration.
 
     Args:
@@ -119,7 +119,7 @@ def audit(demonstration: Demonstration) -> Audit:
         warnings.append(
             f"motion: the tool moves by {path * 1e3:.3f} mm and {np.rad2deg(turned):.3f} degrees: nothing to learn"
         )
-    return Audit(
+    return DemonstrationAudit(
         file=d.source, samples=len(d), duration_s=d.duration, rate_hz=d.rate,
         jitter=float(np.std(step[step < GAP * period]) / period),
         gaps=[[float(d.time[i]), float(step[i])] for i in np.flatnonzero(step > GAP * period)],
@@ -185,7 +185,7 @@ def _wrench_warnings(
     return result
 
 
-def compared(demonstrations: list[Demonstration], audits: list[Audit]) -> list[Audit]:
+def compared(demonstrations: list[Demonstration], audits: list[DemonstrationAudit]) -> list[DemonstrationAudit]:
     """Audits of one set, with warnings of what shows beside each other: a recording given twice, an odd way."""
     said = zip(audits, _repeats(demonstrations), _odd_ways(demonstrations), strict=True)
     return [dataclasses.replace(a, warnings=[*a.warnings, *filter(None, texts)]) for a, *texts in said]

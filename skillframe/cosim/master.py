@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.cosim.bond import bond_work, relative_residual
-from skillframe.cosim.plant import Float, Motion, Plant
+from skillframe.cosim.plant import Float, Mechanics, Motion
 from skillframe.errors import SkillframeError
 from skillframe.fmu.actuator import Actuators
 
@@ -67,7 +67,7 @@ class Master:
         SkillframeError: bonds do not match, or halving is asked for and cannot be done.
     """
 
-    def __init__(self, plant: Plant, bank: Actuators, settings: CosimSettings | None = None) -> None:
+    def __init__(self, plant: Mechanics, bank: Actuators, settings: CosimSettings | None = None) -> None:
         self.plant, self.bank, self.settings = plant, bank, settings or CosimSettings()
         if plant.count != bank.count:
             raise SkillframeError(

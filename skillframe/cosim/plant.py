@@ -18,7 +18,7 @@ class Motion(NamedTuple):
     acceleration: Float
 
 
-class Plant(Protocol):
+class Mechanics(Protocol):
     """Mechanics with `count` bonds, trial by trial as in the bank of actuators.
 
     It may also have `where() -> (position, velocity)`, (count,) each, for the end of a step: where accelerations are

@@ -14,7 +14,7 @@ import zipfile
 from pathlib import Path
 
 from skillframe.fmu.describe import build_description, model_description, variables_header
-from skillframe.fmu.table import Table, read_table
+from skillframe.fmu.table import VariableTable, read_table
 from skillframe.fmu.toolchain import FLAGS, CompilerFailed, compile_library, find_compiler
 from skillframe.paths import cache_dir, data_dirs
 
@@ -94,7 +94,7 @@ def _headers(folder: Path) -> list[Path]:
     return sorted(folder.glob("*.h"))
 
 
-def _token(folder: Path, table: Table, common: Path) -> str:
+def _token(folder: Path, table: VariableTable, common: Path) -> str:
     files = [
         folder / "fmu.toml",
         *(folder / s for s in table.sources),
@@ -105,7 +105,7 @@ def _token(folder: Path, table: Table, common: Path) -> str:
     return "{" + _digest(*parts)[:32] + "}"
 
 
-def _make(table: Table, folder: Path, common: Path, token: str, version: int, work: Path) -> Path:
+def _make(table: VariableTable, folder: Path, common: Path, token: str, version: int, work: Path) -> Path:
     from fmpy import platform, platform_tuple, sharedLibraryExtension
 
     tree = work / "tree"

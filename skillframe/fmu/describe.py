@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from xml.sax.saxutils import quoteattr
 
-from skillframe.fmu.table import Row, Table, rows, states
+from skillframe.fmu.table import Row, VariableTable, rows, states
 
 _CAUSALITY = {"input": "INPUT", "output": "OUTPUT", "local": "LOCAL", "parameter": "PARAMETER"}
 
 
-def variables_header(table: Table, token: str) -> str:
+def variables_header(table: VariableTable, token: str) -> str:
     """The C header that numbers the variables; `token` ties binary and description together."""
     listed = rows(table)
     lines = ["/* Made from fmu.toml; do not edit. */", f'#define MODEL_TOKEN "{token}"', "enum {"]
@@ -28,12 +28,12 @@ def variables_header(table: Table, token: str) -> str:
     return "\n".join([*lines, ""])
 
 
-def model_description(table: Table, token: str, version: int) -> str:
+def model_description(table: VariableTable, token: str, version: int) -> str:
     """modelDescription.xml for FMI 2.0 (version 2) or 3.0 (version 3)."""
     return _description2(table, token) if version == 2 else _description3(table, token)
 
 
-def build_description(table: Table, sources: list[str]) -> str:
+def build_description(table: VariableTable, sources: list[str]) -> str:
     """sources/buildDescription.xml of FMI 3.0."""
     files = "\n".join(f"      <SourceFile name={quoteattr(s)}/>" for s in sources)
     return (
@@ -44,7 +44,7 @@ def build_description(table: Table, sources: list[str]) -> str:
     )
 
 
-def _units(table: Table) -> str:
+def _units(table: VariableTable) -> str:
     lines = []
     for name, powers in table.units.items():
         base = " ".join(f'{unit}="{power}"' for unit, power in powers.items())
@@ -54,7 +54,7 @@ def _units(table: Table) -> str:
     return "  <UnitDefinitions>\n" + "\n".join(lines) + "\n  </UnitDefinitions>\n" if lines else ""
 
 
-def _states_and_unknowns(table: Table) -> tuple[list[Row], list[Row]]:
+def _states_and_unknowns(table: VariableTable) -> tuple[list[Row], list[Row]]:
     """Rows whose initial value is calculated: outputs, then states and rates that are no outputs."""
     outputs = [row for row in rows(table) if row.causality == "output"]
     hidden = [row for pair in states(table) for row in pair if row.causality == "local"]
@@ -90,7 +90,7 @@ def _attributes(row: Row, derivative: str) -> str:
     return " ".join(parts)
 
 
-def _description2(table: Table, token: str) -> str:
+def _description2(table: VariableTable, token: str) -> str:
     index = {row.name: row.reference + 1 for row in rows(table)}
     lines = []
     for row in rows(table):
@@ -128,7 +128,7 @@ def _unknowns2(kind: str, members: list[Row], index: dict[str, int]) -> str:
     return f"    <{kind}>{entries}</{kind}>\n" if members else ""
 
 
-def _description3(table: Table, token: str) -> str:
+def _description3(table: VariableTable, token: str) -> str:
     reference = {row.name: row.reference for row in rows(table)}
     lines = []
     for row in rows(table):

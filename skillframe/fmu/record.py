@@ -20,7 +20,7 @@ from skillframe.fmu.values import values_of
 EXACT = 2.0**53
 
 
-class Recorded(NamedTuple):
+class RecordedRun(NamedTuple):
     """Columns and number of rows written; the problem that ended the run early, or ""."""
 
     columns: list[str]
@@ -31,7 +31,7 @@ class Recorded(NamedTuple):
 def simulate_to_csv(
     file: str, stop: float, step: float, out: Path, *, table: Path | None = None,
     settings: dict[str, Any] | None = None, limit_s: float = 30.0,
-) -> Recorded:  # fmt: skip
+) -> RecordedRun:  # fmt: skip
     """Simulate an FMU (a name or a file) and write time and every output.
 
     Raises:
@@ -47,7 +47,7 @@ def simulate_to_csv(
     return _write(out, ["time", *output_columns(facts)], simulate(request, not is_allowed(path), limit_s))
 
 
-def _write(out: Path, columns: list[str], rows: Iterator[list[Any]]) -> Recorded:
+def _write(out: Path, columns: list[str], rows: Iterator[list[Any]]) -> RecordedRun:
     """Rows as they come; whatever ends them, those that were reached are kept."""
     count, problem = 0, ""
     other: BaseException | None = None
@@ -66,7 +66,7 @@ def _write(out: Path, columns: list[str], rows: Iterator[list[Any]]) -> Recorded
             other = error
     if other is not None:
         raise other
-    return Recorded(columns, count, problem)
+    return RecordedRun(columns, count, problem)
 
 
 def read_inputs(path: Path, facts: FmuFacts) -> tuple[list[str], list[list[float]]]:

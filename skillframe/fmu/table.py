@@ -32,7 +32,7 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Table:
+class VariableTable:
     """A model's variables and sources.
 
     Attributes:
@@ -68,14 +68,14 @@ class Row:
         return self.name.replace("der(", "der_").rstrip(")").upper()
 
 
-def read_table(folder: Path) -> Table:
+def read_table(folder: Path) -> VariableTable:
     """The table of an FMU's source folder.
 
     Raises:
         InputError: no fmu.toml, or one that cannot be meant.
     """
     path = folder / "fmu.toml"
-    table = build(Table, read_toml(path), str(path))
+    table = build(VariableTable, read_toml(path), str(path))
     names = [row.name for row in rows(table)]
     for name in names:
         if names.count(name) > 1:
@@ -91,7 +91,7 @@ def read_table(folder: Path) -> Table:
     return table
 
 
-def rows(table: Table) -> list[Row]:
+def rows(table: VariableTable) -> list[Row]:
     """All variables in the order of their value references; time, the independent variable, is last."""
     groups: list[tuple[Causality, dict[str, Entry]]] = [
         ("input", table.input), ("output", table.output), ("local", table.local), ("parameter", table.parameter),
@@ -101,7 +101,7 @@ def rows(table: Table) -> list[Row]:
     return [Row(name=n, reference=i, causality=c, entry=e) for i, (n, c, e) in enumerate(flat)]
 
 
-def states(table: Table) -> list[tuple[Row, Row]]:
+def states(table: VariableTable) -> list[tuple[Row, Row]]:
     """(state, its rate) in the order of the rates' declaration."""
     by_name = {row.name: row for row in rows(table)}
     return [(by_name[row.entry.derivative], row) for row in rows(table) if row.entry.derivative]

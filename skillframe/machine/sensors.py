@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from skillframe.frames import Float
-from skillframe.robot.driven import Sensors
+from skillframe.robot.driven import MachineNoise
 from skillframe.signals.rates import RateFilter
 
 BLOCK = 100
@@ -25,7 +25,7 @@ class MachineSensors:
         z, rate: (N, n) filtered; pressure_a, pressure_b: (N, k) filtered [Pa]. lag: of all of them [s].
     """
 
-    def __init__(self, settings: Sensors, rngs: Sequence[np.random.Generator], n: int, k: int, dt: float) -> None:
+    def __init__(self, settings: MachineNoise, rngs: Sequence[np.random.Generator], n: int, k: int, dt: float) -> None:
         self._rngs, self._n, self._k = list(rngs), n, k
         self._scale: Float = np.repeat([settings.encoder, settings.pressure], [n, 2 * k])
         self._filter = RateFilter(settings.corner_hz, dt)

@@ -16,8 +16,8 @@ import numpy as np
 
 from skillframe.frames import Float
 from skillframe.report.markup import Markup, figure, join, tag
-from skillframe.report.quantities import Quantity, quantity
-from skillframe.report.results import Rate, Results, Row
+from skillframe.report.quantities import ShownQuantity, quantity
+from skillframe.report.results import Rate, ResultRow, Results
 from skillframe.report.svg import Axes, padded, picture, text
 from skillframe.report.theory import Region, boundary, mark
 
@@ -34,7 +34,7 @@ def influence(results: Results) -> list[str]:
     return sorted(drawn, key=lambda name: (-round(scores[name], 9), drawn.index(name)))
 
 
-def _information(rows: Sequence[Row], name: str) -> float:
+def _information(rows: Sequence[ResultRow], name: str) -> float:
     """Mutual information [nat] between success and the quintile of a quantity."""
     values = np.array([row.values.get(name, math.nan) for row in rows])
     wins = np.array([row.success for row in rows])[np.isfinite(values)]
@@ -63,7 +63,7 @@ def edges_of(values: Float, trials: int) -> Float:
     return np.linspace(unique[0], unique[-1], count + 1)
 
 
-def values_of(rows: Sequence[Row], name: Quantity) -> Float:
+def values_of(rows: Sequence[ResultRow], name: ShownQuantity) -> Float:
     """A quantity's values (n,) in units for people."""
     return name.factor * np.array([row.values.get(name.name, math.nan) for row in rows])
 
@@ -84,8 +84,8 @@ def cell_map(results: Results, skill: str, names: Sequence[str], limits: Sequenc
 
 
 def _cell(
-    axes: Axes, results: Results, rows: Sequence[Row], names: tuple[Quantity, Quantity], x: tuple[float, float],
-    y: tuple[float, float],
+    axes: Axes, results: Results, rows: Sequence[ResultRow], names: tuple[ShownQuantity, ShownQuantity],
+    x: tuple[float, float], y: tuple[float, float],
 ) -> tuple[Markup, Markup]:  # fmt: skip
     """A cell and, to be drawn above everything else, its figures."""
     inside = [r for r in rows if _within(r, names[0], x, axes.x) and _within(r, names[1], y, axes.y)]
@@ -105,7 +105,7 @@ def _cell(
     )
 
 
-def _within(row: Row, name: Quantity, cell: tuple[float, float], whole: tuple[float, float]) -> bool:
+def _within(row: ResultRow, name: ShownQuantity, cell: tuple[float, float], whole: tuple[float, float]) -> bool:
     value = name.factor * row.values.get(name.name, math.nan)
     return bool(cell[0] <= value < cell[1] or (value == whole[1] == cell[1]))
 
@@ -117,7 +117,7 @@ def shade(share: float) -> str:
     return f"#{r:02x}{g:02x}{b:02x}"
 
 
-def _dot(axes: Axes, x: float, y: float, row: Row) -> Markup:
+def _dot(axes: Axes, x: float, y: float, row: ResultRow) -> Markup:
     if not (math.isfinite(x) and math.isfinite(y)):
         return Markup("")
     px, py = float(axes.across(x)), float(axes.up(y))
@@ -140,7 +140,7 @@ def rate_curves(results: Results, name: str, limits: Sequence[Region]) -> Markup
     return figure(f"Over {across.label}", "", svg, class_="plot")
 
 
-def _curve(axes: Axes, results: Results, skill: str, name: Quantity, borders: Float, index: int) -> Markup:
+def _curve(axes: Axes, results: Results, skill: str, name: ShownQuantity, borders: Float, index: int) -> Markup:
     stroke, points, bars = f"s{index % 4 + 1}", [], []
     shift = (index - 0.5) * 0.06 * (borders[1] - borders[0])
     rows = results.of(skill)

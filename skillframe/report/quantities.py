@@ -22,7 +22,7 @@ UNITS: tuple[tuple[str, str, float], ...] = (
 """Words of a name, the unit for people, and its factor; the first that fits counts."""
 
 
-class Quantity(NamedTuple):
+class ShownQuantity(NamedTuple):
     """A column of the results.
 
     Attributes:
@@ -43,14 +43,14 @@ class Quantity(NamedTuple):
         return f"{self.label} [{self.unit}]" if self.unit else self.label
 
 
-def quantity(name: str) -> Quantity:
+def quantity(name: str) -> ShownQuantity:
     """How to show a varied quantity, from its name."""
     group, _, rest = name.rpartition(".")
     unit, factor = _unit(rest)
     words = re.sub(r"^(tilt|rotation|turn)_([xyz])$", r"\1 about \2", rest)
     words = re.sub(r"^offset_([xyz])$", r"offset along \1", words).replace("_", " ")
     group = "" if group == "world" else group
-    return Quantity(name, f"{group} {words}".strip(), unit, factor)
+    return ShownQuantity(name, f"{group} {words}".strip(), unit, factor)
 
 
 def _unit(rest: str) -> tuple[str, float]:

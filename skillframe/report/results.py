@@ -31,7 +31,7 @@ TRUTH = {"1": True, "true": True, "1.0": True, "0": False, "false": False, "0.0"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
+class ResultRow:
     """One trial of one skill; `values` holds every other numeric column, NaN where it is empty or text."""
 
     trial: int
@@ -85,14 +85,14 @@ class Results:
         notes: what was odd about the file.
     """
 
-    rows: tuple[Row, ...]
+    rows: tuple[ResultRow, ...]
     skills: tuple[str, ...]
     varied: tuple[str, ...]
     validity: Validity
     assumed: bool = False
     notes: tuple[str, ...] = ()
 
-    def of(self, skill: str) -> list[Row]:
+    def of(self, skill: str) -> list[ResultRow]:
         """A skill's rows."""
         return [row for row in self.rows if row.skill == skill]
 
@@ -100,7 +100,7 @@ class Results:
         """A skill's success rate."""
         return self.rate_of(self.of(skill))
 
-    def rate_of(self, rows: Sequence[Row]) -> Rate:
+    def rate_of(self, rows: Sequence[ResultRow]) -> Rate:
         """Success rate of some rows of one skill, picked by what was drawn for them."""
         wins = sum(row.success for row in rows)
         return Rate(wins, len(rows), self.validity.interval(wins, len(rows)))
@@ -191,7 +191,7 @@ def read_results(path: Path, declared: Sequence[str] = (), plan: Plan | None = N
     return Results(rows=rows, skills=skills, varied=varied, validity=validity, assumed=plan is None, notes=tuple(notes))
 
 
-def _counted(rows: tuple[Row, ...]) -> tuple[Row, ...]:
+def _counted(rows: tuple[ResultRow, ...]) -> tuple[ResultRow, ...]:
     """The rows of each skill up to the first trial that is missing."""
     reach = {skill: unbroken(r.trial for r in rows if r.skill == skill) for skill in {r.skill for r in rows}}
     return tuple(row for row in rows if row.trial < reach[row.skill])
@@ -216,7 +216,7 @@ def _whole_rows(
     return body, notes
 
 
-def _row(path: Path, number: int, cells: dict[str, str]) -> Row:
+def _row(path: Path, number: int, cells: dict[str, str]) -> ResultRow:
     success = TRUTH.get(cells["success"].strip().lower())
     try:
         trial = int(cells["trial"])
@@ -225,7 +225,9 @@ def _row(path: Path, number: int, cells: dict[str, str]) -> Row:
     if success is None:
         raise InputError(f"{path}: row {number}: success", f"is {cells['success']!r}", "give 1 or 0")
     values = {key: _float(cell) for key, cell in cells.items() if key not in ("trial", "skill", "success", "failure")}
-    return Row(trial=trial, skill=cells["skill"], success=success, failure=cells.get("failure", ""), values=values)
+    return ResultRow(
+        trial=trial, skill=cells["skill"], success=success, failure=cells.get("failure", ""), values=values
+    )
 
 
 def _float(cell: str) -> float:
@@ -235,7 +237,7 @@ def _float(cell: str) -> float:
         return math.nan
 
 
-def _varied(head: Sequence[str], rows: Sequence[Row], declared: Sequence[str]) -> tuple[str, ...]:
+def _varied(head: Sequence[str], rows: Sequence[ResultRow], declared: Sequence[str]) -> tuple[str, ...]:
     known = [name for name in declared if name in head]
     names = known or [name for name in head if name not in FIXED and ("." in name or not declared)]
     return tuple(name for name in names if _differs([row.values.get(name, math.nan) for row in rows]))

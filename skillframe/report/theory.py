@@ -15,7 +15,7 @@ import numpy as np
 
 from skillframe.frames import Float
 from skillframe.report.markup import Markup, escape, join, number, tag
-from skillframe.report.quantities import Quantity, quantity
+from skillframe.report.quantities import ShownQuantity, quantity
 from skillframe.report.svg import LEFT, Axes
 
 TILT_LIMIT = "largest_tilt_rad"
@@ -55,7 +55,7 @@ def _along(scene: Mapping[str, Any], key: str, varied: Sequence[str]) -> dict[st
     return result
 
 
-def boundary(axes: Axes, names: tuple[Quantity, Quantity], region: Region) -> Markup:
+def boundary(axes: Axes, names: tuple[ShownQuantity, ShownQuantity], region: Region) -> Markup:
     """The border of the region on a map: a curve where it depends on the other quantity, else straight lines."""
     for index, name in enumerate(names):
         other = names[1 - index]
@@ -67,7 +67,9 @@ def boundary(axes: Axes, names: tuple[Quantity, Quantity], region: Region) -> Ma
     return Markup("")
 
 
-def _curve(axes: Axes, other: Quantity, name: Quantity, region: Region, sign: float, *, across: bool) -> Markup:
+def _curve(
+    axes: Axes, other: ShownQuantity, name: ShownQuantity, region: Region, sign: float, *, across: bool
+) -> Markup:
     values, limits = region.over[other.name]
     along, limit = other.factor * values, sign * name.factor * np.maximum(limits, 0.0)
     x, y = (limit, along) if across else (along, limit)
@@ -75,7 +77,7 @@ def _curve(axes: Axes, other: Quantity, name: Quantity, region: Region, sign: fl
     return axes.line(np.where(inside, x, np.nan), y, "theory")
 
 
-def mark(axes: Axes, name: Quantity, region: Region) -> Markup:
+def mark(axes: Axes, name: ShownQuantity, region: Region) -> Markup:
     """The region's border on an axis of its own quantity: lines, or bands where it depends on something that varied."""
     if not region.over:
         return join(_line(axes, sign * region.limit * name.factor, vertical=True) for sign in (-1.0, 1.0))

@@ -1,7 +1,8 @@
 """Can this robot be used for dynamics? The mass audit behind `skillframe robots check`.
 
 Fatal: a zero or singular mass matrix, a moving body whose inertia is impossible or too large for its size (contract:
-`robots check`). Each comes with the robot.toml lines that fix it. Everything else is a warning; `skillframe.machine.checks.audit` adds those of driven machines.
+`robots check`). Each comes with the robot.toml lines that fix it. Everything else is a warning;
+`skillframe.machine.checks.audit` adds those of driven machines.
 """
 
 from __future__ import annotations

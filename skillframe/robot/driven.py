@@ -12,7 +12,7 @@ LEAST_CORNER, LARGEST_CORNER = 5.0, 0.08
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Loop:
+class LoopClosure:
     """A closed chain: the origins of two frames of the tree coincide."""
 
     frame_a: str
@@ -20,7 +20,7 @@ class Loop:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Payload:
+class DeclaredPayload:
     """What a machine carries: `mass` [kg] of load in the inertia of a link, and `rating`, the most it may be [kg]."""
 
     link: str
@@ -56,7 +56,7 @@ class Actuation:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sensors:
+class MachineNoise:
     """Of a hydraulic machine: white noise at every sample, standard deviations, then a filter of two equal poles.
 
     The defaults are those published with the data set of Petrovic and Mattila, Mech. Mach. Theory 170 (2022) 104680,
@@ -86,7 +86,7 @@ class Gains:
     force_corner_hz: float = 16.0
 
 
-def impossible(actuation: tuple[Actuation, ...], sensors: Sensors, gains: Gains) -> Iterator[tuple[str, str, str]]:
+def impossible(actuation: tuple[Actuation, ...], sensors: MachineNoise, gains: Gains) -> Iterator[tuple[str, str, str]]:
     """What the types allow and no machine has: key, what is wrong with it, and the cure."""
     for drive in actuation:
         for key in ("velocity_gain", "force_gain"):
@@ -106,7 +106,7 @@ def impossible(actuation: tuple[Actuation, ...], sensors: Sensors, gains: Gains)
             yield key, f"is {value:g}", f"give {allowed}"
 
 
-def fast_filters(sensors: Sensors, gains: Gains, rate_hz: float) -> Iterator[tuple[str, str]]:
+def fast_filters(sensors: MachineNoise, gains: Gains, rate_hz: float) -> Iterator[tuple[str, str]]:
     """Filters that a control rate [Hz] is too low for: what is wrong, and the cure."""
     corners = {"sensors.corner_hz": sensors.corner_hz, "gains.force_corner_hz": gains.force_corner_hz}
     for key, corner in corners.items():

@@ -14,7 +14,7 @@ from typing import Literal
 from skillframe.config import build, read_toml
 from skillframe.errors import InputError, UnknownName
 from skillframe.paths import data_dirs
-from skillframe.robot.driven import Actuation, Gains, Loop, Payload, Sensors, impossible
+from skillframe.robot.driven import Actuation, DeclaredPayload, Gains, LoopClosure, MachineNoise, impossible
 from skillframe.robot.numbers import LARGEST
 
 Vector = tuple[float, float, float]
@@ -95,10 +95,10 @@ class RobotFile:
     workspace: Workspace = field(default_factory=Workspace)
     friction_share: dict[str, float] = field(default_factory=dict)
     inertia: dict[str, LinkInertia] = field(default_factory=dict)
-    payload: Payload | None = None
-    loop: tuple[Loop, ...] = ()
+    payload: DeclaredPayload | None = None
+    loop: tuple[LoopClosure, ...] = ()
     actuation: tuple[Actuation, ...] = ()
-    sensors: Sensors = field(default_factory=Sensors)
+    sensors: MachineNoise = field(default_factory=MachineNoise)
     gains: Gains = field(default_factory=Gains)
 
 
@@ -133,10 +133,10 @@ class RobotSpec:
     workspace: Workspace = field(default_factory=Workspace)
     friction_share: dict[str, float] = field(default_factory=dict)
     inertia: dict[str, LinkInertia] = field(default_factory=dict)
-    payload: Payload | None = None
-    loop: tuple[Loop, ...] = ()
+    payload: DeclaredPayload | None = None
+    loop: tuple[LoopClosure, ...] = ()
     actuation: tuple[Actuation, ...] = ()
-    sensors: Sensors = field(default_factory=Sensors)
+    sensors: MachineNoise = field(default_factory=MachineNoise)
     gains: Gains = field(default_factory=Gains)
 
     def require_simulated(self) -> None:
@@ -248,7 +248,7 @@ def _check_machine(declared: RobotFile, where: str) -> None:
     if declared.actuation:
         for key, problem, fix in impossible(declared.actuation, declared.sensors, declared.gains):
             raise InputError(f"{where}: {key}", problem, fix)
-    elif (declared.sensors, declared.gains) != (Sensors(), Gains()):
+    elif (declared.sensors, declared.gains) != (MachineNoise(), Gains()):
         text = "[sensors] and [gains] are those of a machine with actuators, and there is no [[actuation]]"
         raise InputError(where, text, "leave them out; a wrist sensor's noise is varied as `sensor.*` in a campaign")
 

@@ -34,7 +34,7 @@ from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_
 from skillframe.teaching.teacher import HANDS, Teacher, TeacherSettings
 from skillframe.world.scene import Task
 
-__all__ = ["Channel", "Operator", "OperatorSettings", "loop_gain", "require_stable_loop"]
+__all__ = ["Operator", "OperatorSettings", "TeleoperationChannel", "loop_gain", "require_stable_loop"]
 
 BLOCK = 500
 TREMOR_MEMORY = 0.2  # s; the tremor's bandwidth is 1 / (pi x 0.2 s) = 1.6 Hz (ours)
@@ -121,7 +121,7 @@ def require_stable_loop(settings: OperatorSettings) -> None:
     )
 
 
-class Channel:
+class TeleoperationChannel:
     """One way between master and machine: sampled every packet, held, and late; (N, 3) at every tick of dt [s]."""
 
     def __init__(self, settings: OperatorSettings, count: int, dt: float) -> None:
@@ -164,7 +164,7 @@ class Operator(Skill):
         s, count, dt = self._settings, len(rngs), observation.dt
         self._home = Pose(observation.pose.position.copy(), observation.pose.rotation.copy())
         self._place, self._velocity = np.zeros((count, 3)), np.zeros((count, 3))
-        self._there, self._back = Channel(s, count, dt), Channel(s, count, dt)
+        self._there, self._back = TeleoperationChannel(s, count, dt), TeleoperationChannel(s, count, dt)
         self._reference = RateFilter(s.filter_hz, dt)
         self._reference.start(np.zeros((count, 3)))
         self._tremor = _Tremor(s, [rng.spawn(1)[0] for rng in rngs], dt)

@@ -16,13 +16,13 @@ import mujoco
 import pinocchio as pin
 
 from skillframe.errors import UnknownName
-from skillframe.robot.driven import Loop
+from skillframe.robot.driven import LoopClosure
 
 TIME_CONSTANTS = 2.2  # time steps; MuJoCo refuses less than 2
 SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 
 
-def close_loops(spec: mujoco.MjSpec, model: pin.Model, loops: Sequence[Loop], bodies: dict[int, Any]) -> None:
+def close_loops(spec: mujoco.MjSpec, model: pin.Model, loops: Sequence[LoopClosure], bodies: dict[int, Any]) -> None:
     """Close a robot's chains.
 
     Args:
@@ -49,7 +49,7 @@ def close_loops(spec: mujoco.MjSpec, model: pin.Model, loops: Sequence[Loop], bo
         equality.solimp = SOLIMP
 
 
-def _names(loop: Loop) -> tuple[str, str]:
+def _names(loop: LoopClosure) -> tuple[str, str]:
     return loop.frame_a, loop.frame_b
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from skillframe.reproduce import crane_runs
-from skillframe.robot.driven import Gains, Sensors
+from skillframe.robot.driven import Gains, MachineNoise
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot
 from skillframe.world.scene import Geom, Sprung
@@ -102,7 +102,7 @@ def path_over(surface):
 def precise():
     """The crane with encoders of 20 bits, 6e-6 rad, and filters and gains that their noise allows."""
     spec = load_robot("hiab_xs031")
-    sensors, gains = Sensors(encoder=ENCODER, corner_hz=60.0), Gains(body=1e4, force_corner_hz=50.0)
+    sensors, gains = MachineNoise(encoder=ENCODER, corner_hz=60.0), Gains(body=1e4, force_corner_hz=50.0)
     return load_model(dataclasses.replace(spec, sensors=sensors, gains=gains))
 
 

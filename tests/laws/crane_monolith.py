@@ -76,7 +76,7 @@ class Monolith:
         x, v = m.piston
         force = eq.piston_force(self.p, oil, x, v)
         drive = m.mass @ (m.arms.T @ force - m.bias)
-        own = eq.rates(self.p, oil, eq.Motion(x, v, demand, np.zeros(3)))
+        own = eq.rates(self.p, oil, eq.PistonMotion(x, v, demand, np.zeros(3)))
         return np.concatenate([y[3:6], drive, own.ravel()])
 
     def powers(self, y):

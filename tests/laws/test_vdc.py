@@ -11,7 +11,7 @@ from skillframe.machine.law import vdc
 from skillframe.machine.law.vdc_adaptation import projected_rate
 from skillframe.machine.law.vdc_body import mass_matrix, regressor
 from skillframe.machine.law.vdc_flows import power_flows
-from skillframe.machine.law.vdc_reference import Path, Task, required_motion
+from skillframe.machine.law.vdc_reference import Path, ToolTask, required_motion
 from skillframe.robot.model import load_model
 from skillframe.robot.payload import with_payload
 from skillframe.robot.spec import load_robot
@@ -230,9 +230,9 @@ def test_required_accelerations_are_the_rates_of_required_velocities(seed):
 
 def test_a_task_that_does_not_command_every_freedom_is_refused():
     with pytest.raises(InputError, match="choose joints among"):
-        Task(crane(), (0, 2), ())
+        ToolTask(crane(), (0, 2), ())
     with pytest.raises(InputError, match="lift_piston do not command 3 freedoms"):
-        Task(crane(), (0, 2), ("lift_piston",))
+        ToolTask(crane(), (0, 2), ("lift_piston",))
 
 
 def test_a_force_on_the_tool_is_carried_by_the_pistons():

@@ -6,7 +6,7 @@ import numpy as np
 
 from skillframe.machine.law import vdc
 from skillframe.machine.law.vdc_adaptation import projected_rate, relative_bounds
-from skillframe.machine.law.vdc_reference import Path, Task, required_motion
+from skillframe.machine.law.vdc_reference import Path, ToolTask, required_motion
 from skillframe.robot.chain import ClosedChain
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot
@@ -23,7 +23,7 @@ def crane():
 
 @cache
 def task():
-    return Task(crane(), (0, 2), ("extension",))
+    return ToolTask(crane(), (0, 2), ("extension",))
 
 
 def quintic(s):

@@ -13,7 +13,7 @@ import pytest
 from skillframe.errors import InputError
 from skillframe.machine.checks.audit import audit
 from skillframe.machine.law.vdc_actuator import cylinders
-from skillframe.robot.driven import Actuation, Gains, Sensors
+from skillframe.robot.driven import Actuation, Gains, MachineNoise
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot, robot_names
 
@@ -66,7 +66,7 @@ def test_each_figure_that_the_page_gives_is_one_that_the_controller_needs():
 
 def test_the_tables_of_sensors_and_gains_show_the_defaults():
     shown = tomllib.loads(block(CRANE, "toml", "[sensors]") + block(CRANE, "toml", "[gains]"))
-    assert (Sensors(**shown["sensors"]), Gains(**shown["gains"])) == (Sensors(), Gains())
+    assert (MachineNoise(**shown["sensors"]), Gains(**shown["gains"])) == (MachineNoise(), Gains())
 
 
 def test_the_python_of_the_crane_page_runs(capsys):

@@ -23,7 +23,7 @@ LEAST_ABSOLUTE = 100.0
 STATES = ("spool", "spool_velocity", "pressure_a", "pressure_b", "pressure_supply", "deflection")
 
 
-class Motion(NamedTuple):
+class PistonMotion(NamedTuple):
     """What drives the oil at an instant: piston position [m] and velocity [m/s], command the spool follows [-1, 1]."""
 
     position: Float
@@ -144,7 +144,7 @@ def piston_force(p: SimpleNamespace, y: Float, position: Float, velocity: Float)
     return result
 
 
-def pressure_rates(p: SimpleNamespace, y: Float, motion: Motion) -> Float:
+def pressure_rates(p: SimpleNamespace, y: Float, motion: PistonMotion) -> Float:
     """Eq. 4: rates of the pressures (3, n) [Pa/s]."""
     pa, pb, ps = y[2], y[3], y[4]
     flows = valve_flows(p, y[0], pa, pb, ps, motion.position)
@@ -163,7 +163,7 @@ def pressure_rates(p: SimpleNamespace, y: Float, motion: Motion) -> Float:
     return result
 
 
-def rates(p: SimpleNamespace, y: Float, motion: Motion) -> Float:
+def rates(p: SimpleNamespace, y: Float, motion: PistonMotion) -> Float:
     """Rates of all states (6, n): eq. 2 for the spool, eq. 4 for the pressures, eq. 8 for the seals."""
     pull = p.omega**2 * (motion.demand - y[0]) - 2 * p.spool_damping * p.omega * y[1]
     pressures = pressure_rates(p, y, motion)

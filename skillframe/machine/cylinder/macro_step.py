@@ -45,11 +45,11 @@ class _Motion(NamedTuple):
     demand: Any
     slew: Any
 
-    def at(self, t: Any) -> eq.Motion:
+    def at(self, t: Any) -> eq.PistonMotion:
         limit = where(self.slew > 0, self.slew * t, np.inf)
         demand = self.demand + clip(self.target - self.demand, -limit, limit)
         x, v, a = self.position, self.velocity, self.acceleration
-        return eq.Motion(x + t * (v + 0.5 * a * t), v + a * t, demand, self.other_flow)
+        return eq.PistonMotion(x + t * (v + 0.5 * a * t), v + a * t, demand, self.other_flow)
 
 
 def _motion(p: SimpleNamespace, memory: Vector, given: Vector, target: Any) -> _Motion:
@@ -110,7 +110,7 @@ def _rows(vector: Vector, count: int = 6) -> list[Any]:
     return [vector[i] for i in range(count)]
 
 
-def _count(p: SimpleNamespace, y: Vector, motion: eq.Motion, rates: Vector, step: Any) -> Any:
+def _count(p: SimpleNamespace, y: Vector, motion: eq.PistonMotion, rates: Vector, step: Any) -> Any:
     """How many internal steps keep h lambda below one half; `rates` now, to see ports open."""
     pa, pb, low = y[2], y[3], p.return_pressure
     to_supply = minimum(absolute(y[4] - pa), absolute(y[4] - pb))
@@ -129,7 +129,7 @@ def _count(p: SimpleNamespace, y: Vector, motion: eq.Motion, rates: Vector, step
     return clip(ceil(2.0 * step * known), 1.0, float(MOST_SUBSTEPS))
 
 
-def _push(p: SimpleNamespace, y: Vector, rates: Vector, motion: eq.Motion, a: Any) -> list[Any]:
+def _push(p: SimpleNamespace, y: Vector, rates: Vector, motion: eq.PistonMotion, a: Any) -> list[Any]:
     """Force and power without the seals' deflection, and their rates, for the quadrature."""
     v = motion.velocity
     force = eq.piston_force(p, y, motion.position, v) + p.stiffness * y[5]

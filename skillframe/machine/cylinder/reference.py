@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from skillframe.errors import InputError, UnknownName
 from skillframe.fmu.actuator import DISCARD, OK, OUTPUTS, ActuatorSpec, Capabilities
-from skillframe.fmu.table import Table, rows
+from skillframe.fmu.table import VariableTable, rows
 from skillframe.fmu.wiring import columns
 from skillframe.machine.cylinder import equations as eq
 from skillframe.machine.cylinder.macro_step import GIVEN, MEMORY, RESULT, SHOWN
@@ -32,7 +32,9 @@ class ReferenceBank:
         symbolic: False computes in plain numpy, for comparison.
     """
 
-    def __init__(self, specs: Sequence[ActuatorSpec], table: Table, trials: int = 1, *, symbolic: bool = True) -> None:
+    def __init__(
+        self, specs: Sequence[ActuatorSpec], table: VariableTable, trials: int = 1, *, symbolic: bool = True
+    ) -> None:
         self.inputs, self.outputs = columns(specs)
         self.count = trials * len(specs)
         self.u = np.zeros((self.count, len(self.inputs)))

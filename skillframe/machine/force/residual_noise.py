@@ -22,7 +22,7 @@ from skillframe.machine.force.damped import share_of
 if TYPE_CHECKING:
     from skillframe.machine.law.vdc_actuator import Cylinders
     from skillframe.robot.chain import ClosedChain
-    from skillframe.robot.driven import Sensors
+    from skillframe.robot.driven import MachineNoise
 
 RUBBING = 0.04
 """Of Coulomb friction that a sliding piston leaves open."""
@@ -31,7 +31,7 @@ LEAST = 1.0
 _POINTS = 4000
 
 
-def residual_noise(chain: ClosedChain, cylinders: Cylinders, sensors: Sensors, corner: float, dt: float) -> Float:
+def residual_noise(chain: ClosedChain, cylinders: Cylinders, sensors: MachineNoise, corner: float, dt: float) -> Float:
     """Equation (1) at home: (n,) standard deviations [Nm or N].
 
     Args:

@@ -37,7 +37,7 @@ from skillframe.machine.law.vdc_actuator import (
     pressure_force,
 )
 from skillframe.machine.law.vdc_adaptation import adapt, relative_bounds
-from skillframe.machine.law.vdc_reference import Path, Task, required_motion
+from skillframe.machine.law.vdc_reference import Path, ToolTask, required_motion
 from skillframe.robot.chain import ChainState, ClosedChain
 from skillframe.robot.spec import RobotSpec
 from skillframe.signals.rates import RateFilter
@@ -163,9 +163,9 @@ def plane_axes(chain: ClosedChain) -> tuple[int, int]:
     return axes[0], axes[1]
 
 
-def plane_task(chain: ClosedChain) -> Task:
+def plane_task(chain: ClosedChain) -> ToolTask:
     """The tool's point in its plane, and the last independent joints as far as the plane leaves them open."""
-    return Task(chain, plane_axes(chain), chain.independent[2:])
+    return ToolTask(chain, plane_axes(chain), chain.independent[2:])
 
 
 def terms(chain: ClosedChain, z: Float, rate: Float, theta: Float | None = None) -> Terms:

@@ -19,7 +19,7 @@ from skillframe.machine.law.vdc import Bodies
 from skillframe.robot.chain import ChainState
 
 
-class Flows(NamedTuple):
+class PowerFlows(NamedTuple):
     """Virtual power flows [W].
 
     Attributes:
@@ -55,7 +55,7 @@ def eye_forces(state: ChainState, tree: Float, piston: Float) -> Float:
     return np.asarray(solution, dtype=float).reshape(-1, 3)
 
 
-def power_flows(state: ChainState, motion: Bodies, difference: Float, tool: Float | None = None) -> Flows:
+def power_flows(state: ChainState, motion: Bodies, difference: Float, tool: Float | None = None) -> PowerFlows:
     """All flows of a machine whose bodies' net forces differ from the required ones.
 
     Args:
@@ -77,7 +77,7 @@ def power_flows(state: ChainState, motion: Bodies, difference: Float, tool: Floa
     net = np.einsum("bi,bi->b", motion.error, difference)
     balance = _balance(state, net, outer, inner, eye_flow)
     rates = (state.embedding @ state.chain.minimal(error))[state.chain.driven]
-    return Flows(net, outer, inner, eye_flow, balance, rates * piston, damping * error)
+    return PowerFlows(net, outer, inner, eye_flow, balance, rates * piston, damping * error)
 
 
 def _joint_forces(state: ChainState, net: Float, eyes: Float) -> Float:

@@ -38,7 +38,7 @@ class Required(NamedTuple):
     acceleration: Float
 
 
-class Task:
+class ToolTask:
     """Which n quantities are commanded: axes of the tool's position in base, then independent joints.
 
     Args:
@@ -99,7 +99,7 @@ class Task:
 
 
 def required_motion(
-    task: Task,
+    task: ToolTask,
     state: ChainState,
     path: Path,
     stiffness: Float,

@@ -95,7 +95,7 @@ def monolithic(boom, values, commands, hold, tolerance=1e-9):
             now = demand + way * min(t / arrival, 1.0) if arrival > 0 else demand
             cylinder = y[2:, None]
             force = eq.piston_force(p, cylinder, x * one, v * one)[0]
-            oil = eq.rates(p, cylinder, eq.Motion(x * one, v * one, now * one, 0 * one))[:, 0]
+            oil = eq.rates(p, cylinder, eq.PistonMotion(x * one, v * one, now * one, 0 * one))[:, 0]
             return np.concatenate([boom.rates(y[:2], force), oil])
 
         atol = [1e-11, 1e-11, 1e-10, 1e-8, 0.1, 0.1, 0.1, 1e-13]

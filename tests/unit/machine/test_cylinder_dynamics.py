@@ -28,7 +28,7 @@ def radau(p, y, motion, breaks, tolerance=1e-9):
 
     def f(s, state):
         x, v, demand = motion(s)
-        return eq.rates(p, state[:, None], eq.Motion(x * one, v * one, demand * one, 0.0 * one))[:, 0]
+        return eq.rates(p, state[:, None], eq.PistonMotion(x * one, v * one, demand * one, 0.0 * one))[:, 0]
 
     for begin, end in itertools.pairwise(breaks):
         atol = [1e-11, 1e-8, 0.02, 0.02, 0.02, 1e-13]
@@ -191,7 +191,7 @@ def test_energy_is_balanced_over_six_seconds_with_oil_and_motion_as_state_functi
     def f(t, s):
         x, v, cylinder = s[0] * one, s[1] * one, s[2:8, None]
         u = 0.06 * np.sin(2 * math.pi * t / 3.0) * one
-        rates = eq.rates(p, cylinder, eq.Motion(x, v, u, 0 * one))[:, 0]
+        rates = eq.rates(p, cylinder, eq.PistonMotion(x, v, u, 0 * one))[:, 0]
         flows = eq.valve_flows(p, *cylinder[[0, 2, 3, 4]], x)
         force = eq.piston_force(p, cylinder, x, v)[0]
         lost = eq.friction_force(p, cylinder[5], v)[0] * v[0]

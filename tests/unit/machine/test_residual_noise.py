@@ -9,7 +9,7 @@ from skillframe.machine.force.damped import CriticallyDamped
 from skillframe.machine.force.momentum import ForceSettings
 from skillframe.machine.force.residual_noise import LEAST, RUBBING, residual_noise
 from skillframe.machine.law.vdc_actuator import cylinders
-from skillframe.robot.driven import Sensors
+from skillframe.robot.driven import MachineNoise
 from skillframe.signals.rates import RateFilter
 from tests.laws.crane_plants import crane
 
@@ -23,7 +23,7 @@ def known():
 @pytest.mark.parametrize(("corner", "dt"), [(24.0, 1e-3), (60.0, 1e-3), (24.0, 2e-3)])
 def test_noise_through_the_filters_themselves_has_the_stated_deviation(corner, dt):
     """Fifty signals of 20 s and more: a deviation is known within half a percent."""
-    rng, sensors = np.random.default_rng(2), Sensors(encoder=1.0, pressure=0.0, corner_hz=corner)
+    rng, sensors = np.random.default_rng(2), MachineNoise(encoder=1.0, pressure=0.0, corner_hz=corner)
     gauge, smooth, found, before = RateFilter(corner, dt), CriticallyDamped(8.0, dt), [], np.zeros(50)
     gauge.start(before)
     for _ in range(SAMPLES):
@@ -39,12 +39,14 @@ def test_noise_through_the_filters_themselves_has_the_stated_deviation(corner, d
 
 def test_for_the_crane_that_ships_it_gives_what_was_measured_in_air_within_a_tenth():
     np.testing.assert_allclose(
-        residual_noise(crane(), known(), Sensors(), ForceSettings().corner, DT), ForceSettings().row_noise, rtol=0.1
+        residual_noise(crane(), known(), MachineNoise(), ForceSettings().corner, DT),
+        ForceSettings().row_noise,
+        rtol=0.1,
     )
 
 
 def test_perfect_sensors_leave_what_friction_leaves():
-    silent = Sensors(encoder=0.0, pressure=0.0)
+    silent = MachineNoise(encoder=0.0, pressure=0.0)
     arms = crane().at(crane().minimal(crane().robot.home), np.zeros(3)).arms
     left = np.abs(np.diag(arms)) * RUBBING * known().coulomb_friction
     np.testing.assert_allclose(residual_noise(crane(), known(), silent, 8.0, DT), left, rtol=1e-9)
@@ -52,5 +54,5 @@ def test_perfect_sensors_leave_what_friction_leaves():
 
 def test_what_has_no_noise_at_all_still_has_a_weight():
     smooth_pistons = dataclasses.replace(known(), coulomb_friction=np.zeros(3))
-    silent = Sensors(encoder=0.0, pressure=0.0)
+    silent = MachineNoise(encoder=0.0, pressure=0.0)
     np.testing.assert_allclose(residual_noise(crane(), smooth_pistons, silent, 8.0, DT), LEAST)

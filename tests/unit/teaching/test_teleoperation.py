@@ -8,7 +8,13 @@ from skillframe.frames import Pose
 from skillframe.skill import Observation
 from skillframe.teaching import teleoperation
 from skillframe.teaching.teacher import TeacherSettings
-from skillframe.teaching.teleoperation import Channel, Operator, OperatorSettings, loop_gain, require_stable_loop
+from skillframe.teaching.teleoperation import (
+    Operator,
+    OperatorSettings,
+    TeleoperationChannel,
+    loop_gain,
+    require_stable_loop,
+)
 from skillframe.world.scene import Task
 
 DT = 2e-3
@@ -129,7 +135,7 @@ def test_a_delay_that_makes_no_sense_is_refused(settings, delay):
 @pytest.mark.parametrize("ticks", [0, 1, 50, 150])
 def test_what_is_sent_at_every_tick_arrives_unchanged_so_many_ticks_later(ticks):
     sent = np.random.default_rng(0).standard_normal((400, 2, 3))
-    channel = Channel(replace(STEADY, delay_s=ticks * DT, packet_hz=1.0 / DT), 2, DT)
+    channel = TeleoperationChannel(replace(STEADY, delay_s=ticks * DT, packet_hz=1.0 / DT), 2, DT)
     arrived = np.array([channel.step(value) for value in sent])
     np.testing.assert_array_equal(arrived[ticks:], sent[: len(sent) - ticks])
     assert not arrived[:ticks].any()
@@ -137,7 +143,7 @@ def test_what_is_sent_at_every_tick_arrives_unchanged_so_many_ticks_later(ticks)
 
 def test_between_packets_the_last_one_is_held():
     sent = np.arange(1.0, 101.0)[:, None, None] * np.ones((1, 1, 3))
-    channel = Channel(replace(STEADY, packet_hz=50.0, delay_s=0.014), 1, DT)
+    channel = TeleoperationChannel(replace(STEADY, packet_hz=50.0, delay_s=0.014), 1, DT)
     arrived = np.array([channel.step(value) for value in sent])[:, 0, 0]
     late = np.arange(100) - 7
     np.testing.assert_array_equal(arrived, np.where(late < 0, 0.0, 10 * (late // 10) + 1.0))
