@@ -11,7 +11,7 @@ PYTEST := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q --
 SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist worksteal
 PROJECTS := pyproject.toml plugins/all.txt $(wildcard plugins/*/pyproject.toml)
 
-.PHONY: demo install test test-core test-all test-slow figures bench docs lint clean
+.PHONY: demo install test test-core test-rest test-beside test-slow figures bench docs lint clean
 
 demo: install
 	$(BIN)/skillframe quickstart --out $(OUT)
@@ -36,14 +36,19 @@ $(VENV)/.dev: $(VENV)/.test
 	$(PIP) install --group dev
 	@touch $@
 
-test: test-core test-all
+test: test-core test-rest
 
 # The core on its own: no plug-in is loaded.
 test-core: $(VENV)/.test
-	SKILLFRAME_PLUGINS= $(PYTEST) $(SIDE_BY_SIDE) -m "not slow and not figures and not needs_plugins" tests/unit
+	SKILLFRAME_PLUGINS= $(PYTEST) $(SIDE_BY_SIDE) -m "core and not slow and not figures" tests/unit
 
-test-all: $(VENV)/.test
-	$(PYTEST) $(SIDE_BY_SIDE) -m "not slow and not figures"
+# Everything else, with all plug-ins.
+test-rest: $(VENV)/.test
+	$(PYTEST) $(SIDE_BY_SIDE) -m "not core and not slow and not figures"
+
+# The core's tests once more, beside the plug-ins.
+test-beside: $(VENV)/.test
+	$(PYTEST) $(SIDE_BY_SIDE) -m "core and not slow and not figures" tests/unit
 
 test-slow: $(VENV)/.test
 	$(PYTEST) $(SIDE_BY_SIDE) -m "slow and not figures"
