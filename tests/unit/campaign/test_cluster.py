@@ -80,7 +80,8 @@ def test_workers_give_the_table_of_one_process_listen_on_the_local_host_only_and
     ],
 )
 def test_exactly_the_guilty_trial_is_named(out, reference, misbehave, cause):
-    summary = fakes.run(out, misbehave, **LIMITS)
+    patient = {"time_limit_s": 120.0} if misbehave is fakes.hoards else {}  # on a busy machine memory grows slowly
+    summary = fakes.run(out, misbehave, **{**LIMITS, **patient})
     (line,) = changed(out, reference)
     assert line.startswith(b"37,a.skill.json,")
     assert line.endswith(b",0," + cause + b",nan,nan,nan,nan,nan,nan,nan,lost,nan")
