@@ -27,7 +27,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture
 def fresh_registry() -> Iterator[None]:
-    """The process's registry is loaded anew in this test, and again after it."""
+    """The process's registry is loaded afresh in this test, and again after it."""
     registry.cache_clear()
     yield
     registry.cache_clear()

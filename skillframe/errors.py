@@ -1,6 +1,6 @@
 """Exceptions: one base class, and leaves that carry facts and format one sentence a person can act on.
 
-`SkillframeError` is everything a user can mend (exit code 2); `RunStopped` and its kind are answers, not errors, and
+`SkillframeError` is everything a user can fix (exit code 2); `RunStopped` and its kind are answers, not errors, and
 live with the executor. An error's text says what is wrong, where, and what to do.
 """
 

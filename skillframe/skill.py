@@ -102,7 +102,7 @@ class Skill(ABC):
     def restart(
         self, rows: NDArray[np.intp], observation: Observation, rngs: Sequence[np.random.Generator]
     ) -> None:  # fmt: skip
-        """Begin anew in some trials, as `start` would in them alone; the others go on undisturbed.
+        """Start again in some trials, as `start` would in them alone; the others go on undisturbed.
 
         Compositions use it to let trials enter a skill at different times. A skill that does not provide it is run
         there with one instance per trial.
@@ -112,7 +112,7 @@ class Skill(ABC):
             observation: of all N trials.
             rngs: M generators.
         """
-        raise NotImplementedError(f"{type(self).__name__} cannot begin anew in some of its trials; see per_trial")
+        raise NotImplementedError(f"{type(self).__name__} cannot start again in some of its trials; see per_trial")
 
     def journal(self, trial: int) -> list[tuple[float, str]]:
         """What happened in a trial and why: times [s] and words; empty if there is nothing to tell."""
@@ -151,7 +151,7 @@ class _PerTrial(Skill):
 
 
 def restartable(make: Callable[[], Skill]) -> Skill:
-    """A skill from a factory that can begin anew in some of its trials: itself, or one instance per trial."""
+    """A skill from a factory that can start again in some of its trials: itself, or one instance per trial."""
     skill = make()
     return per_trial(make) if type(skill).restart is Skill.restart else skill
 

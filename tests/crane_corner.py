@@ -27,7 +27,7 @@ class Corner(NamedTuple):
 
     @property
     def good(self):
-        """(N,) in the corner, and never pressed harder than the bar."""
+        """(N,) in the corner, and never pressed harder than the threshold."""
         return self.result.success & (self.result.peak_force_n < PEAK)
 
 

@@ -77,7 +77,7 @@ class ClusterPool:
         workers: number of local processes, where no scheduler is given.
         scheduler: address of a running scheduler, whose workers see the campaign's folder under the same path.
         memory_bytes: limit per local worker; None shares the machine's memory between them and this process.
-        watch: folder for the workers' files, seen by all of them: made anew, and removed at the end.
+        watch: folder for the workers' files, seen by all of them: made here, and removed at the end.
         ours: what this process is; workers must be the same.
         needed: distributions of plug-ins that the workers must have.
         tell: told now and then how many trials' worth of the jobs in flight is done.

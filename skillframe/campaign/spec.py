@@ -39,7 +39,7 @@ class Stop:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Expect:
-    """The bar: exit code 1 when a skill's success rate is below it.
+    """The threshold: exit code 1 when a skill's success rate is below it.
 
     Attributes:
         rate: lowest acceptable success rate.

@@ -148,9 +148,9 @@ def read_summary(folder: Path) -> dict[str, Any]:
 
 
 def below_bar(spec: CampaignSpec, summary: Mapping[str, Any]) -> str:
-    """A sentence if a complete campaign's rate is below its stated bar, else ""."""
+    """A sentence if a complete campaign's rate is below its threshold, else ""."""
     label = spec.expect.skill or spec.labels[0]
     rate = summary["skills"][label]["rate"]
     if spec.expect.rate is None or not summary["complete"] or rate >= spec.expect.rate:
         return ""
-    return f"{label}: success rate {rate:.3f} is below the bar of {spec.expect.rate:g}"
+    return f"{label}: success rate {rate:.3f} is below the threshold of {spec.expect.rate:g}"

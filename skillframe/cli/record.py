@@ -135,7 +135,7 @@ def _recorded(
 def _refuse_idle(
     teacher: str, person: tuple[float | None, float | None, float | None], places: tuple[str | None, str | None]
 ) -> None:
-    """Refuse what the chosen teacher would not heed."""
+    """Refuse options that the chosen teacher would ignore."""
     from skillframe.errors import InputError
 
     blind = teacher == "blind"

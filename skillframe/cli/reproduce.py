@@ -1,4 +1,4 @@
-"""`skillframe reproduce`: the papers' results beside ours, computed anew."""
+"""`skillframe reproduce`: the papers' results beside ours, computed again."""
 
 from __future__ import annotations
 

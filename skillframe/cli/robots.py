@@ -110,7 +110,7 @@ def _plain(result: Audit) -> dict[str, object]:
 
 
 def _not_loaded(robot: str, message: str) -> dict[str, object]:
-    fix = "mend the file, then check again"
+    fix = "fix the file, then check again"
     problem = {"code": "does_not_load", "severity": "fatal", "where": robot, "message": message, "fix": fix}
     return {"usable": False, "nq": None, "nv": None, "mass_kg": None, "problems": [problem]}
 

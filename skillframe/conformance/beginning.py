@@ -52,7 +52,7 @@ def _values(commands: list[Command], i: int) -> list[Any]:
 
 
 def _alike(one: list[Any], two: list[Any]) -> bool:
-    """Whether a field is the same in every tick but the first; what is drawn anew is not, with other generators."""
+    """Whether a field is the same in every tick but the first; what is drawn is not, with other generators."""
     return all(np.array_equal(a, b) for a, b in zip(one[1:], two[1:], strict=True))
 
 

@@ -68,7 +68,7 @@ class ImpedanceController:
         return torque, law
 
     def _damping_for(self, impedance: Impedance, reading: Reading) -> Float:
-        """The skill's damping, or critical damping designed anew for the rows whose stiffness has changed."""
+        """The skill's damping, or critical damping designed again for the rows whose stiffness has changed."""
         if impedance.damping is not None:
             return impedance.damping
         stiffness = impedance.stiffness

@@ -54,12 +54,12 @@ def refuse_not_finite(columns: Columns) -> None:
         if beyond.size and not bad.size:
             raise InputError(
                 columns.place(int(beyond[0]), name), f"is {columns[name][beyond[0]]:g}, which nothing measures",
-                f"remove or mend the row ({beyond.size} like it in this column)",
+                f"remove or fix the row ({beyond.size} like it in this column)",
             )  # fmt: skip
         if bad.size:
             raise InputError(
                 columns.place(int(bad[0]), name), f"is not a finite number ({columns[name][bad[0]]})",
-                f"remove or mend the row ({bad.size} like it in this column)",
+                f"remove or fix the row ({bad.size} like it in this column)",
             )  # fmt: skip
 
 

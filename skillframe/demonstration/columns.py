@@ -90,7 +90,7 @@ def name_columns(table: Table, spec: str | None, units: str | None) -> Columns:
 def _refuse_words(table: Table, index: int, name: str) -> None:
     row, said = table.text[index]
     comma = said.count(",") == 1 and said.replace(",", "").replace("-", "").replace("+", "").isdigit()
-    fix = "a decimal comma is not read; write numbers with a point" if comma else "mend that cell"
+    fix = "a decimal comma is not read; write numbers with a point" if comma else "fix that cell"
     raise InputError(f"{table.source}: row {row}, column {name}", f"is not a number ({said[:40]!r})", fix)
 
 

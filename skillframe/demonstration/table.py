@@ -140,7 +140,7 @@ def _refuse_ragged(path: Path, names: list[str], lines: list[tuple[int, str]], d
             reference = "the header" if names else f"row {lines[0][0]}"
             raise InputError(
                 f"{path}: row {row}", f"has {count} values, {reference} has {width}",
-                "rows must be of one length; remove or mend that row (a last row like this is a truncated file)",
+                "rows must be of one length; remove or fix that row (a last row like this is a truncated file)",
             )  # fmt: skip
 
 

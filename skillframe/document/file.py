@@ -173,7 +173,7 @@ def _check(document: Document, where: str) -> None:
         _demand(document, "type_version", int, where, "")
     for key in ("version", "type_version"):
         if document.get(key, 1) < 1:
-            raise InputError(f"{where}: {key}", f"is {document[key]}, and versions count from 1", "mend it")
+            raise InputError(f"{where}: {key}", f"is {document[key]}, and versions count from 1", "fix it")
     for spot, problem in _no_numbers(document, ""):
         raise InputError(f"{where}: {spot}", problem, "correct it, or learn the skill again")
     check_plain(document, where, _AGAIN)
@@ -191,7 +191,7 @@ def _demand(values: Any, key: str, kind: type, where: str, inside: str) -> None:
     if not isinstance(values, dict) or key not in values:
         raise InputError(where, f"lacks the key {name!r}", "add it, or learn the skill again")
     if not isinstance(values[key], kind) or isinstance(values[key], bool):
-        raise InputError(f"{where}: {name}", f"should be {_WORDS[kind]}", "mend it, or learn the skill again")
+        raise InputError(f"{where}: {name}", f"should be {_WORDS[kind]}", "fix it, or learn the skill again")
 
 
 def _check_frame(frame: Document, where: str) -> None:
@@ -209,7 +209,7 @@ def _check_frame(frame: Document, where: str) -> None:
 
 def _check_point(point: Any, where: str) -> None:
     if not isinstance(point, list) or len(point) != 3 or not all(type(x) in (int, float) for x in point):
-        raise InputError(where, "should be a point [x, y, z] of the tool frame in metres", "mend it")
+        raise InputError(where, "should be a point [x, y, z] of the tool frame in metres", "fix it")
 
 
 def _no_numbers(value: Any, spot: str) -> Iterator[tuple[str, str]]:

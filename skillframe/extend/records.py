@@ -188,7 +188,7 @@ class RowResult:
 
     Attributes:
         ours: our figure, in the words of the published one.
-        verdict: of the row's bar; "reported" where there is none, or where it could not be computed.
+        verdict: of the row's threshold; "reported" where there is none, or where it could not be computed.
         difference: by how much it differs from the paper and why, or why it was not computed; "" if it does not.
         computed: False if there is no figure of ours, for the reason given in `difference`.
         values: figures by name, for scripts.
@@ -215,11 +215,11 @@ class RowType:
         summary: what is claimed, one line.
         published: the published figure.
         source: where it was published.
-        bar: what ours must be for "pass"; "" if it is reported only.
+        bar: the threshold: what ours must be for "pass"; "" if it is reported only.
         frozen: every constant of the method was fixed before this row's world or figure was looked at, so ours is a
             prediction; False says that method and worlds were developed together, with fresh seeds for the figure.
         calibrated: what was chosen with the published figure in sight; "" if nothing was.
-        weak: why reaching the bar would show nothing, in words; such a row can fail, and is "reported" if it does not.
+        weak: why reaching the threshold would show nothing, in words; such a row can fail, and is "reported" if it does not.
         settings: what `--set` can change, with its value as shipped [SI units, unless the name says otherwise].
         group: rows of one group are computed one after another in one process, so that they can share what is costly.
         topic: a word or two under which the page lists the row; "" takes the group.

@@ -212,7 +212,7 @@ def _whole_rows(
     body = body[:-1] if notes else body
     for number, cells in body:
         if len(cells) != width:
-            raise InputError(f"{path}: row {number}", f"has {len(cells)} cells, the header {width}", "mend that row")
+            raise InputError(f"{path}: row {number}", f"has {len(cells)} cells, the header {width}", "fix that row")
     return body, notes
 
 

@@ -1,9 +1,8 @@
-"""Is a share reached? By counting; in a quick run, whose trials are few, only what the counts exclude is not.
+"""Is a share reached? By count in a full run; in a quick one unless the counts exclude it.
 
-Where few groups are counted, a share that is missed by count, though its interval holds the threshold, is undecided.
-
-Quick: the exact two-sided 95 % interval of the share (Clopper and Pearson 1934) must reach the bar. Our choice, because
-a bar that is met by 54 of 60 is missed by 9 of 10 one time in three.
+A quick run has few trials, so there the upper end of the exact two-sided 95 % interval (Clopper and Pearson 1934) must
+reach the threshold. This is our choice: at a true rate of 0.9, ten trials miss a threshold of 0.9 one time in four. Where
+a full run has few groups, too, a share that misses its threshold while its interval contains it is undecided.
 """
 
 from __future__ import annotations

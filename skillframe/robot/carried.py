@@ -1,6 +1,6 @@
 r"""Another payload than declared: its inertia, and gravity of one more kilogram in the grip, for many machines at once.
 
-The link that robot.toml's `[payload]` names hangs on independent joints only. With the joints' axes \(a_j\) and origins
+The link that robot.toml's `[payload]` names is moved by independent joints only. With the joints' axes \(a_j\) and origins
 \(o_j\) in base from the product of exponentials, and the link's centre of mass c,
 
     g_j = -g . dc/dz_j,     dc/dz_j = a_j x (c - o_j)  (turns),   a_j  (slides),
@@ -67,7 +67,7 @@ class CarriedLoad:
         chain: its robot declares a payload.
 
     Raises:
-        InputError: no payload is declared, or it hangs on a cylinder.
+        InputError: no payload is declared, or a cylinder moves it.
     """
 
     def __init__(self, chain: ClosedChain) -> None:
@@ -79,7 +79,7 @@ class CarriedLoad:
         self._joints = []
         for j in list(model.supports[frame.parentJoint])[1:]:
             if model.names[j] not in chain.independent:
-                text = f"link {spec.payload.link!r} hangs on {model.names[j]}, which a loop moves"
+                text = f"link {spec.payload.link!r} is moved by {model.names[j]}, which a loop moves"
                 raise InputError(where, text, "name a link of the main chain")
             placement, axis = model.jointPlacements[j], np.array(model.joints[j].createData().S, dtype=float).ravel()
             slides = not axis[3:].any()

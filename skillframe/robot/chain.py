@@ -111,7 +111,7 @@ class ClosedChain:
         """(N, n) gravity's generalised forces per kilogram of the robot's payload at minimal coordinates (N, n).
 
         Raises:
-            InputError: the robot declares no payload, or it hangs on a cylinder.
+            InputError: the robot declares no payload, or a cylinder moves it.
         """
         if self._load is None:
             self._load = CarriedLoad(self)

@@ -1,6 +1,6 @@
 """`RobotModel`: the nominal `pinocchio.Model` of a robot, its home and its tool frames.
 
-The model is built from a bare tree (links with their inertia, joints), written anew from the checked URDF with the
+The model is built from a bare tree (links with their inertia, joints), written again from the checked URDF with the
 overlay of robot.toml in it; geometry plays no part, so meshes may be missing. A revolute joint without limits (or with
 equal or reversed ones) turns within +-2 pi, a prismatic one slides within +-10 m (our choice; the audit warns); no
 effort limit means unlimited.
@@ -156,7 +156,7 @@ def _build(urdf: Urdf, spec: RobotSpec, mimic: bool) -> tuple[pin.Model, str]:
         with _silent() as log:
             return pin.buildModelFromXML(*arguments), fallback if mimic else ""
     except (ValueError, RuntimeError) as error:
-        raise InputError(urdf.path, f"is refused by Pinocchio ({_first_line(log, error)})", "mend the URDF") from None
+        raise InputError(urdf.path, f"is refused by Pinocchio ({_first_line(log, error)})", "fix the URDF") from None
 
 
 def _check_size(urdf: Urdf) -> None:

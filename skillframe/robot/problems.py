@@ -1,4 +1,4 @@
-"""One finding of the audit, and the robot.toml lines that mend a link's inertia."""
+"""One finding of the audit, and the robot.toml lines that fix a link's inertia."""
 
 from __future__ import annotations
 

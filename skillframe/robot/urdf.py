@@ -45,7 +45,7 @@ class Urdf(NamedTuple):
     root: str
 
     def children(self) -> dict[str, list[Joint]]:
-        """Joints that hang on each link."""
+        """Joints whose parent is each link."""
         hanging: dict[str, list[Joint]] = {link: [] for link in self.links}
         for joint in self.joints.values():
             hanging[joint.parent].append(joint)
@@ -95,7 +95,7 @@ def _parse_xml(path: Path, content: bytes) -> ET.Element:
         parser.Parse(content, True)
     except expat.ExpatError as error:
         where = f"{path}: line {error.lineno}"
-        raise InputError(where, f"is not valid XML ({expat.ErrorString(error.code)})", "mend that line") from None
+        raise InputError(where, f"is not valid XML ({expat.ErrorString(error.code)})", "fix that line") from None
     except (LookupError, ValueError) as error:
         raise InputError(path, f"is in an encoding that cannot be read ({error})", "save it as UTF-8") from None
     return builder.close()

@@ -52,7 +52,7 @@ __all__ = ["MachineLoop", "simulate_machine"]
 
 IMPEDANCE_RATE, LEAST_DAMPING = 2.0, 5e4  # 1/s and N s/m; D where a skill leaves it open, from teleoperation trials
 VALVES_S = 0.5
-"""So often the swing's rows are fitted anew for overlap and supply pressure of the valves (ours)."""
+"""So often the swing's rows are fitted again for overlap and supply pressure of the valves (ours)."""
 AT_STOP, WILD = 0.99, 0.5
 """Opening of a valve at its stop, and the share of the swing for which one may be (ours; at 150 bar and with friction
 by a third too large it is 0.18, of a sound crane 0, and of one whose gains are ten times too large 0.97)."""
@@ -233,7 +233,7 @@ class MachineLoop(Loop):
             self._end(np.array([i]), 0.0, f"{text}; lower gains.body, velocity_gain or force_gain in robot.toml", True)
 
     def _look_at_valves(self, tick: int) -> None:
-        """Identify them, and let the law go by what is known so far: what it learns of inertias hangs on it."""
+        """Identify them, and let the law go by what is known so far: what it learns of inertias depends on it."""
         self.valves.step(self.demand.valve, self._seen, self.terms)
         if tick and tick % round(VALVES_S / self.dt) == 0:
             self.valves.solve()

@@ -3,7 +3,7 @@ r"""A simulated person who searches blindfolded: no sight, no sound, only a beli
 Published (seed, section on search; [5]): teachers were blindfolded and the relative pose of start and goal was varied.
 How they moved was not published, so **every figure here is our assumption**, not human data:
 
-    goal - start ~ N(centre, believed^2), cut at 2.5 standard deviations            drawn anew for each demonstration
+    goal - start ~ N(centre, believed^2), cut at 2.5 standard deviations            drawn again for each demonstration
     via points: a local step of lognormal length (6 in 10), else a fresh draw of the belief
     between them: minimum jerk, s = 10 u^3 - 15 u^4 + 6 u^5, lasting length / speed + 0.15 s, then a dwell
     push: force + Ornstein-Uhlenbeck noise; in 15 of 100 segments a tap, the part just lifted for most of the way

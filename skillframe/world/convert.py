@@ -41,7 +41,7 @@ def wxyz(quaternion: Any) -> list[float]:
 
 
 def build_spec(robot: RobotModel, scene: Scene, timestep: float = TIMESTEP) -> mujoco.MjSpec:
-    """The robot holding the scene's tool, with the scene's fixture in its second hand or placed anew per trial."""
+    """The robot holding the scene's tool, with the scene's fixture in its second hand or placed per trial."""
     spec = mujoco.MjSpec()
     spec.modelname = f"{robot.spec.name} in {scene.name}"
     _set_options(spec, timestep)

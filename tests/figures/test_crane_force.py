@@ -116,7 +116,7 @@ def test_the_full_filter_is_the_best_row_in_rms_of_those_with_a_part_left_out():
 
 
 def test_on_a_soft_surface_the_estimate_is_as_good_in_newtons():
-    """3e4 N/m: a third of the load, so the bar is 4 %."""
+    """3e4 N/m: a third of the load, so the threshold is 4 %."""
     log, force, _, valid, *_ = pressed(FEW, 3e4)
     found = score(log, force, window(log, valid)[0])
     row("crane, soft surface, 4 seeds", str(found))

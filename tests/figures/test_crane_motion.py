@@ -53,7 +53,7 @@ def told(lap):
 
 @pytest.mark.slow
 def test_on_the_first_leg_with_wrong_inertia_and_friction_the_tool_stays_within_a_centimetre():
-    """5 s in which the inertias begin to be learned; the second lap's bars are among the figures."""
+    """5 s in which the inertias begin to be learned; the second lap's thresholds are among the figures."""
     errors, speed, _ = run(Vdc(path, SHARE, 1), path, 5.0, TRUTH[:1], [1])
     assert figures(errors[:, 0], speed).largest < 0.01
 
@@ -62,7 +62,7 @@ def test_on_the_first_leg_with_wrong_inertia_and_friction_the_tool_stays_within_
 def test_in_the_second_lap_the_error_is_below_six_millimetres_and_a_fiftieth_of_a_second_of_the_speed():
     first, second = laps(2, HydraulicGains())
     row("diamond, VDC, 4 seeds, first lap, worst", told(first))
-    row("diamond, VDC, 4 seeds, second lap, worst", told(second), "bar 6 mm, 0.02 s; hard goal 3 mm, 0.01 s")
+    row("diamond, VDC, 4 seeds, second lap, worst", told(second), "at most 6 mm, 0.02 s; hard goal 3 mm, 0.01 s")
     assert worst(second)[0] < 6e-3
     assert worst(second)[2] < 0.02
 
@@ -138,7 +138,7 @@ def landed(found):
 def test_in_steady_sliding_the_residual_of_the_target_dynamics_is_below_a_percent(surface, mass, friction):
     """With the force that the machine takes it for; with the true one where the plant is as believed.
 
-    Wrong friction and mass leave the estimate 60 N of 8.9 kN, which has bars of its own. On 5e6 N/m the tool hops in
+    Wrong friction and mass leave the estimate 60 N of 8.9 kN, which has thresholds of its own. On 5e6 N/m the tool hops in
     the first 0.3 s: this crane's encoders show the touch of a load that turns round within 37 ms after 22 ms.
     """
     found = pressed(surface, mass=mass, friction=friction)

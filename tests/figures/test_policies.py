@@ -124,7 +124,7 @@ def test_policies_from_whole_demonstrations_do_the_whole_task(name):
 @pytest.mark.figures
 @pytest.mark.parametrize("name", ARM_TASKS)
 def test_policies_learned_with_a_free_tool_run_on_an_arm(name):
-    """Shown: the arm's joints add inertia and limits of their own, and nothing is learned anew."""
+    """Shown: the arm's joints add inertia and limits of their own, and nothing is learned again."""
     task, wins, reasons = TASKS[name], 0, set[str]()
     for i in range(POLICIES):
         seed = task.seed + i

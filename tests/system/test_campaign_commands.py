@@ -110,7 +110,7 @@ def test_a_rate_below_its_bar_exits_1(campaign, tmp_path, capsys):
     vary = '"fixture.offset_x" = { uniform = [0.2, 0.3] }'  # the valley is somewhere else
     path = campaign(vary, trials=4, extra="[expect]\nrate = 0.9\n")
     assert run(["campaign", "run", path, "--out", str(tmp_path / "out"), "--traces", "0"]) == 1
-    assert "below the bar of 0.9" in capsys.readouterr().err
+    assert "below the threshold of 0.9" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

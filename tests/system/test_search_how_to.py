@@ -1,4 +1,4 @@
-"""What docs/how-to/search.md composes is recorded, learned and run: a search mends the insertions that stall."""
+"""What docs/how-to/search.md composes is recorded, learned and run: a search completes the insertions that stall."""
 
 import re
 import shlex

@@ -79,7 +79,7 @@ def test_table_of_configurations_signs_postures_and_friction(posture):
                 for r in at_8
             )
             print(f"  {name:2} friction {friction}: {reach:7} (published {PUBLISHED[name[0]]})  {text}", flush=True)
-        if name in "ABCD":  # the bars
+        if name in "ABCD":  # the thresholds
             assert all(largest(rows, sign, 0.0) >= 12.0 for sign in (1, -1))
 
 

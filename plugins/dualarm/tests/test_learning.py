@@ -33,7 +33,7 @@ def degrees(a, b):
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_one_arm_led_teaches_what_the_paper_learned(seed):
     phase = read_phase(learn(demonstrations(seed).demonstrations, LearnOptions()))
-    assert degrees(phase.desired_direction, [0.0, 0.0, 1.0]) < 10.0  # bar of the published row
+    assert degrees(phase.desired_direction, [0.0, 0.0, 1.0]) < 10.0  # threshold of the published row
     (along,), (about,) = phase.compliant_translation, phase.compliant_rotation
     assert degrees(along, [1.0, 0.0, 0.0]) < 15.0 and degrees(about, [0.0, 1.0, 0.0]) < 15.0
 

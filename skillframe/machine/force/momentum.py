@@ -184,7 +184,7 @@ class ForceEstimator:
     def calibrate(self, on: bool) -> None:
         """Say that the tool is in air (True), or that it may touch from now on (False): an explicit step of a task.
 
-        Turning it on begins the identification anew.
+        Turning it on starts the identification again.
         """
         if on and not self.calibrating:
             self.identification.start()

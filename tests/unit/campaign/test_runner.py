@@ -147,7 +147,7 @@ def test_the_bar_is_asked_of_the_skill_it_names(campaign, tmp_path):
     from skillframe.campaign.folder import load
 
     summary = run(out)
-    assert "below the bar of 0.7" in below_bar(load(out, FakeParams), summary)
+    assert "below the threshold of 0.7" in below_bar(load(out, FakeParams), summary)
     assert below_bar(load(out, FakeParams), {**summary, "complete": False}) == ""
 
 

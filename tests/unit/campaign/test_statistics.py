@@ -32,7 +32,7 @@ def test_clopper_pearson_puts_half_of_alpha_beyond_each_bound(counts, alpha):
 
 def test_clopper_pearson_gives_the_known_numbers():
     assert clopper_pearson(0, 10).high == pytest.approx(1 - 0.025**0.1, rel=1e-12)
-    assert clopper_pearson(53, 54).low > 0.9  # the numbers that a bar of 0.9 asks for
+    assert clopper_pearson(53, 54).low > 0.9  # the numbers that a threshold of 0.9 asks for
     assert clopper_pearson(36, 36).low > 0.9
     assert clopper_pearson(35, 35).low < 0.9
 

@@ -41,11 +41,11 @@ def test_a_command_that_returns_nothing_is_fine(command):
 
 
 def test_bad_input_is_one_sentence_and_exit_code_2(command, capsys):
-    command(raises(InputError("a.csv", "row 3 holds NaN", "mend it")))
+    command(raises(InputError("a.csv", "row 3 holds NaN", "fix it")))
     assert main.run(["doctor"]) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
-    assert captured.err == "error: a.csv: row 3 holds NaN; mend it\n"
+    assert captured.err == "error: a.csv: row 3 holds NaN; fix it\n"
 
 
 def test_a_mistake_of_ours_is_exit_code_3_without_traceback(command, capsys):

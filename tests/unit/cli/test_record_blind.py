@@ -1,4 +1,4 @@
-"""`demonstration record --teacher blind`: what cannot be searched or would not be heeded is refused in one sentence."""
+"""`demonstration record --teacher blind`: what cannot be searched or would be ignored is refused in one sentence."""
 
 import pytest
 from click.testing import CliRunner

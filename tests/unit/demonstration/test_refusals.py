@@ -68,7 +68,7 @@ CASES: dict[str, tuple[Callable[[Cells], Cells], str]] = {
     "NaN": (lambda r: spoil(r, "fy", "nan", 12), "row 12, column fy: is not a finite number"),
     "infinity": (lambda r: spoil(r, "pz", "inf", 4), "row 4, column pz: is not a finite number"),
     "an empty cell": (lambda r: spoil(r, "qx", "", 5), "row 5, column qx: is not a finite number"),
-    "a word": (lambda r: spoil(r, "tx", "high", 6), "row 6, column tx: is not a number .'high'.; mend that cell"),
+    "a word": (lambda r: spoil(r, "tx", "high", 6), "row 6, column tx: is not a number .'high'.; fix that cell"),
     "a decimal comma": (decimal_commas, "row 2, column t: is not a number.*decimal comma.*with a point"),
     "digits of another script": (lambda r: spoil(r, "px", "\u0661\u0662", 6), "row 6, column px: is not a number"),
     "a number as Python writes it": (lambda r: spoil(r, "px", "1_0", 6), "row 6, column px: is not a number .'1_0'"),

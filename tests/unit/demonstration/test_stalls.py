@@ -79,7 +79,7 @@ def test_a_stall_is_no_noise_and_no_contact(start: float, stop: float) -> None:
 def test_the_level_after_a_stall_at_the_start_is_the_live_sensor_s(tmp_path: Path) -> None:
     held = stalled(recording(), 0.0, 3.9)
     held.wrench.flags.writeable = True
-    held.wrench[within(held, 0.0, 3.9), 2] = 12.7  # it hangs on what it read last time
+    held.wrench[within(held, 0.0, 3.9), 2] = 12.7  # it repeats what it read last
     found = audit(held)
     assert found.bias == pytest.approx(BIAS, abs=0.05)  # 50 samples of 0.05 N: 0.007 N
     assert found.contacts[0][0] == pytest.approx(TOUCH, abs=0.05)

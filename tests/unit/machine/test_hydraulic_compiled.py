@@ -129,7 +129,7 @@ def test_without_a_compiler_the_law_says_so(monkeypatch):
 
 
 def test_the_same_machine_gives_the_same_code():
-    """Else every process would compile anew."""
+    """Else every process would compile again."""
     first, second = (source(law_function(crane(), (0, 2))) for _ in range(2))
     assert first == second
 

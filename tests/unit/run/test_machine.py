@@ -209,7 +209,7 @@ def test_a_machine_steers_its_tool_frame_only():
 
 @pytest.mark.slow
 def test_pressing_on_a_plate_is_seen_in_the_pressures():
-    """Sliding at 12 kN: the estimate follows the simulator's contact within 6 %, the bar of the force figures."""
+    """Sliding at 12 kN: the estimate follows the simulator's contact within 6 %, the threshold of the force figures."""
     result = simulate(
         Follow(press_and_slide(0.12), PRESSING), setup(plate=True), {}, rngs([0]), duration_s=9.0, trace_hz=100.0
     )

@@ -142,7 +142,7 @@ def _check(phase: Phase) -> None:
     positive = ("speed", "stiffness", "turn_stiffness", "lead_force_n", "stall_s", "stall_m", "time_limit_s")
     for key in positive:
         if getattr(phase, key) <= 0.0:
-            raise InputError(f"{where}.{key}", "should be positive", "mend it")
+            raise InputError(f"{where}.{key}", "should be positive", "fix it")
     shares = [arm.share for arm in phase.arms]
     if min(shares) < 0.0 or abs(sum(shares) - 1.0) > 1e-9:
         raise InputError(f"{where}.arms", f"shares of the motion are {shares}", "let them add up to 1")

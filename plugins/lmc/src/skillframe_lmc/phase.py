@@ -88,7 +88,7 @@ def read_phase(document: Document) -> Phase:
     stop = build(Stop, _get(values, "stop", dict[str, Any], where), f"{where}.stop")
     for name in Stop.__dataclass_fields__:
         if getattr(stop, name) <= 0.0:
-            raise InputError(f"{where}.stop.{name}", "should be positive", "mend it")
+            raise InputError(f"{where}.stop.{name}", "should be positive", "fix it")
     return Phase(
         translation=_part(_get(values, "translation", dict[str, Any], where), f"{where}.translation"),
         rotation=_part(_get(values, "rotation", dict[str, Any], where), f"{where}.rotation"),

@@ -67,21 +67,21 @@ class LmcSkill(Skill):
     def restart(
         self, rows: NDArray[np.intp], observation: Observation, rngs: Sequence[np.random.Generator]
     ) -> None:  # fmt: skip
-        """Begin anew in some trials, from where their tools are now."""
+        """Start again in some trials, from where their tools are now."""
         some = rows_of(observation, rows)
-        anew = LmcSkill(self._phase, self._in_start_attitude)
-        anew.start(some, rngs)
+        fresh = LmcSkill(self._phase, self._in_start_attitude)
+        fresh.start(some, rngs)
         for mine, theirs in (
-            (self._home.position, anew._home.position), (self._home.rotation, anew._home.rotation),
-            (self._began, anew._began), (self._status, anew._status), (self._reason, anew._reason),
+            (self._home.position, fresh._home.position), (self._home.rotation, fresh._home.rotation),
+            (self._began, fresh._began), (self._status, fresh._status), (self._reason, fresh._reason),
         ):  # fmt: skip
             mine[rows] = theirs
-        self._push.replace(rows, anew._push)
-        self._turn.replace(rows, anew._turn)
+        self._push.replace(rows, fresh._push)
+        self._turn.replace(rows, fresh._turn)
         self._twist = np.concatenate([self._push.velocity, self._turn.velocity], axis=1)
         if self._in_start_attitude:
             stiffness = self._impedance.stiffness.copy()
-            stiffness[rows] = anew._impedance.stiffness
+            stiffness[rows] = fresh._impedance.stiffness
             self._impedance = Impedance(stiffness)
         self._stall.forget(rows, some)
         self._fresh = np.zeros(len(self._status), dtype=bool) if self._fresh is None else self._fresh

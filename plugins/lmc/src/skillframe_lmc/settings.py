@@ -74,6 +74,6 @@ class Settings:
             if not 0.0 < value < float("inf"):
                 raise InputError(f"--set {name}", f"{value} is not a positive number", "give a positive number")
         if self.quantile > 1.0 or self.slack < 1.0:
-            raise InputError("--set", "quantile must be at most 1 and slack at least 1", "mend it")
+            raise InputError("--set", "quantile must be at most 1 and slack at least 1", "fix it")
         if self.lead_force_max_n < self.lead_force_n:
             raise InputError("--set lead_force_max_n", "is below lead_force_n", "give a larger one")

@@ -31,7 +31,7 @@ class StallWatch:
         return seen
 
     def forget(self, rows: NDArray[np.intp], observation: Observation) -> None:
-        """Watch some trials anew from an observation of them alone."""
+        """Watch some trials again from an observation of them alone."""
         if self._smooth is not None:
             seen = self._seen(observation)
             self._smooth[rows], self._anchor[rows], self._since[rows] = seen, seen, observation.time

@@ -126,7 +126,7 @@ def _check_numbers(phase: Phase) -> None:
     }  # fmt: skip
     for key, value in positive.items():
         if not 0.0 < value < 1e6:
-            raise InputError(f"phases[0].{key}", f"should be positive, is {value:g}", "mend it, or learn again")
+            raise InputError(f"phases[0].{key}", f"should be positive, is {value:g}", "fix it, or learn again")
     if phase.stop.time_s > 300.0:
         raise InputError("phases[0].stop.time_s", "a search longer than 300 s is not planned", "give a shorter time")
     if phase.path.reach < phase.path.step:
@@ -136,7 +136,7 @@ def _check_numbers(phase: Phase) -> None:
 def _check_exploration(phase: Phase) -> None:
     names = list(phase.searched)
     if not names or names != [name for name in COORDINATES if name in names]:
-        raise InputError("phases[0].searched", f"should name some of {', '.join(COORDINATES)}, in order", "mend it")
+        raise InputError("phases[0].searched", f"should name some of {', '.join(COORDINATES)}, in order", "fix it")
     if phase.path.kind in ("spiral", "random_walk"):
         if names[:2] != list(COORDINATES[:2]):
             raise InputError("phases[0].searched", "a spiral or walk needs across_1 and across_2", "choose tour")

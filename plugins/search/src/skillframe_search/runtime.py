@@ -76,15 +76,15 @@ class SearchSkill(Skill):
     def restart(
         self, rows: NDArray[np.intp], observation: Observation, rngs: Sequence[np.random.Generator]
     ) -> None:  # fmt: skip
-        """Begin anew in some trials, from where their tools are now."""
-        anew = SearchSkill(self._phase, self._in_start_attitude, self._shift)
-        anew.start(rows_of(observation, rows), rngs)
+        """Start again in some trials, from where their tools are now."""
+        fresh = SearchSkill(self._phase, self._in_start_attitude, self._shift)
+        fresh.start(rows_of(observation, rows), rngs)
         self._stiffness = self._stiffness.copy()
         for name in PER_TRIAL:
-            getattr(self, name)[rows] = getattr(anew, name)
-        for mine, theirs in ((self._home, anew._home), (self._end, anew._end)):
+            getattr(self, name)[rows] = getattr(fresh, name)
+        for mine, theirs in ((self._home, fresh._home), (self._end, fresh._end)):
             mine.position[rows], mine.rotation[rows] = theirs
-        self._watch.replace(rows, anew._watch)
+        self._watch.replace(rows, fresh._watch)
 
     def _gain(self, along: float, rows: NDArray[np.bool_]) -> Float:
         """(n, 6, 6) stiffness of some rows with a stiffness along the push."""

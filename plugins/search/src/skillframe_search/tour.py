@@ -1,6 +1,6 @@
 r"""A search trajectory by sampling (seed, Fig. 16b): places drawn from the distribution, visited in a tour.
 
-Samples in the order in which they were drawn waste half of the way; a nearest-neighbour tour, mended by 2-opt
+Samples in the order in which they were drawn waste half of the way; a nearest-neighbour tour, improved by 2-opt
 exchanges, visits the same places in a fraction of it. Three things are ours. Samples come in rounds of 60 mm. A sample
 next to the way so far is passed over. And rounds go from the middle outwards: with effort l spent and a width w looked
 at on the way, search theory (Koopman 1957) spends it where the goal is likeliest, here within c standard deviations of

@@ -55,7 +55,7 @@ def moved(rows: Sequence[Document], moves: Sequence[Move], names: Sequence[str])
         cuts = result[move.demonstration]["boundaries"]
         if move.boundary >= len(cuts):
             there = ", ".join(f"{t:.2f} s" for t in cuts) or "none"
-            raise InputError(where, f"has no boundary {move.boundary + 1} (there are: {there})", f"mend {OPTION}")
+            raise InputError(where, f"has no boundary {move.boundary + 1} (there are: {there})", f"fix {OPTION}")
         cuts[move.boundary] = move.time
     for move in moves:
         _check_order(result[move.demonstration], move, names)
@@ -68,5 +68,5 @@ def _check_order(row: Document, move: Move, names: Sequence[str]) -> None:
         raise InputError(
             names[move.demonstration] or f"demonstration {move.demonstration + 1}",
             f"boundary {move.boundary + 1} cannot be at {move.time:g} s: boundaries stay inside and in order",
-            f"it lasts from {row['start']:.2f} s to {row['end']:.2f} s; mend {OPTION}",
+            f"it lasts from {row['start']:.2f} s to {row['end']:.2f} s; fix {OPTION}",
         )

@@ -31,7 +31,7 @@ def describe(document: Document) -> list[str]:
             f"phase {turning + 1} is not an LMC: it goes round and round, and no linear motion comes back against its "
             f"own direction{'; run, it will not repeat what was shown' * (policy.skills[turning]['type'] == 'lmc')}"
         )
-    again = f"begun anew at most {policy.recoveries} time{'s' * (policy.recoveries != 1)}"
+    again = f"retried at most {policy.recoveries} time{'s' * (policy.recoveries != 1)}"
     lines.append(f"a phase that fails (its force, time or travel limit) is {again if policy.recoveries else 'the end'}")
     for row in document.get("demonstrations", []):
         cuts = ", ".join(f"{t:.2f} s" for t in row["boundaries"]) or "nowhere"

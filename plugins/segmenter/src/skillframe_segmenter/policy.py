@@ -2,13 +2,13 @@
 
 A phase gives way to another that followed it in a demonstration
 
-- when the contact wrench asks for it: the gate's posterior exceeds its bar for two windows of 50 ms, and the phase has
+- when the contact wrench asks for it: the gate's posterior exceeds its threshold for two windows of 50 ms, and the phase has
   stopped moving the tool (under 4 mm/s and 2 degrees/s), or goes on moving it although the wrench has asked for a
   second: a coupler that touches with one edge feels like one that is seated, but it is still turning; or
 - when its own skill has ended well, as an LMC does that comes to rest while pushing: then to what followed most often,
 
 and the policy ends where demonstrations ended. A phase whose skill fails (a limit of force, time or travel) is
-recovered from: the phase that the wrench asks for begins anew, `recoveries` times; then the policy fails with that
+recovered from: the phase that the wrench asks for starts again, `recoveries` times; then the policy fails with that
 phase's reason. The journal says which phase ran when, and why it was left.
 """
 
@@ -90,7 +90,7 @@ class Policy(Composition):
         if self._recovered[row] < self._policy.recoveries:
             self._recovered[row] += 1
             following = part if self._gate is None else int(self._gate.posterior[row].argmax())
-            return following, Status.RUNNING, f"begins anew, as phase {part + 1} failed: {reason}"
+            return following, Status.RUNNING, f"starts again, because phase {part + 1} failed: {reason}"
         return END, status, reason
 
     def switch(self, row: int, part: int, time: float, why: str) -> None:

@@ -118,7 +118,7 @@ def refitted(
     for i in said:
         if len(again[i]["boundaries"]) != len(rows[i]["boundaries"]):
             where = again[i]["file"] or f"demonstration {i + 1}"
-            raise InputError(where, f"has an interval shorter than a window of {WINDOW_S:g} s", f"mend {OPTION}")
+            raise InputError(where, f"has an interval shorter than a window of {WINDOW_S:g} s", f"fix {OPTION}")
         again[i]["boundaries"] = rows[i]["boundaries"]
     return {"phase_model": _model_of(prepared, found, chosen, kind), "demonstrations": again}
 

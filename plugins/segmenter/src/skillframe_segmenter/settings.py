@@ -41,11 +41,11 @@ class Cutting:
     def __post_init__(self) -> None:
         for name in ("temper", "temper_windows", "stay_s", "phases_max", "merge_angle_rad", "merge_votes"):
             if not 0.0 < getattr(self, name) < float("inf"):
-                raise InputError(f"--set {name}", f"{getattr(self, name)} is not a positive number", "mend it")
+                raise InputError(f"--set {name}", f"{getattr(self, name)} is not a positive number", "fix it")
         if self.phases_max > 20:
             raise InputError("--set phases_max", f"{self.phases_max} is more than 20", "give a smaller number")
         if not 0.5 <= self.switch_posterior < 1.0 or self.switch_windows < 1:
-            raise InputError("--set", "switch_posterior is within 0.5 and 1, switch_windows at least 1", "mend it")
+            raise InputError("--set", "switch_posterior is within 0.5 and 1, switch_windows at least 1", "fix it")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

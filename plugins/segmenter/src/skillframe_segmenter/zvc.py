@@ -48,7 +48,7 @@ class ZvcSettings:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.still < 1.0 or self.force_n < 0.0:
-            raise InputError("--set", "still is within 0 and 1, force_n not negative", "mend it")
+            raise InputError("--set", "still is within 0 and 1, force_n not negative", "fix it")
 
 
 def fit(demonstrations: Sequence[Demonstration], phases: int | None, settings: Mapping[str, Any]) -> Document:
