@@ -38,7 +38,7 @@ class ChunkJob:
         folder: the campaign's folder, where the spec's relative paths start.
         skill: index of the skill.
         trials: trial numbers.
-        traces: whether every row shall bring its trace, as `TRACE`.
+        traces: whether every row brings its trace, as `TRACE`.
     """
 
     spec: dict[str, Any]

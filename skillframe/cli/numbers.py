@@ -41,5 +41,5 @@ NOT_NEGATIVE = _Finite(min=0.0)
 WHOLE = _Whole()
 NATURAL = _Whole(min=0)
 COUNT = _Whole(min=1, max=1_000_000)
-"""How many of something: more than a million of anything here is a slip of the finger (our choice)."""
+"""How many of something: more than a million of anything here is a typing mistake (our choice)."""
 SEED = NATURAL

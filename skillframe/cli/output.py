@@ -52,7 +52,7 @@ def note(text: str) -> None:
 
 GAP = 2  # columns of blanks between the columns of a table
 PAGE_WIDTH = 110
-"""Columns of text that a page or an editor shows without breaking lines of its own accord."""
+"""Columns of text that a page or an editor shows without breaking lines."""
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[object]], width: int | None = None) -> None:

@@ -1,7 +1,7 @@
 """Quantities with a unit, "8mm", "5deg", "20N", as SI numbers; a bare number is SI already.
 
-A unit is a prefix-free word of `UNITS`; each belongs to one SI unit, in which a quantity is asked for. What else is
-asked for (a count, a ratio) has the unit "", and takes no word.
+A unit is a word of `UNITS`, and each word belongs to one SI unit. A quantity asks for one SI unit; a count or a ratio
+has the unit "" and takes no word.
 """
 
 from __future__ import annotations
@@ -81,8 +81,8 @@ def si(value: Any, unit: str, where: str) -> Any:
 def doubt(key: str, value: Any, unit: str, default: Any) -> str:
     """A sentence where a bare number was probably meant in millimetres or degrees, else "".
 
-    Our choice: an offset of 1 m or more, another length of at least 100 times its default, an angle above 1 rad that is
-    no more than 360. The factor between metres and millimetres is 1000, that between radians and degrees 57.
+    Our choice: a length of at least 100 times its default, or of 1 m if that is 0; an angle above 1 rad and above
+    twice its default. Millimetres read as metres are 1000 times too large, degrees read as radians 57 times.
 
     Args:
         key: of the quantity.

@@ -219,7 +219,7 @@ class RowType:
         frozen: every constant of the method was fixed before this row's world or figure was looked at, so ours is a
             prediction; False says that method and worlds were developed together, with fresh seeds for the figure.
         calibrated: what was chosen with the published figure in sight; "" if nothing was.
-        weak: why reaching the threshold would show nothing, in words; such a row can fail, and is "reported" if it does not.
+        weak: why reaching the threshold would show nothing, in words; such a row can fail, else it is "reported".
         settings: what `--set` can change, with its value as shipped [SI units, unless the name says otherwise].
         group: rows of one group are computed one after another in one process, so that they can share what is costly.
         topic: a word or two under which the page lists the row; "" takes the group.

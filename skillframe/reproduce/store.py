@@ -45,7 +45,7 @@ def values_are(row: RowType, result: RowResult) -> str:
 
 
 def verdict(row: RowType, result: RowResult) -> str:
-    """The verdict that counts: a threshold that other methods reach as well can be missed, and reaching it is no pass."""
+    """The verdict that counts: reaching a weak row's threshold is no pass, but missing it is a failure."""
     return "reported" if row.weak and result.verdict == "pass" else result.verdict
 
 

@@ -1,7 +1,7 @@
 r"""Another payload than declared: its inertia, and gravity of one more kilogram in the grip, for many machines at once.
 
-The link that robot.toml's `[payload]` names is moved by independent joints only. With the joints' axes \(a_j\) and origins
-\(o_j\) in base from the product of exponentials, and the link's centre of mass c,
+The link that robot.toml's `[payload]` names is moved by independent joints only. With the joints' axes \(a_j\) and
+origins \(o_j\) in base from the product of exponentials, and the link's centre of mass c,
 
     g_j = -g . dc/dz_j,     dc/dz_j = a_j x (c - o_j)  (turns),   a_j  (slides),
 

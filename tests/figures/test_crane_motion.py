@@ -138,8 +138,8 @@ def landed(found):
 def test_in_steady_sliding_the_residual_of_the_target_dynamics_is_below_a_percent(surface, mass, friction):
     """With the force that the machine takes it for; with the true one where the plant is as believed.
 
-    Wrong friction and mass leave the estimate 60 N of 8.9 kN, which has thresholds of its own. On 5e6 N/m the tool hops in
-    the first 0.3 s: this crane's encoders show the touch of a load that turns round within 37 ms after 22 ms.
+    Wrong friction and mass leave the estimate 60 N of 8.9 kN, which has thresholds of its own. On 5e6 N/m the tool hops
+    in the first 0.3 s: this crane's encoders show the touch of a load that turns round within 37 ms after 22 ms.
     """
     found = pressed(surface, mass=mass, friction=friction)
     load = np.hypot(*found.force[found.steady :].mean(axis=0))

@@ -85,7 +85,7 @@ def test_what_was_learned_ends_in_the_corner_from_three_starts(surface: str) -> 
     row(
         f"{surface}, learned {angle_of(document):.1f} degrees", f"{corner.good.sum()}/36",
         f"error median {1e3 * np.median(result.final_error_m):.1f}, largest {1e3 * result.final_error_m.max():.1f} mm",
-        f"peak median {np.median(result.peak_force_n):.0f}, largest {result.peak_force_n.max():.0f} N (at most {PEAK:.0f})",
+        f"peak median {np.median(result.peak_force_n):.0f}, largest {result.peak_force_n.max():.0f} N (<= {PEAK:.0f})",
     )  # fmt: skip
     assert corner.good.all(), (list(result.failure), result.peak_force_n)
 

@@ -1,7 +1,7 @@
 """The acceptance figures of the segmenter over fresh seeds, beside all baselines; `pytest -s -m figures` prints them.
 
 Boundaries are judged within windows of 50 ms: missed beyond 0.30 s, false beyond 0.35 s (see `tests.figures.phases`).
-Seeds were used for nothing else. What is asserted are the thresholds that are called reachable; rows marked "hard" are shown.
+Seeds were used for nothing else. Thresholds that are called reachable are asserted; rows marked "hard" are shown.
 """
 
 from __future__ import annotations
@@ -166,9 +166,7 @@ def test_boundaries_of_demonstrations_from_contact_simulation():
     ]
     met += [bar(f"{t}: largest error 0.15 s", rows[t].total.largest <= 0.15) for t in ("corner", "hose coupler")]
     if not all(met):
-        pytest.xfail(
-            "thresholds of quasi-static demonstrations that contact simulation misses; see the page on segmentation"
-        )
+        pytest.xfail("thresholds of quasi-static demonstrations, missed in contact simulation; see segmentation.md")
 
 
 def touched(demonstration: Demonstration) -> float:
@@ -260,9 +258,7 @@ def test_following_new_demonstrations_and_the_gate_where_tables_have_moved(famil
     for column in (2, 3):  # all worlds together; of one world alone, a dozen seeds may be lucky
         assert sum(row[column].near for row in gated) < 0.2 * sum(row[column].changes for row in gated)
     if not known:
-        pytest.xfail(
-            "thresholds of quasi-static demonstrations that contact simulation misses; see the page on segmentation"
-        )
+        pytest.xfail("thresholds of quasi-static demonstrations, missed in contact simulation; see segmentation.md")
 
 
 def bar(what: str, met: bool) -> bool:

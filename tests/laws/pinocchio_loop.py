@@ -1,4 +1,4 @@
-"""One trial of a push at a time, written again with Pinocchio and `mujoco.mj_step`: the witness of the batched executor.
+"""One trial of a push at a time, written with Pinocchio and `mujoco.mj_step`: the witness of the batched executor.
 
 It shares the compiled MuJoCo model and the start with skillframe, and no law: equation (1), damping design, null space,
 taring, ramp and the push itself are written again here, over single vectors and Pinocchio's data.

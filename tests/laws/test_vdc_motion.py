@@ -45,7 +45,7 @@ def test_the_task_finds_the_joints_of_a_position_and_refuses_what_it_cannot_reac
 
 def test_without_noise_and_with_the_true_model_the_sampled_law_follows_within_a_millimetre():
     """The start of the published path. The rate filter lags by 2/(2 pi 24 Hz) = 13 ms, which an acceleration of at most
-    0.16 m/s^2 turns into 2.2 mm/s, and Lambda = 6 1/s into 0.36 mm: the rest of the bound is for the sampled control."""
+    0.16 m/s^2 turns into 2.2 mm/s, and Lambda = 6 1/s into 0.36 mm: the rest is for the sampled control."""
     errors, speed = run(Vdc(crane(), 16.0), diamond, 0.6, noise=0.0)
     assert figures(errors, speed).largest < 1e-3
 

@@ -2,9 +2,9 @@
 
 A phase gives way to another that followed it in a demonstration
 
-- when the contact wrench asks for it: the gate's posterior exceeds its threshold for two windows of 50 ms, and the phase has
-  stopped moving the tool (under 4 mm/s and 2 degrees/s), or goes on moving it although the wrench has asked for a
-  second: a coupler that touches with one edge feels like one that is seated, but it is still turning; or
+- when the contact wrench asks for it: the gate's posterior exceeds its threshold for two windows of 50 ms, and the
+  phase has stopped moving the tool (under 4 mm/s and 2 degrees/s), or goes on moving it although the wrench has asked
+  for a second: a coupler that touches with one edge feels like one that is seated, but it is still turning; or
 - when its own skill has ended well, as an LMC does that comes to rest while pushing: then to what followed most often,
 
 and the policy ends where demonstrations ended. A phase whose skill fails (a limit of force, time or travel) is
