@@ -7,10 +7,12 @@ live with the executor. An error's text says what is wrong, where, and what to d
 from __future__ import annotations
 
 from collections.abc import Iterable
-from difflib import get_close_matches
+from difflib import SequenceMatcher
 
 MOST_NAMES = 30
 """Names that an error lists; more are no sentence any more."""
+LEAST_LIKENESS = 0.5
+"""Share of letters in common (Ratcliff and Obershelp) from which on a name is suggested."""
 
 
 class SkillframeError(Exception):
@@ -60,6 +62,12 @@ class MissingDependency(SkillframeError):
 
 
 def suggest(name: str, known: Iterable[str]) -> str | None:
-    """Nearest of the known names, or None if none is near."""
-    near = get_close_matches(name.lower(), {k.lower(): k for k in known}, n=1, cutoff=0.5)
-    return {k.lower(): k for k in known}[near[0]] if near else None
+    """Nearest of the known names, or None if none is near; a name can be near as a whole or by its beginning."""
+
+    def likeness(other: str) -> tuple[float, float, str]:
+        texts = (other, other[: len(name)])
+        whole, beginning = (SequenceMatcher(None, text.lower(), name.lower()).ratio() for text in texts)
+        return max(whole, beginning), whole, other  # of equals the last, whatever the order of `known`
+
+    near = max(known, key=likeness, default=None)
+    return near if near is not None and likeness(near)[0] >= LEAST_LIKENESS else None
