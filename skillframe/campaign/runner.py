@@ -51,12 +51,14 @@ class Progress(NamedTuple):
         note: a sentence if there is something to say.
         under_way: how many rows' worth of the chunks in flight is done; `done + under_way` never falls, so after a
             chunk was lost it stands still until the same is done again.
+        usual: whether the note belongs to an undisturbed campaign, so that `--quiet` leaves it out.
     """
 
     done: int
     total: int
     note: str = ""
     under_way: float = 0.0
+    usual: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,7 +165,7 @@ class _Session:
         """Run once more what is to leave a trace."""
         jobs = self._untraced()
         if jobs:
-            self._tell(f"{sum(len(job.trials) for job in jobs)} of them run again, to leave traces")
+            self._tell(f"{sum(len(job.trials) for job in jobs)} of them run again, to leave traces", usual=True)
         self._driver(pool, self._keep_traces, traces=True).run(jobs)
 
     def _pool(self, evaluate: Evaluate) -> Pool:
@@ -206,10 +208,10 @@ class _Session:
         self._check_in_place()
         self._tell()
 
-    def _tell(self, note: str = "", under_way: float = 0.0) -> None:
+    def _tell(self, note: str = "", under_way: float = 0.0, usual: bool = False) -> None:
         done = len(self.log.done)
         self.furthest = min(max(self.furthest, done + under_way), self.total)
-        self.notify(Progress(done, self.total, note, self.furthest - done))
+        self.notify(Progress(done, self.total, note, self.furthest - done, usual))
 
     def _tell_share(self, under_way: float) -> None:
         """Between chunks; the traces at the end are no rows."""

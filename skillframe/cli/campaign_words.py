@@ -83,11 +83,11 @@ def show_rates(skills: dict[str, dict[str, Any]]) -> None:
 
 @contextmanager
 def progress() -> Iterator[Callable[[Progress], None]]:
-    """A bar on a terminal, a line per tenth of the work in a pipe, both on stderr; with -q, what has to be said."""
+    """A bar on a terminal, a line per tenth of the work in a pipe, both on stderr; with -q only what is unusual."""
     import sys
 
     if is_quiet():
-        yield lambda progress: None
+        yield lambda progress: click.echo(progress.note, err=True) if progress.note and not progress.usual else None
         return
     if not sys.stderr.isatty():
         yield _lines()

@@ -172,7 +172,7 @@ def test_a_campaign_tells_its_outcome_as_json_names_robot_and_world_and_is_quiet
     vary = '"fixture.offset_x" = { uniform = ["-30mm", "30mm"] }\n"start.tilt_z" = { choice = [0, "1deg"] }\n'
     out = str(tmp_path / "results")
     capsys.readouterr()
-    assert run(["campaign", "run", campaign(vary, trials=4), "--out", out, "--traces", "0", "--json", "-q"]) == 0
+    assert run(["campaign", "run", campaign(vary, trials=4), "--out", out, "--traces", "2", "--json", "-q"]) == 0
     told = capsys.readouterr()
     said = json.loads(told.out)
     assert told.err == ""

@@ -7,6 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from skillframe.campaign.runner import Progress
+from skillframe.cli.campaign_words import progress as campaign_progress
 from skillframe.cli.main import run
 from skillframe.cli.output import PAGE_WIDTH, laid_out, note, progress, quiet_option, table
 from skillframe.cli.reproduce import _show
@@ -101,3 +103,18 @@ def test_quiet_work_says_nothing_of_how_far_it_is(capsys: pytest.CaptureFixture[
     assert capsys.readouterr().err == ""
     work.main([], standalone_mode=False)
     assert capsys.readouterr().err == "a note\n1 of 1 frames\n"
+
+
+def test_a_quiet_campaign_says_what_is_unusual_and_nothing_else(capsys: pytest.CaptureFixture[str]) -> None:
+    @click.command()
+    @quiet_option
+    def work() -> None:
+        with campaign_progress() as notify:
+            notify(Progress(1, 4))
+            notify(Progress(1, 4, "worker 1 was ended: memory"))
+            notify(Progress(4, 4, "2 of them run again, to leave traces", usual=True))
+
+    work.main(["-q"], standalone_mode=False)
+    assert capsys.readouterr().err == "worker 1 was ended: memory\n"
+    work.main([], standalone_mode=False)
+    assert len(capsys.readouterr().err.splitlines()) == 4
