@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from skillframe.cli.numbers import NUMBER, POSITIVE
+
+if TYPE_CHECKING:
+    from skillframe.fmu.library import BuiltFmu
 
 
 @click.group(name="fmu")
@@ -34,10 +38,10 @@ def list_(as_json: bool) -> None:
 
     rows = built()
     if as_json:
-        click.echo(json.dumps([{"name": r.name, "fmi_version": r.fmi_version, "path": str(r.path)} for r in rows]))
+        click.echo(_json(rows))
         return
     for row in rows:
-        click.echo(f"{row.name}  FMI {row.fmi_version}  {row.path}")
+        click.echo(_line(row))
     for name in fmu_folders():
         if name not in {row.name for row in rows}:
             click.echo(f"{name}  not built yet (skillframe fmu build {name})")
@@ -55,7 +59,7 @@ def build(names: tuple[str, ...], as_json: bool) -> int:
     """
     from skillframe.errors import SkillframeError
     from skillframe.fmu.foreign import build_from_sources
-    from skillframe.fmu.library import BuiltFmu, build_named, fmu_folders
+    from skillframe.fmu.library import build_named, fmu_folders
 
     rows: list[BuiltFmu] = []
     failed = 0
@@ -71,10 +75,18 @@ def build(names: tuple[str, ...], as_json: bool) -> int:
             continue
         rows += made
         for row in made:
-            click.echo(f"{row.name}  FMI {row.fmi_version}  {row.path}", err=as_json)
+            click.echo(_line(row), err=as_json)
     if as_json:
-        click.echo(json.dumps([{"name": r.name, "fmi_version": r.fmi_version, "path": str(r.path)} for r in rows]))
+        click.echo(_json(rows))
     return 2 if failed else 0
+
+
+def _json(rows: Sequence[BuiltFmu]) -> str:
+    return json.dumps([{"name": row.name, "fmi_version": row.fmi_version, "path": str(row.path)} for row in rows])
+
+
+def _line(row: BuiltFmu) -> str:
+    return f"{row.name}  FMI {row.fmi_version}  {row.path}"
 
 
 @command.command("check")
