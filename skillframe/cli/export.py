@@ -62,7 +62,7 @@ def command(
 
 
 def _list(as_json: bool) -> None:
-    from skillframe.cli.output import emit_json, table
+    from skillframe.cli.output import LIST_WIDTH, emit_json, table
     from skillframe.document.export import FORMATS
 
     if as_json:
@@ -74,7 +74,7 @@ def _list(as_json: bool) -> None:
         )
         return
     rows = [(f.name, f.axes, f.summary, f.checked) for f in FORMATS.values()]
-    table(("format", "axes", "what it is", "checked against"), rows)
+    table(("format", "axes", "what it is", "checked against"), rows, LIST_WIDTH)
 
 
 def _write(skill: Path, form: str, out: Path, phase: int | None, coc: str | None, attitude: str | None) -> Format:

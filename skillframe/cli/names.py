@@ -1,7 +1,7 @@
 """Names for the shell to complete, and the robot that every command takes where none is named.
 
 The shell asks while somebody types, so a name is looked up by what is light: folders for robots, the registry for the
-rest. Whatever goes wrong meanwhile completes to nothing; the command itself says what is wrong.
+rest. What cannot be read completes to nothing; the command itself says what is wrong.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def _completed(names: Callable[[], Iterable[str]]) -> Complete:
     def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[str]:
         try:
             return sorted(name for name in names() if name.startswith(incomplete))
-        except SkillframeError:
+        except (SkillframeError, OSError):
             return []
 
     return complete

@@ -51,6 +51,8 @@ def note(text: str) -> None:
 
 
 GAP = 2  # columns of blanks between the columns of a table
+LIST_WIDTH = 80
+"""Columns that a listing keeps in a pipe, too: a terminal's as it opens."""
 PAGE_WIDTH = 110
 """Columns of text that a page or an editor shows without breaking lines."""
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from skillframe.cli import names
-from skillframe.cli.output import emit_json, table
+from skillframe.cli.output import LIST_WIDTH, emit_json, table
 from skillframe.config.fields import settings_of
 from skillframe.config.units import doubt
 
@@ -37,7 +37,7 @@ def command(world: str | None, as_json: bool) -> None:
         emit_json(rows)
         return
     lines = [(row["name"], row["world"] or "any", row["unit"], typed(row["default"]), row["about"]) for row in rows]
-    table(("setting", "world", "unit", "default", "what it is"), lines)
+    table(("setting", "world", "unit", "default", "what it is"), lines, LIST_WIDTH)
 
 
 def _of_trials() -> Iterator[dict[str, Any]]:

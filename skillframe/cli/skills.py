@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from skillframe.cli.output import emit_json, table
+from skillframe.cli.output import LIST_WIDTH, emit_json, table
 
 
 @click.group()
@@ -40,4 +40,4 @@ def list_(as_json: bool) -> None:
         click.echo(left_out or "no kind of skill is installed; type: make install (or: pip install -e plugins/lmc)")
     else:
         lines = [(r["name"], "yes" if r["learns"] else "no", r["summary"], r["distribution"]) for r in rows]
-        table(("skill", "learns", "what it is", "from"), lines)
+        table(("skill", "learns", "what it is", "from"), lines, LIST_WIDTH)

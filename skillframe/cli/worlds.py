@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from skillframe.cli import names
-from skillframe.cli.output import emit_json, table
+from skillframe.cli.output import LIST_WIDTH, emit_json, table
 
 
 @click.group()
@@ -37,7 +37,8 @@ def list_(as_json: bool) -> None:
     if as_json:
         emit_json(rows)
     else:
-        table(("world", "what it is", "from"), [(row["name"], row["summary"], row["distribution"]) for row in rows])
+        lines = [(row["name"], row["summary"], row["distribution"]) for row in rows]
+        table(("world", "what it is", "from"), lines, LIST_WIDTH)
 
 
 @command.command()
@@ -74,7 +75,7 @@ def show(world: str, as_json: bool) -> None:
     if scene.holder is not None:
         click.echo("  a second arm, where there is one, holds the fixture")
     lines = [(row["name"], row["unit"], typed(row["default"]), row["about"]) for row in settings]
-    table(("setting", "unit", "default", "what it is"), lines)
+    table(("setting", "unit", "default", "what it is"), lines, LIST_WIDTH)
 
 
 def _point(point: tuple[float, ...]) -> str:

@@ -66,6 +66,14 @@ def test_every_setting_that_a_run_takes_is_listed_with_a_line_about_it(capsys):
     assert next(row for row in only if row["name"] == "world.slope")["unit"] == "rad"
 
 
+@pytest.mark.parametrize(
+    "words", ["settings", "skills list", "worlds list", "worlds show peg_in_hole", "export --list"]
+)
+def test_a_listing_in_a_pipe_is_no_wider_than_a_terminal(words, capsys):
+    assert run(words.split()) == 0
+    assert max(map(len, capsys.readouterr().out.splitlines())) <= 80
+
+
 def test_every_nominal_value_is_one_that_a_run_accepts():
     for each in VARIED:
         if each.nominal is not None:
