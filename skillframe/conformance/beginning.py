@@ -32,7 +32,7 @@ JOURNAL_TICKS = 5
 
 
 def goes_by_time(skill: SkillType, document: Document) -> Iterator[str]:
-    """What changes while the tool is held still changes with the observation's time, not with the count of ticks."""
+    """While the tool is held, commands change with the observation's time and not with the count of ticks."""
     fast, slow = (_held(skill, document, dt) for dt in HELD_DT)
     for i, name in enumerate(NAMES):
         if name == "reason":  # may hold a time, and says nothing more than status
@@ -52,25 +52,18 @@ def _values(commands: list[Command], i: int) -> list[Any]:
 
 
 def _alike(one: list[Any], two: list[Any]) -> bool:
-    """Whether a field is the same in every tick but the first; what is drawn is not, with other generators."""
+    """Whether a field is the same in every tick but the first; what is drawn differs, with other generators."""
     return all(np.array_equal(a, b) for a, b in zip(one[1:], two[1:], strict=True))
 
 
 def _held(skill: SkillType, document: Document, dt: float, seed: int = 7) -> list[Command]:
     """Commands to a tool that is held where it starts."""
-    follower, commands = Follower(lead_of(skill, document), dt), []
-    built = skill.build(document)
+    follower, built = Follower(lead_of(skill, document), dt), skill.build(document)
+    first, commands = follower.observation(), []
+    asked(built, built.start, first, [np.random.default_rng([seed, i]) for i in range(len(first.time))])
     for tick in range(HELD_TICKS):
         follower.tick = tick
-        observation = follower.observation()
-        if tick == 0:
-            asked(
-                built,
-                built.start,
-                observation,
-                [np.random.default_rng([seed, i]) for i in range(len(observation.time))],
-            )
-        commands.append(kept(asked(built, built.step, observation)))
+        commands.append(kept(asked(built, built.step, follower.observation())))
     return commands
 
 

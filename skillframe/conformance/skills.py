@@ -27,7 +27,7 @@ from skillframe.conformance.play import (
     with_row,
 )
 from skillframe.conformance.problems import attempt, json_problems
-from skillframe.conformance.watch import watched
+from skillframe.conformance.watch import printed, watched
 from skillframe.extend.records import Document, SkillType
 from skillframe.frames import Float, norm, rotation_vector
 from skillframe.skill import Command, Skill, Status, row
@@ -45,18 +45,23 @@ def example_document(skill: SkillType) -> Document:
 
 def check_skill(skill: SkillType, document: Document | None = None) -> list[str]:
     """Problems of a skill type, tried with a document (default: `example_document`); empty if it conforms."""
-    with watched():  # what is printed is told by a check, and stays out of what the command prints
-        if document is None:
-            try:
-                document = example_document(skill)
-            except (Exception, SystemExit) as error:  # foreign code: any failure is a finding
-                what = f"no document to try it with: {type(error).__name__}: {error}"
-                return [f"{what}; give SkillType.example, or a document"]
-        stop = attempt("builds", partial(_unusable, skill, copy.deepcopy(document))) or attempt(
-            "answers in time", partial(running.answers_in_time, skill, copy.deepcopy(document))
-        )
-        rest = {what: check for what, check in CHECKS.items() if what != "answers in time"}
-        return stop or [p for what, check in rest.items() for p in attempt(what, partial(check, skill, document))]
+    with watched() as seen:
+        problems = _problems(skill, document)
+    return problems or list(printed(seen))
+
+
+def _problems(skill: SkillType, document: Document | None) -> list[str]:
+    if document is None:
+        try:
+            document = example_document(skill)
+        except (Exception, SystemExit) as error:  # foreign code: any failure is a finding
+            what = f"no document to try it with: {type(error).__name__}: {error}"
+            return [f"{what}; give SkillType.example, or a document"]
+    stop = attempt("builds", partial(_unusable, skill, copy.deepcopy(document))) or attempt(
+        "answers in time", partial(running.answers_in_time, skill, copy.deepcopy(document))
+    )
+    rest = {what: check for what, check in CHECKS.items() if what != "answers in time"}
+    return stop or [p for what, check in rest.items() for p in attempt(what, partial(check, skill, document))]
 
 
 def _unusable(skill: SkillType, document: Document) -> Iterator[str]:
@@ -69,8 +74,8 @@ def _unusable(skill: SkillType, document: Document) -> Iterator[str]:
 def skill_warnings(skill: SkillType, document: Document | None = None) -> list[str]:
     """What is allowed and may surprise, in words: a skill that never ends and does not say so."""
     try:
-        document = example_document(skill) if document is None else document
         with watched():
+            document = example_document(skill) if document is None else document
             return list(running.end_warnings(skill, document))
     except (Exception, SystemExit):  # foreign code: what raises is a problem of `check_skill`
         return []

@@ -16,7 +16,7 @@ import numpy as np
 
 from skillframe.conformance import goals, trials
 from skillframe.conformance.problems import attempt
-from skillframe.conformance.watch import left_behind, watched
+from skillframe.conformance.watch import left_behind, printed, watched
 from skillframe.extend.records import WorldType
 from skillframe.frames import Pose, matrix_from_quaternion
 
@@ -26,14 +26,19 @@ if TYPE_CHECKING:
 
 def check_world(world: WorldType) -> list[str]:
     """Problems of a world, built from its defaults; empty if it conforms."""
-    with watched(), np.errstate(all="ignore"):
-        for what, check in (("parameters", _parameter_problems), ("scene", _scene_problems)):
-            if problems := attempt(what, partial(check, world)):
-                return problems
-        scene = world.build(world.params())
-        problems = [p for what, check in SCENES.items() for p in attempt(what, partial(check, scene))]
-        problems += attempt("parameters", partial(goals.idle_parameters, world, scene))
-        return problems or attempt("runs", partial(trials.runs, scene))
+    with watched() as seen, np.errstate(all="ignore"):
+        problems = _problems(world)
+    return problems or list(printed(seen))
+
+
+def _problems(world: WorldType) -> list[str]:
+    for what, check in (("parameters", _parameter_problems), ("scene", _scene_problems)):
+        if problems := attempt(what, partial(check, world)):
+            return problems
+    scene = world.build(world.params())
+    problems = [p for what, check in SCENES.items() for p in attempt(what, partial(check, scene))]
+    problems += attempt("parameters", partial(goals.idle_parameters, world, scene))
+    return problems or attempt("runs", partial(trials.runs, scene))
 
 
 def _parameter_problems(world: WorldType) -> Iterator[str]:

@@ -1,8 +1,8 @@
 """Is a share reached? By count in a full run; in a quick one unless the counts exclude it.
 
 A quick run has few trials, so there the upper end of the exact two-sided 95 % interval (Clopper and Pearson 1934) must
-reach the threshold. This is our choice: at a true rate of 0.9, ten trials miss a threshold of 0.9 one time in four. Where
-a full run has few groups, too, a share that misses its threshold while its interval contains it is undecided.
+reach the threshold. This is our choice: at a true rate of 0.9, ten trials miss a threshold of 0.9 one time in four.
+Where a full run has few groups, too, a share that misses its threshold while its interval contains it is undecided.
 """
 
 from __future__ import annotations

@@ -100,6 +100,10 @@ def prints(params):
     return plate(params)
 
 
+def says_where(scene):
+    return replace(scene, goal=lambda state: print("judging") or scene.goal(state))
+
+
 DRAWN = np.random.default_rng(3)
 
 
@@ -183,6 +187,7 @@ PLANTED = {
     "no mass": (with_tool(mass=0.0), "scene: no body has mass 0.0"),
     "chance in building": (with_scene(by_chance), "scene: building twice from the same parameters"),
     "prints": (world(prints), "scene: prints 'building the plate', which gets into what a command prints"),
+    "prints in its goal": (with_scene(says_where), "prints 'judging', which gets into what a command prints"),
     "a key that is missing": (world(lambda params: {}["plate"]), "scene: raised KeyError: 'plate'"),
     "quits": (world(lambda params: exec("raise SystemExit(2)")), "scene: raised SystemExit: 2"),
 }

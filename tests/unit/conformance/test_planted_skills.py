@@ -31,6 +31,24 @@ def test_a_skill_without_a_defect_has_no_finding(make):
     assert skill_warnings(sound) == []
 
 
+@pytest.mark.parametrize(
+    "chatty",
+    [
+        {"example": lambda: print("an example") or {"phases": [{}]}},
+        {"describe": lambda document: print("an example") or ["glides down"]},
+        {"explain": lambda document: print("an example") or []},
+    ],
+    ids=lambda changes: next(iter(changes)),
+)
+def test_what_prints_outside_of_a_run_is_named_too_and_stays_off_the_terminal(chatty, capsys):
+    from skillframe.conformance import skill_warnings
+
+    said = ["prints 'an example', which gets into what a command prints; leave it out"]
+    assert check_skill(kind(Glide, **chatty)) == said
+    assert skill_warnings(kind(Glide, **chatty)) == []
+    assert capsys.readouterr() == ("", "")
+
+
 def test_a_skill_that_never_ends_is_a_warning_unless_it_says_so():
     from skillframe.conformance import skill_warnings
 
