@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 from skillframe.extend.hookspecs import hookimpl
-from skillframe.extend.records import ReaderType, RowType, WorldType
-
-if TYPE_CHECKING:
-    from skillframe.frames import Float, Pose
+from skillframe.extend.records import Lazy, ReaderType, RowType, WorldType
 
 
 @hookimpl
@@ -25,7 +21,7 @@ def skillframe_readers() -> Iterable[ReaderType]:
     """The demonstration formats that ship with the core."""
     from skillframe.extend.readers import reader_types
 
-    return reader_types(_tool_poses)
+    return reader_types(Lazy("skillframe.robot.recorded:tool_poses"))  # its library is loaded for joint states only
 
 
 @hookimpl
@@ -34,10 +30,3 @@ def skillframe_rows() -> Iterable[RowType]:
     from skillframe.reproduce.crane import row_types
 
     return row_types()
-
-
-def _tool_poses(robot: str, arm: str | None, names: Sequence[str], positions: Float) -> Pose:
-    """Forward kinematics, whose library is loaded when joint states are read."""
-    from skillframe.robot.recorded import tool_poses
-
-    return tool_poses(robot, arm, names, positions)

@@ -5,10 +5,12 @@ import inspect
 import os
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from skillframe.extend.records import Lazy
 from skillframe.extend.registry import KINDS, registry
 
 PLUGINS = sorted(p for p in (Path(__file__).resolve().parents[2] / "plugins").iterdir() if (p / "src").is_dir())
@@ -92,20 +94,33 @@ def test_completing_a_word_loads_no_heavy_library(typed):
     assert not loaded_by(code, ALL_PLUGINS, **words) & HEAVY
 
 
+ARGUMENTS = {
+    "build": 1, "check": 1, "learn": 2, "describe": 1, "explain": 1, "area": 1, "example": 0, "centers": 1, "fit": 3,
+    "run": 1,
+}  # fmt: skip
+
+
 def factories():
-    """(what it is, place, number of arguments) of every factory that is imported when it is called."""
-    counts = {"build": 1, "check": 1, "learn": 2, "describe": 1, "explain": 1, "area": 1, "example": 0, "run": 1}
+    """(record, field, function, what is given to it in advance) of every factory that is imported when it is called."""
     for kind in KINDS:
         for record in registry().records(kind):
             for field in dataclasses.fields(record):
                 value = getattr(record, field.name)
-                if type(value).__name__ == "Lazy":
-                    yield record, field.name, value, counts[field.name]
+                factory = value.func if isinstance(value, partial) else value
+                if isinstance(factory, Lazy):
+                    given = (value.args, value.keywords) if isinstance(value, partial) else ((), {})
+                    yield record, field.name, factory.load(), given
 
 
+@pytest.mark.needs_plugins
 def test_every_factory_that_is_imported_when_called_is_there_and_takes_what_it_is_given():
-    for record, name, factory, count in factories():
-        inspect.signature(factory.load()).bind(*range(count)), (record.name, name)
+    found = list(factories())
+    assert {name for _, name, *_ in found} == set(ARGUMENTS)
+    for record, name, function, (first, named) in found:
+        try:
+            inspect.signature(function).bind(*first, *range(ARGUMENTS[name]), **named)
+        except TypeError as error:
+            pytest.fail(f"{name} of {record.name}: {error}")
 
 
 def test_the_settings_of_every_record_are_a_dataclass():
@@ -115,6 +130,6 @@ def test_the_settings_of_every_record_are_a_dataclass():
 
 @pytest.mark.needs_plugins
 def test_a_row_is_computed_by_the_function_that_says_its_number():
-    rows = [(record.name, factory.load()) for record, name, factory, _ in factories() if name == "run"]
+    rows = [(record.name, function) for record, name, function, _ in factories() if name == "run"]
     assert len(rows) == 19  # 23 rows, less the crane's four, which stand in a light module
     assert all(run.__doc__.startswith(f"Row {number}: ") for number, run in rows)

@@ -2,54 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 from skillframe import hookimpl
-from skillframe.extend.records import CoordinatorType, Document, LearnOptions, RowType, WorldType
-
-if TYPE_CHECKING:
-    from skillframe.demonstration.record import Demonstration
-    from skillframe.frames import Float
-    from skillframe.skill import Skill
-
-
-def _learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
-    from skillframe_dualarm.learner import learn
-
-    return learn(demonstrations, options)
-
-
-def _settings() -> type:
-    from skillframe_dualarm.learner import Settings
-
-    return Settings
-
-
-def _check(document: Document) -> None:
-    from skillframe_dualarm.document import read_phase
-
-    read_phase(document)
-
-
-def _build(document: Document) -> Skill:
-    from skillframe_dualarm.runtime import build
-
-    return build(document)
-
-
-def _centers(document: Document) -> Float:
-    import numpy as np
-
-    from skillframe_dualarm.document import read_phase
-
-    return np.array([arm.center_of_compliance for arm in read_phase(document).arms])
-
-
-def _describe(document: Document) -> list[str]:
-    from skillframe_dualarm.describe import describe
-
-    return describe(document)
+from skillframe.extend.records import CoordinatorType, Lazy, RowType, WorldType
 
 
 @hookimpl
@@ -58,12 +14,12 @@ def skillframe_coordinators() -> Iterable[CoordinatorType]:
     yield CoordinatorType(
         name="dual_arm",
         summary="two arms push one way and give way in others, each for itself or as one relative task",
-        build=_build,
-        check=_check,
-        learn=_learn,
-        settings=_settings,
-        describe=_describe,
-        centers=_centers,
+        build=Lazy("skillframe_dualarm.runtime:build"),
+        check=Lazy("skillframe_dualarm.document:read_phase"),
+        learn=Lazy("skillframe_dualarm.learner:learn"),
+        settings=Lazy("skillframe_dualarm.learner:Settings").load,
+        describe=Lazy("skillframe_dualarm.describe:describe"),
+        centers=Lazy("skillframe_dualarm.document:centers"),
     )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from skillframe.config import build
 from skillframe.errors import InputError, UnknownName
 from skillframe.extend.records import Document
-from skillframe.frames import norm
+from skillframe.frames import Float, norm
 
 Vector = tuple[float, float, float]
 Mode = Literal["independent", "relative"]
@@ -132,6 +132,11 @@ def read_phase(document: Document) -> Phase:
     phase = build(Phase, phases[0], "phases[0]")
     _check(phase)
     return phase
+
+
+def centers(document: Document) -> Float:
+    """(arms, 3) centres of compliance of a document, in each arm's tool frame [m]."""
+    return np.array([arm.center_of_compliance for arm in read_phase(document).arms])
 
 
 def _check(phase: Phase) -> None:

@@ -7,51 +7,10 @@ that is imported when plug-ins are listed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 from skillframe.extend.hookspecs import hookimpl
-from skillframe.extend.records import Document, Illustration, LearnOptions, RowType, SkillType
-
-if TYPE_CHECKING:
-    from skillframe.demonstration.record import Demonstration
-    from skillframe.skill import Skill
-
-
-def _learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
-    from skillframe_lmc.learner import learn
-
-    return learn(demonstrations, options)
-
-
-def _settings() -> type:
-    from skillframe_lmc.settings import Settings
-
-    return Settings
-
-
-def _check(document: Document) -> None:
-    from skillframe_lmc.phase import read_phase
-
-    read_phase(document)
-
-
-def _build(document: Document) -> Skill:
-    from skillframe_lmc.runtime import build
-
-    return build(document)
-
-
-def _describe(document: Document) -> list[str]:
-    from skillframe_lmc.describe import describe
-
-    return describe(document)
-
-
-def _explain(document: Document) -> list[Illustration]:
-    from skillframe_lmc.explain import explain
-
-    return explain(document)
+from skillframe.extend.records import Lazy, RowType, SkillType
 
 
 @hookimpl
@@ -60,12 +19,12 @@ def skillframe_skills() -> Iterable[SkillType]:
     yield SkillType(
         name="lmc",
         summary="linear motion with compliance: push one way, give way in others, learned from forces",
-        build=_build,
-        check=_check,
-        learn=_learn,
-        settings=_settings,
-        describe=_describe,
-        explain=_explain,
+        build=Lazy("skillframe_lmc.runtime:build"),
+        check=Lazy("skillframe_lmc.phase:read_phase"),
+        learn=Lazy("skillframe_lmc.learner:learn"),
+        settings=Lazy("skillframe_lmc.settings:Settings").load,
+        describe=Lazy("skillframe_lmc.describe:describe"),
+        explain=Lazy("skillframe_lmc.explain:explain"),
     )
 
 

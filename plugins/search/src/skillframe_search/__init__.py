@@ -8,16 +8,11 @@ listed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
+from functools import partial
 
 from skillframe.extend.hookspecs import hookimpl
-from skillframe.extend.records import Document, Illustration, LearnOptions, RowType, SkillType
-
-if TYPE_CHECKING:
-    from skillframe.demonstration.record import Demonstration
-    from skillframe.frames import Float
-    from skillframe.skill import Skill
+from skillframe.extend.records import Lazy, RowType, SkillType
 
 SUMMARIES = {
     "search": "looks where a blindfolded person looked, with the forces that were felt, until it falls in",
@@ -26,68 +21,22 @@ SUMMARIES = {
 }
 
 
-def _learn(kind: str) -> Callable[[Sequence[Demonstration], LearnOptions], Document]:
-    def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
-        from skillframe_search.learner import learn
-
-        return learn(demonstrations, options, kind)
-
-    return learn
-
-
-def _settings() -> type:
-    from skillframe_search.learner import Settings
-
-    return Settings
-
-
-def _check(document: Document) -> None:
-    from skillframe_search.phase import read_phase
-
-    read_phase(document)
-
-
-def _build(document: Document) -> Skill:
-    from skillframe_search.runtime import build
-
-    return build(document)
-
-
-def _area(document: Document) -> Float:
-    from skillframe_search.plan import area
-
-    return area(document)
-
-
-def _describe(document: Document) -> list[str]:
-    from skillframe_search.describe import describe
-
-    return describe(document)
-
-
-def _explain(document: Document) -> list[Illustration]:
-    from skillframe_search.pictures import explain
-
-    return explain(document)
-
-
-def _example(kind: str) -> Callable[[], Document]:
-    def example() -> Document:
-        from skillframe_search.example import example
-
-        return example(kind)
-
-    return example
-
-
 @hookimpl
 def skillframe_skills() -> Iterable[SkillType]:
     """The kinds of search."""
     for kind, summary in SUMMARIES.items():
         yield SkillType(
-            name=kind, summary=summary, build=_build, check=_check, learn=_learn(kind), settings=_settings,
-            describe=_describe, explain=_explain, example=_example(kind), area=_area,
-        )  # fmt: skip
+            name=kind,
+            summary=summary,
+            build=Lazy("skillframe_search.runtime:build"),
+            check=Lazy("skillframe_search.phase:read_phase"),
+            learn=partial(Lazy("skillframe_search.learner:learn"), kind=kind),
+            settings=Lazy("skillframe_search.learner:Settings").load,
+            describe=Lazy("skillframe_search.describe:describe"),
+            explain=Lazy("skillframe_search.pictures:explain"),
+            example=partial(Lazy("skillframe_search.example:example"), kind),
+            area=Lazy("skillframe_search.plan:area"),
+        )
 
 
 @hookimpl

@@ -8,82 +8,28 @@ plug-ins are listed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from functools import partial
 
 from skillframe.extend.hookspecs import hookimpl
-from skillframe.extend.records import Document, Illustration, LearnOptions, RowType, SegmenterType, SkillType
-
-if TYPE_CHECKING:
-    from skillframe.demonstration.record import Demonstration
-    from skillframe.skill import Skill
-
-Fit = Callable[["Sequence[Demonstration]", "int | None", Mapping[str, Any]], Document]
-
-
-def _hmm(kind: str) -> Fit:
-    def fit(demonstrations: Sequence[Demonstration], phases: int | None, settings: Mapping[str, Any]) -> Document:
-        from skillframe_segmenter.segmentation import segment
-
-        return segment(demonstrations, phases, settings, kind)
-
-    return fit
-
-
-def _zvc(demonstrations: Sequence[Demonstration], phases: int | None, settings: Mapping[str, Any]) -> Document:
-    from skillframe_segmenter.zvc import fit
-
-    return fit(demonstrations, phases, settings)
+from skillframe.extend.records import Lazy, RowType, SegmenterType, SkillType
 
 
 @hookimpl
 def skillframe_segmenters() -> Iterable[SegmenterType]:
     """The ways of cutting demonstrations into phases that this plug-in provides."""
+    segment = Lazy("skillframe_segmenter.segmentation:segment")
     yield SegmenterType(
         name="wrench_hmm", summary="phases with linear motion each; the contact wrench drives the transitions",
-        fit=_hmm("wrench_hmm"),
+        fit=partial(segment, kind="wrench_hmm"),
     )  # fmt: skip
     yield SegmenterType(
         name="pose_hmm", summary="baseline: the same phases; the pose drives the transitions (Kroemer et al. 2015)",
-        fit=_hmm("pose_hmm"),
+        fit=partial(segment, kind="pose_hmm"),
     )  # fmt: skip
-    yield SegmenterType(name="zvc", summary="baseline: cuts where the tool stands still", fit=_zvc)
-
-
-def _build(document: Document) -> Skill:
-    from skillframe_segmenter.policy import build
-
-    return build(document)
-
-
-def _check(document: Document) -> None:
-    from skillframe_segmenter.document import check
-
-    check(document)
-
-
-def _learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
-    from skillframe_segmenter.learning import learn
-
-    return learn(demonstrations, options)
-
-
-def _settings() -> type:
-    from skillframe_segmenter.settings import PolicySettings
-
-    return PolicySettings
-
-
-def _describe(document: Document) -> list[str]:
-    from skillframe_segmenter.describe import describe
-
-    return describe(document)
-
-
-def _explain(document: Document) -> list[Illustration]:
-    from skillframe_segmenter.describe import explain
-
-    return explain(document)
+    yield SegmenterType(
+        name="zvc", summary="baseline: cuts where the tool stands still", fit=Lazy("skillframe_segmenter.zvc:fit")
+    )
 
 
 @hookimpl
@@ -92,12 +38,12 @@ def skillframe_skills() -> Iterable[SkillType]:
     yield SkillType(
         name="policy",
         summary="phases in sequence, found in whole demonstrations; the contact wrench switches between them",
-        build=_build,
-        check=_check,
-        learn=_learn,
-        settings=_settings,
-        describe=_describe,
-        explain=_explain,
+        build=Lazy("skillframe_segmenter.policy:build"),
+        check=Lazy("skillframe_segmenter.document:check"),
+        learn=Lazy("skillframe_segmenter.learning:learn"),
+        settings=Lazy("skillframe_segmenter.settings:PolicySettings").load,
+        describe=Lazy("skillframe_segmenter.describe:describe"),
+        explain=Lazy("skillframe_segmenter.describe:explain"),
     )
 
 
