@@ -57,8 +57,8 @@ def command(
         return
     click.echo(f"{out}: {form}")
     click.echo(f"checked against {chosen.checked}")
-    for line in chosen.notes:
-        click.echo(f"note: {line}" if line is chosen.notes[0] else f"      {line}")
+    for text in chosen.notes:
+        click.echo(f"note: {text}")
 
 
 def _list(as_json: bool) -> None:

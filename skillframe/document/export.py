@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from skillframe.frames import Float
 DIRECTIONS = ("x", "y", "z")
 WIDE_OPEN = {"translation": 0.1, "rotation": 0.5}  # crisp's defaults, on axes without stiffness [m, rad]
 CRISP_LARGEST = 5000.0  # its bound of every stiffness and damping: it refuses to load a larger one
+WIDTH = 110  # of the file's comments
 VELOCITY_MODE = 1  # aic_control_interfaces/TrajectoryGenerationMode
 
 
@@ -34,8 +36,8 @@ class Format:
         axes: what its numbers are expressed in.
         body: the settings.
         checked: the controller's version, or repository and commit, that names and types were checked against.
-        notes: what must be known before it is used, a line each; in the file and on the terminal.
-        comments: how they are used, a line each.
+        notes: what must be known before it is used, a sentence each; in the file and on the terminal.
+        comments: how they are used; in the file.
     """
 
     name: str
@@ -100,7 +102,7 @@ FORMATS = {
             name="crisp", summary="crisp_controllers CartesianController (ROS 2 parameters)", axes="base", body=crisp,
             checked="utiasDSL/crisp_controllers 2b33ab7 (releases 2.2.0 to 2.3.1)",
             notes=(
-                "needs crisp_controllers 1.3.0 or newer: before, use_local_jacobian: false acts at the base's origin,",
+                "needs crisp_controllers 1.3.0 or newer: before, use_local_jacobian: false acts at the base's origin, "
                 "where a push makes a torque (20 N at 0.5 m: 10 Nm) about axes that the skill leaves free",
             ),
             comments=(
@@ -114,17 +116,17 @@ FORMATS = {
             summary="cartesian_controllers CartesianComplianceController (ROS 2 parameters)",
             checked="fzi-forschungszentrum-informatik/cartesian_controllers f53f798 (2024-10-20, ros2)",
             notes=(
-                "the spring acts at end_effector_link; compliance_ref_link gives only its axes and the sensor's point:",
+                "the spring acts at end_effector_link; compliance_ref_link gives only its axes and the sensor's point: "
                 "put both at the centre of compliance, with the tool's axes",
                 "it holds stiffness alone: damping and speed follow from its own pd_gains and solver",
             ),
             comments=(
                 "Add joints, links, command_interfaces, solver and pd_gains of your robot, and ft_sensor_ref_link.",
-                "The stiffness turns with the tool. The twist above is in the tool's axes at the start of the phase:",
+                "The stiffness turns with the tool. The twist above is in the tool's axes at the start of the phase: "
                 "turn it into robot_base_link, in which target_frame is read.",
-                "Publish target_frame: the pose at the start of the phase, moving with that twist, but ahead of the",
+                "Publish target_frame: the pose at the start of the phase, moving with that twist, but ahead of the "
                 "measured one by no more than lead over stiffness: the controller itself clips at 1 m and 1 rad only.",
-                "Publish ft_sensor_wrench, the environment's force on the tool, without bias and the tool's weight, in",
+                "Publish ft_sensor_wrench, the environment's force on the tool, without bias and the tool's weight, in "
                 "the axes of ft_sensor_ref_link: without it nothing gives way. Leave target_wrench at zero.",
             ),
         ),
@@ -133,7 +135,7 @@ FORMATS = {
             body=motion_update, checked="intrinsic-dev/aic db40abc (2026-03-13)",
             notes=(
                 "for aic_control_interfaces from 2026-02-19 on (2b0f671): wrench_feedback_gains_at_tip is float64[6]",
-                "the toolkit's bring-up limits the wrench to 10 N and 10 Nm per axis (impedance.maximum_wrench):",
+                "the toolkit's bring-up limits the wrench to 10 N and 10 Nm per axis (impedance.maximum_wrench): "
                 "a larger push never arrives",
             ),
             comments=(
@@ -159,8 +161,7 @@ def settings_text(form: Format, phase: MovingImpedance, words: list[str]) -> str
         f"lead: {phase.lead_force:g} N, {phase.lead_torque:g} Nm at most",
         f"the phase ends with: {stops}",
         f"checked against {form.checked}",
-        *form.notes,
-        *form.comments,
+        *(line for text in (*form.notes, *form.comments) for line in wrap(text, WIDTH)),
     ]
     return "".join(f"# {line}\n" for line in [form.summary, *said]) + "".join(_lines(form.body(phase), ""))
 
