@@ -80,6 +80,7 @@ def test_a_plugin_made_by_new_is_found_and_passes_its_checks(made, capsys):
         "name": "glide_slowly", "distribution": "skillframe-glide-slowly", "version": "0.1.0",
         "provides": ["skill:glide_slowly"], "error": None,
     }  # fmt: skip
+    assert "skillframe_glide_slowly.skill" not in sys.modules  # a listing imports the entry module alone
     assert run(["plugins", "check", "glide_slowly"]) == 0
     assert "skill:glide_slowly: passes" in capsys.readouterr().out
 
