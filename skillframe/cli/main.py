@@ -10,7 +10,8 @@ import errno
 import io
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
@@ -68,15 +69,17 @@ class LazyGroup(click.Group):
             with formatter.section("Commands"):
                 formatter.write_dl(rows)
 
+    def make_context(self, *arguments: Any, **settings: Any) -> click.Context:
+        """As click does, which prints `--help` and `--version` here; see `invoke`."""
+        with _readers_may_leave():
+            return super().make_context(*arguments, **settings)
+
     def invoke(self, ctx: click.Context) -> Any:
         """As click does; that the reader of our output has left, as `head` does, is no error."""
-        try:
+        with _readers_may_leave():
             result = super().invoke(ctx)
             sys.stdout.flush()
             return result
-        except BrokenPipeError:
-            _discard_output()
-            return 0
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
         """As click does, but an unknown name is answered with the nearest one."""
@@ -161,6 +164,16 @@ def _of_the_system(error: OSError | MemoryError) -> str:
         return f"{error.filename or 'the system'}: {said}"
     _discard_output()
     return f"{error.filename or 'what is printed (standard output) cannot be written'}: {said}; make room there"
+
+
+@contextmanager
+def _readers_may_leave() -> Iterator[None]:
+    """End with 0 where nobody reads the output any more; click would end with 1."""
+    try:
+        yield
+    except BrokenPipeError:
+        _discard_output()
+        raise click.exceptions.Exit(0) from None
 
 
 def _discard_output() -> None:

@@ -90,7 +90,7 @@ def doubt(key: str, value: Any, unit: str, default: Any) -> str:
         unit: its SI unit.
         default: what it is otherwise; 0.0 if that is no measure of it.
     """
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    if not isinstance(value, int | float):
         return ""
     size = abs(value)
     usual = abs(default) if isinstance(default, int | float) else 0.0

@@ -9,7 +9,7 @@ import pytest
 
 from skillframe.cli.main import cli, run
 from skillframe.cli.names import ROBOT
-from skillframe.extend.homes import HOMES
+from skillframe.extend.homes import HOMES, where_to_get
 from skillframe.extend.registry import registry
 from skillframe.world.placement import check_quantities
 from skillframe.world.quantities import QUANTITIES, VARIED
@@ -102,6 +102,12 @@ def test_a_name_of_a_plugin_that_is_not_installed_comes_with_the_line_that_insta
         assert line in capsys.readouterr().err
     assert run(["skills", "list"]) == 0
     assert "type: make install" in capsys.readouterr().out
+
+
+def test_a_plugin_that_is_installed_is_not_to_be_installed_again():
+    """It is left out by SKILLFRAME_PLUGINS, or does not load: other notes say so."""
+    assert "pip install -e plugins/lmc" in where_to_get("skill", "lmc", ["dmp"], ["baselines"])
+    assert where_to_get("skill", "lmc", ["dmp"], ["baselines", "lmc"]) == ""
 
 
 @pytest.mark.needs_plugins

@@ -1,6 +1,8 @@
 """Skills with one defect each, as an author could write them by mistake; every one holds or glides otherwise."""
 
+import contextlib
 import os
+import socket
 import subprocess
 import sys
 import time
@@ -9,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from skillframe.extend.records import SkillType
-from skillframe.frames import Pose
+from skillframe.frames import Pose, rotation_matrix
 from skillframe.skill import Impedance, Skill
 from skillframe.testing import HoldSkill
 
@@ -91,6 +93,33 @@ class RunsAProgram(Glide):
     def start(self, observation, rngs):
         super().start(observation, rngs)
         subprocess.run([sys.executable, "-c", ""], check=True)
+
+
+class Connects(Glide):
+    def start(self, observation, rngs):
+        super().start(observation, rngs)
+        with socket.socket() as line, contextlib.suppress(OSError):
+            line.connect(("127.0.0.1", 9))
+
+
+class Removes(Glide):
+    def start(self, observation, rngs):
+        super().start(observation, rngs)
+        Path("old.log").unlink(missing_ok=True)
+
+
+class Twists(Glide):
+    def step(self, observation):
+        push = np.zeros((len(observation.time), 6))
+        push[:, 5] = 80.0 * np.minimum(observation.time - self.began, 1.0)
+        return super().step(observation)._replace(feedforward=push)
+
+
+class Spins(Glide):
+    def step(self, observation):
+        command = super().step(observation)
+        turn = rotation_matrix((observation.time - self.began)[:, None] * [0.0, 0.0, 30.0])
+        return command._replace(pose=Pose(command.pose.position, turn @ command.pose.rotation))
 
 
 class RaisesLate(Glide):
@@ -285,6 +314,10 @@ PLANTED = {
     WritesFiles: "leaves nothing behind: opens the file 'ticks.log' for writing",
     RunsAProgram: "leaves nothing behind: runs the program",
     ChangesItsFolder: "leaves nothing behind: makes the folder 'cache'",
+    Connects: "leaves nothing behind: connects to ('127.0.0.1', 9)",
+    Removes: "leaves nothing behind: removes 'old.log'",
+    Twists: "runs for two seconds: the feed-forward is 50.1 Nm",
+    Spins: "runs for two seconds: the desired pose moves at",
     RaisesLate: "runs for two seconds: step raised IndexError in tick 600, at 0.600 s: list index out of range",
     NotFiniteLate: "runs for two seconds: the command is not finite in tick 899",
     WritesLate: "writes into its observation, which is not its own; copy what it changes",

@@ -16,10 +16,10 @@ STOP = {"lead_force_n": 20.0, "lead_torque_nm": 2.0, "time_limit_s": 20.0}
 WHAT = {"bool": bool, "double": float, "float64": float, "string": str, "uint8": int, "int32": int, "uint32": int}
 
 
-def phase(stiffness=1000.0):
+def phase(stiffness=1000.0, damped=0.1):
     def part(k, direction, speed):
         k = np.asarray(k, dtype=float)
-        damping = (0.1 * k).tolist()
+        damping = (damped * k).tolist()
         return {"stiffness": k.tolist(), "damping": damping, "speed": speed, "desired_direction": direction}
 
     body = {
@@ -98,3 +98,5 @@ def test_a_stiffness_that_crisp_would_refuse_to_load_is_refused_with_its_bound()
     assert written("crisp", stiffness=high)["task.k_pos_y"] == high > low
     with pytest.raises(InputError, match="5001, and crisp_controllers takes 5000 at most"):
         written("crisp", stiffness=high + 1.0)
+    with pytest.raises(InputError, match="6000, and crisp_controllers takes 5000 at most"):
+        written("crisp", damped=6.0)
