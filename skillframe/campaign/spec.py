@@ -22,7 +22,7 @@ from skillframe.config import build, read_toml
 from skillframe.errors import InputError
 
 DURATION_S = 20.0
-MOST_TRIALS = 10_000_000  # more are a slip of the keyboard, and would fill the memory before the first one runs
+MOST_TRIALS = 10_000_000  # more are a typing mistake, and would fill the memory before the first one runs
 """Simulated time after which a trial has failed; our choice, several times what an insertion takes."""
 
 

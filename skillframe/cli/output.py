@@ -26,7 +26,7 @@ QUIET = "skillframe.quiet"
 
 
 def quiet_option(function: F) -> F:
-    """`-q`: what is long says nothing of how far it is."""
+    """`-q`: no progress and no notes; see `is_quiet`."""
     option = click.option(
         "-q", "--quiet", is_flag=True, expose_value=False, callback=_silence,
         help="No progress and no notes on stderr; warnings and errors stay.",
