@@ -98,10 +98,11 @@ class BelievedLoad:
     def __init__(self, law: HydraulicLaw | CompiledLaw, draws: Draws, count: int) -> None:
         payload = law.chain.robot.spec.payload
         assert payload is not None  # else the force estimate has refused the robot
-        self._law, self._nominal, self._rating = law, payload.mass, payload.rating
+        self._law, self._rating = law, payload.rating
         self.told: Float = np.array(np.broadcast_to(draws.get(TOLD, payload.mass), count), dtype=float)
         self.mass: Float = self.told
-        self._tell()
+        if np.any(self.told != payload.mass):
+            self._tell()
 
     def weigh(self, seen: Measured, terms: Terms) -> bool:
         """Judge what was told at rest, before the swing; whether the law goes by something else now."""
@@ -115,8 +116,7 @@ class BelievedLoad:
         return changed
 
     def _tell(self) -> None:
-        if np.any(self.mass != self._nominal):
-            self._law.tell(inertias(self._law.chain, self.mass))
+        self._law.tell(inertias(self._law.chain, self.mass))
 
 
 def _starts_in_balance(spec: RobotSpec) -> bool:

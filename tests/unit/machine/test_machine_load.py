@@ -94,6 +94,18 @@ def test_the_controller_is_told_of_a_load_by_the_nominal_payload():
     assert np.ptp(own.plant.mass_matrix(), axis=0).max() == 0.0
 
 
+@pytest.mark.parametrize("others", [[], [100.0]], ids=["alone", "beside another"])
+def test_a_controller_told_too_little_goes_by_the_nominal_load_if_that_is_what_it_holds(others):
+    """As weighed, 475 kg is robot.toml's own, to the bit, because it is the rating too."""
+    loads = np.array([475.0, *others])
+    own = loop({"robot.payload": loads, "robot.nominal_payload": np.full(len(loads), 200.0)})
+    own._sample()
+    own._weigh()
+    np.testing.assert_allclose(own.load.mass, loads, atol=5.0)
+    expected = [carried(load) for load in own.load.mass]
+    np.testing.assert_allclose(own.law.told[:, CARRIER, 0], expected, rtol=1e-9)
+
+
 @pytest.mark.parametrize(("told", "words"), [(476.0, "rating of 475 kg"), (-1.0, "rating of 475 kg")])
 def test_a_controller_is_not_told_of_a_load_beyond_the_rating(told, words):
     with pytest.raises(InputError, match=words):
