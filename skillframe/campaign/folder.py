@@ -15,8 +15,8 @@ import dataclasses
 import json
 import os
 import re
+import secrets
 import shutil
-import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +28,7 @@ from skillframe.campaign.provenance import combined_hash, file_hashes
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.config import build, read_toml
 from skillframe.errors import InputError, UnknownName
-from skillframe.files import sync_folder, write_whole
+from skillframe.files import remove_temporary, sync_folder, write_whole
 from skillframe.paths import data_dirs
 
 CAMPAIGN, SCENE = "campaign.toml", "scene.json"
@@ -52,10 +52,9 @@ def prepare(spec: CampaignSpec, out: Path, describe: Describe, params: type) -> 
         InputError: the folder holds something, a robot or skill cannot be found, or `describe` refuses.
     """
     _refuse_full(out)
-    out.absolute().parent.mkdir(parents=True, exist_ok=True)
-    temporary = Path(tempfile.mkdtemp(dir=out.absolute().parent, prefix=f".{out.absolute().name}."))
+    temporary = out.absolute().with_name(f".{out.absolute().name}.{secrets.token_hex(8)}")
     try:
-        temporary.chmod(0o777 & ~_umask())
+        temporary.mkdir(parents=True)
         ready = replace(
             spec, folder=temporary, skills=_copy_skills(spec, temporary), robot=_copy_robot(spec, temporary),
             fixed=_all_fixed(spec, params),
@@ -77,17 +76,10 @@ def prepare(spec: CampaignSpec, out: Path, describe: Describe, params: type) -> 
     return CampaignSpec.from_toml(out / CAMPAIGN, params)
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
-
-
 def sweep(folder: Path) -> None:
     """Remove what killed sessions left half written; only under the folder's lock."""
     for place in (folder, folder / "traces"):
-        for path in place.glob(".*.tmp"):
-            path.unlink(missing_ok=True)
+        remove_temporary(place)
 
 
 def load(folder: Path, params: type | None = None) -> CampaignSpec:

@@ -8,6 +8,7 @@ rename and the folder after it, so that a power cut leaves the old content or th
 from __future__ import annotations
 
 import os
+import re
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -17,6 +18,8 @@ from skillframe.errors import InputError
 
 LONGEST = 40
 """Characters of the target's name within the temporary name, which file systems limit to 255 bytes."""
+RANDOM_BYTES = 8
+_TEMPORARY = re.compile(rf"\..+\.[0-9a-f]{{{2 * RANDOM_BYTES}}}")
 
 
 def write_whole(path: Path, content: bytes) -> None:
@@ -63,6 +66,13 @@ def sync_folder(folder: Path) -> None:
         _sync(folder)
 
 
+def remove_temporary(folder: Path) -> None:
+    """Remove the temporary files that killed processes left in a folder; only where nobody writes."""
+    for path in folder.glob(".*"):
+        if _TEMPORARY.fullmatch(path.name) and path.is_file():
+            path.unlink(missing_ok=True)
+
+
 def not_written(path: Path, error: OSError) -> InputError:
     """What the system said of a file that could not be written, as one sentence."""
     said = error.strerror or str(error) or type(error).__name__
@@ -90,7 +100,7 @@ def _refuse_other_kinds(path: Path) -> None:
 
 
 def _created_beside(path: Path) -> Path:
-    temporary = path.with_name(f".{path.name[:LONGEST]}.{secrets.token_hex(8)}")
+    temporary = path.with_name(f".{path.name[:LONGEST]}.{secrets.token_hex(RANDOM_BYTES)}")
     os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
     return temporary
 

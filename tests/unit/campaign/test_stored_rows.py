@@ -5,6 +5,7 @@ import json
 import campaign_fakes as fakes
 import pytest
 
+from skillframe import files
 from skillframe.campaign.status import status_of
 from skillframe.errors import InputError
 from skillframe.report.sources import read_folder
@@ -180,3 +181,15 @@ def test_a_link_under_a_temporary_name_is_not_written_through(out, tmp_path):
     fakes.run(out, traces=0)
     assert victim.read_bytes() == b"mine"
     assert not (out / "results.csv").is_symlink()
+
+
+def test_what_a_killed_session_left_half_written_is_removed_and_nothing_else(out):
+    with files.writing_whole(out / "traces" / "00000_a.npz") as half:
+        pass
+    half.touch()  # as a kill before the rename leaves it
+    others = [out / ".notes.txt", out / ".git", out / "traces" / "00000_a.npz"]
+    for path in others:
+        path.touch()
+    fakes.run(out, traces=0)
+    assert not half.exists()
+    assert all(path.exists() for path in others)
