@@ -175,9 +175,6 @@ class ClusterPool:
                 f"scheduler {address} cannot be used ({type(error).__name__}: {error}); check that it and its workers "
                 "run"
             ) from None
-        several = [worker for worker, threads in client.nthreads().items() if threads != 1]
-        if several:
-            raise SchedulerError(f"worker {several[0]} runs several threads; start it with --nthreads 1")
         return client
 
     def submit(self, job: ChunkJob) -> None:

@@ -1,8 +1,9 @@
 """The workers of a Dask scheduler as they come and go: who may work, who is refused, and why.
 
 Every worker of a scheduler that was there before says who it is (`identity`) before it gets work, also one that joins
-late or comes back after its death. Workers that this process started run its interpreter in its environment; they are
-not asked, which would cost them the second in which plug-ins load.
+late or comes back after its death. One of several threads is refused, because a process has only one watchdog. Workers
+that this process started run its interpreter in its environment; they are not asked, which would cost them the second
+in which plug-ins load.
 What is asked of Dask is asked in its own loop and waited for by looking, so that Ctrl-C interrupts nothing halfway.
 """
 
@@ -69,7 +70,7 @@ class Crew:
         """
         if self._looking is not None and self._looking.done():
             if self._looking.exception() is None:
-                self._meet(set(self._looking.result()))
+                self._meet(self._looking.result())
             self._looking, self._due = None, time.monotonic() + LOOK_S
         if self._looking is None and time.monotonic() >= self._due:
             self._looking = self._ask(self._client.scheduler.ncores())
@@ -80,7 +81,9 @@ class Crew:
     def _ask(self, coroutine: Any) -> Future[Any]:
         return asyncio.run_coroutine_threadsafe(coroutine, self._client.loop.asyncio_loop)
 
-    def _meet(self, present: set[str]) -> None:
+    def _meet(self, threads: Mapping[str, int]) -> None:
+        """Take note of who is there, each with its number of threads."""
+        present = set(threads)
         gone, new = self.present - present, present - self.present
         for address in gone:
             self.usable.pop(address, None)
@@ -93,6 +96,9 @@ class Crew:
         for address in new | (back & present):
             if self._own:
                 self.usable[address] = self._ours.environment
+                continue
+            if threads[address] != 1:
+                self.set_aside(address, f"it runs {threads[address]} threads; start it with --nthreads 1")
                 continue
             answer = self._client.run(identity, workers=[address], on_error="return", asynchronous=True)
             self._asked[address] = self._ask(answer)

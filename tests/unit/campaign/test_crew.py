@@ -68,7 +68,7 @@ class FakeClient:
     """Stands for Dask's: who is there, and what each says of itself."""
 
     def __init__(self, **identities):
-        self.identities = identities
+        self.identities, self.threads = identities, {}
 
 
 def crew_of(client, told):
@@ -80,7 +80,7 @@ def crew_of(client, told):
     def ask(request):
         kind, address = request
         future = Future()
-        future.set_result(dict.fromkeys(client.identities, 1) if kind == "ncores" else {
+        future.set_result({a: client.threads.get(a, 1) for a in client.identities} if kind == "ncores" else {
             address: client.identities[address]
         })  # fmt: skip
         return future
@@ -112,6 +112,16 @@ def test_a_worker_that_joins_late_is_compared_too_and_one_that_left_gets_no_work
     del client.identities["a"]
     look(crew)
     assert set(crew.usable) == {"d"}
+
+
+def test_a_worker_of_several_threads_gets_no_work_also_if_it_joins_late():
+    told, client = [], FakeClient(a=tuple(OURS))
+    crew = crew_of(client, told)
+    look(crew)
+    client.identities["b"], client.threads["b"] = tuple(OURS), 4
+    look(crew)
+    assert set(crew.usable) == {"a"}
+    assert told == ["worker b gets no work: it runs 4 threads; start it with --nthreads 1"]
 
 
 def test_where_no_worker_may_work_the_campaign_stops_and_says_why():
