@@ -173,11 +173,11 @@ class _Session:
             return InProcess(evaluate, self._tell_share)
         from skillframe.campaign.cluster import ClusterPool
 
+        ours = identity(plugins=self.options.scheduler is not None)
         return ClusterPool(
             evaluate, self.options.time_limit_s, workers=self.options.workers or 1, scheduler=self.options.scheduler,
             memory_bytes=self.options.memory_bytes, watch=self.spec.folder.resolve() / WATCH, tell=self._tell_share,
-            ours=(ours := identity(plugins=self.options.scheduler is not None)),
-            needed=needed_plugins(self.spec, ours), note=self._tell,
+            ours=ours, needed=needed_plugins(self.spec, ours), note=self._tell,
         )  # fmt: skip
 
     def _driver(self, pool: Pool, keep: Callable[[list[Row]], None], traces: bool = False) -> Driver:

@@ -160,14 +160,6 @@ def repair_tail(path: Path) -> None:
             file.truncate(whole)
 
 
-def read_rows(
-    folder: Path, campaign: str | None = None, spec: CampaignSpec | None = None
-) -> tuple[Done, list[dict[str, Any]]]:
-    """Stored rows by (trial, skill), and the sessions' notes; as `read_content`."""
-    found = read_content(folder, campaign, spec)
-    return found.done, list(found.sessions)
-
-
 def read_content(folder: Path, campaign: str | None = None, spec: CampaignSpec | None = None) -> Content:
     """What `rows.jsonl` holds; a torn last line is left out.
 
@@ -185,13 +177,16 @@ def read_content(folder: Path, campaign: str | None = None, spec: CampaignSpec |
     except FileNotFoundError:
         return Content()
     texts = content.split(b"\n")[:-1]
-    records = [_record(path, number, text) for number, text in enumerate(texts, start=1)]
+    signed = [_is_intact(text) for text in texts]
+    records = [
+        _record(path, number, text, intact)
+        for number, (text, intact) in enumerate(zip(texts, signed, strict=True), start=1)
+    ]
     if not records:
         return Content()
-    unchecked = sum(_checked(text) is None for text in texts)
+    unchecked = signed.count(None)
     if _check_header(path, records[0], campaign) >= ROWS_VERSION and unchecked:
-        number = 1 + next(i for i, text in enumerate(texts) if _checked(text) is None)
-        raise InputError(f"{path}: line {number}", "has lost its checksum", FIX)
+        raise InputError(f"{path}: line {1 + signed.index(None)}", "has lost its checksum", FIX)
     lines = tuple(
         _row(path, n, record, spec) for n, record in enumerate(records[1:], start=2) if "session" not in record
     )
@@ -210,13 +205,13 @@ def _line(record: Mapping[str, Any]) -> bytes:
     return b'%s, "crc32": "%08x"}\n' % (text, zlib.crc32(text))
 
 
-def _checked(line: bytes) -> bool | None:
+def _is_intact(line: bytes) -> bool | None:
     """Whether a line is as it was written; None if it carries no checksum."""
     found = re.search(rb', "crc32": "([0-9a-f]{8})"\}$', line)
     return None if found is None else zlib.crc32(line[: found.start()]) == int(found[1], 16)
 
 
-def _record(path: Path, number: int, line: bytes) -> Row:
+def _record(path: Path, number: int, line: bytes, intact: bool | None) -> Row:
     where, again = f"{path}: line {number}", "delete that line, its trial will run again"
     try:
         record = parse_json(line, where, again)
@@ -224,7 +219,7 @@ def _record(path: Path, number: int, line: bytes) -> Row:
         raise InputError(where, f"is damaged ({error.problem})", again) from None
     if not isinstance(record, dict):
         raise InputError(where, "is damaged", again)
-    if _checked(line) is False:
+    if intact is False:
         raise InputError(where, "was changed after it was written (its checksum does not fit)", FIX)
     record.pop("crc32", None)
     return record
@@ -275,11 +270,6 @@ def _check_header(path: Path, header: Row, campaign: str | None) -> int:
     return version
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a file whole or not at all."""
-    write_whole(path, text.encode())
-
-
 def ordered(spec: CampaignSpec, rows: Iterable[Row], stop_after: int | None = None) -> list[Row]:
     """Rows by trial, then by skill; without those after the trial at which the campaign stopped."""
     order = {label: i for i, label in enumerate(spec.labels)}
@@ -294,4 +284,4 @@ def write_results(folder: Path, spec: CampaignSpec, rows: Sequence[Row]) -> None
     names = columns(spec)
     writer.writerow(names)
     writer.writerows([cell(row.get(name, "")) for name in names] for row in rows)
-    write_text(folder / RESULTS, text.getvalue())
+    write_whole(folder / RESULTS, text.getvalue().encode())

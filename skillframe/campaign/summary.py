@@ -12,9 +12,10 @@ from typing import Any
 from skillframe.campaign.rows import Row
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.statistics import correction, holm
-from skillframe.campaign.store import FORMAT, VERSION, write_text
+from skillframe.campaign.store import FORMAT, VERSION
 from skillframe.campaign.validity import Basis, Validity, unbroken, validity_of
 from skillframe.errors import InputError
+from skillframe.files import write_whole
 from skillframe.files.documents import read_json
 
 SUMMARY = "summary.json"
@@ -130,7 +131,8 @@ def summarize(
 
 def write_summary(folder: Path, summary: Mapping[str, Any]) -> None:
     """Write summary.json, whole or not at all."""
-    write_text(folder / SUMMARY, json.dumps(summary, indent=2, sort_keys=True, ensure_ascii=False) + "\n")
+    text = json.dumps(summary, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+    write_whole(folder / SUMMARY, text.encode())
 
 
 def read_summary(folder: Path) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from skillframe.campaign.provenance import file_hash
-from skillframe.campaign.rows import Row, plain_value
+from skillframe.campaign.rows import MEASURES, Row, plain_value
 from skillframe.campaign.sampling import draws
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.errors import InputError
@@ -20,7 +20,7 @@ from skillframe.errors import InputError
 FIX = "put the file back as it was, or delete that line and resume: its trial runs again"
 KEYS: dict[str, type | tuple[type, ...]] = {"trial": int, "skill": str}
 KINDS = KEYS | {"seed": int, "success": bool, "failure": str}
-KINDS |= dict.fromkeys(("duration_s", "peak_force_n", "final_error_m", "final_error_rad"), (int, float))
+KINDS |= dict.fromkeys(MEASURES, (int, float))
 """What the rows of every version of campaigns have; columns that came later may be missing."""
 
 

@@ -142,14 +142,14 @@ def test_a_file_name_that_is_no_text_is_learned_from_and_written_escaped(tmp_pat
 
 def test_half_a_surrogate_pair_in_a_skill_s_words_is_stored_in_trace_and_rows(tmp_path: Path) -> None:
     from skillframe.campaign.rows import plain_value
-    from skillframe.campaign.store import RowLog, read_rows
+    from skillframe.campaign.store import RowLog, read_content
 
     assert plain_value(np.str_("gave up \ud800")) == "gave up \\ud800"
     row = {"trial": 0, "skill": "a", "seed": 1, "success": False, "failure": plain_value("gave up \ud800")}
     row |= {"duration_s": 1.0, "peak_force_n": 1.0, "final_error_m": 0.0, "final_error_rad": 0.0}
     with RowLog(tmp_path, "x") as log:
         log.append([row])
-    assert read_rows(tmp_path)[0] == {(0, "a"): row}
+    assert read_content(tmp_path).done == {(0, "a"): row}
     arrays = {name: np.ones((2, *shape)) for name, shape in COLUMNS.items()} | {"time": np.arange(2.0)}
     drawn = {"q": np.ones((2, 7)), "body_position": np.ones((2, 1, 3)), "body_quaternion": np.ones((2, 1, 4))}
     Trace(**arrays, **drawn, meta={"reason": "gave up \ud800"}).save(tmp_path / "t.npz")
@@ -231,7 +231,7 @@ def test_constant_columns_that_pack_to_almost_nothing_are_read(tmp_path: Path) -
 
 @pytest.mark.parametrize("key", ["trial", "skill"])
 def test_a_row_of_a_campaign_without_a_key_is_refused_by_line_and_key(tmp_path: Path, key: str) -> None:
-    from skillframe.campaign.store import read_rows
+    from skillframe.campaign.store import read_content
 
     row = {"trial": 0, "skill": "a", "seed": 1, "success": True, "failure": "", "duration_s": 1.0, "peak_force_n": 1.0}
     row |= {"final_error_m": "nan", "final_error_rad": 0.0}
@@ -241,4 +241,4 @@ def test_a_row_of_a_campaign_without_a_key_is_refused_by_line_and_key(tmp_path: 
     with pytest.raises(
         InputError, match=f"rows.jsonl: line 2: has no '{key}'; put the file back as it was, or delete that line"
     ):
-        read_rows(tmp_path)
+        read_content(tmp_path)
