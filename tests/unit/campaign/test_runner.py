@@ -1,6 +1,5 @@
 import json
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -9,47 +8,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 from campaign_fakes import (
-    TEXT,
     FakeParams,
     always_raises,
     edit_rows,
     good,
-    raises,
     run,
     start,
+    table,
     tells_quickly,
-    write_campaign,
 )
 
 from skillframe.campaign.driver import CampaignError, chunk_size
 from skillframe.campaign.replay import replay_trial
 from skillframe.campaign.status import status_of
-from skillframe.campaign.store import read_rows
+from skillframe.campaign.store import read_content
 from skillframe.campaign.summary import below_bar, read_summary
 from skillframe.errors import InputError, UnknownName
 
 FAKES = Path(__file__).with_name("campaign_fakes.py")
-
-
-def table(folder):
-    return (folder / "results.csv").read_bytes()
-
-
-@pytest.fixture
-def out(campaign, tmp_path):
-    return start(campaign(trials=48), tmp_path / "out")
-
-
-@pytest.fixture
-def reference(campaign, tmp_path):
-    """The table of an undisturbed run, by number of trials."""
-
-    def of(trials):
-        folder = start(campaign(trials=trials), tmp_path / "reference")
-        run(folder)
-        return table(folder)
-
-    return of
 
 
 @pytest.mark.parametrize("chunk", [1, 5, 7, 64])
@@ -87,7 +63,7 @@ def test_a_replay_that_differs_says_in_what_and_on_which_machine(out):
                 versions |= {"numpy": "0.1"} if "numpy" in versions else {}
         return records
 
-    then = read_rows(out)[0][0, "a.skill.json"]["success"]
+    then = read_content(out).done[0, "a.skill.json"]["success"]
     edit_rows(out, change)
     found = replay_trial(out, 0, good, None, FakeParams)
     assert found.changed["success"] == (not then, then)
@@ -100,15 +76,6 @@ def test_a_replay_of_what_is_not_there_is_refused(out):
         replay_trial(out, 48, good, None, FakeParams)
     with pytest.raises(UnknownName, match="unknown skill 'b'"):
         replay_trial(out, 0, good, "b", FakeParams)
-
-
-def test_a_trial_that_raises_is_named_and_the_rest_stands(out, reference):
-    run(out, raises)
-    mine, other = table(out).splitlines(), reference(48).splitlines()
-    changed = [line for line, undisturbed in zip(mine, other, strict=True) if line != undisturbed]
-    assert len(changed) == 1
-    assert changed[0].startswith(b"37,a.skill.json,7,")
-    assert changed[0].endswith(b",0,error: ValueError: the skill tripped,nan,nan,nan,nan,nan,nan,nan,lost,nan")
 
 
 def test_a_campaign_in_which_nothing_works_is_given_up_with_the_cause(out):
@@ -247,80 +214,6 @@ def test_twenty_kills_of_a_client_with_workers_end_in_the_identical_table(campai
     run(out)
     assert kills >= 10
     assert table(out) == reference(400)
-
-
-INTERRUPT = """
-import sys
-sys.path.insert(0, {tests!r})
-import campaign_fakes, skillframe.campaign.evaluate as real
-from skillframe.cli.main import main
-real.evaluate = campaign_fakes.slow
-if __name__ == "__main__":
-    main(sys.argv[1:])
-"""
-
-
-# Dask's side of fetching a result sends Ctrl-C to its own process and gives the main thread time to be interrupted
-AMID_A_GATHER = """
-import distributed, os, signal, time
-gather, gathers = distributed.Client._gather, []
-async def interrupted(*args, **options):
-    gathers.append(args)
-    if len(gathers) == 4:
-        os.kill(os.getpid(), signal.SIGINT)
-        time.sleep(0.1)
-    return await gather(*args, **options)
-distributed.Client._gather = interrupted
-"""
-
-
-def interruptible(tmp_path, options, prelude=""):
-    """A command line that runs a campaign in a process of its own, and that campaign's folder."""
-    text = TEXT.replace('"fake"\nskills', '"peg_in_hole"\nskills')
-    out = tmp_path / "out"
-    from skillframe.campaign.folder import prepare
-    from skillframe.campaign.spec import CampaignSpec
-    from skillframe.world.worlds.peg_in_hole import PegParams
-
-    prepare(CampaignSpec.from_toml(write_campaign(tmp_path, trials=400, text=text)), out, lambda spec: {}, PegParams)
-    script = tmp_path / "client.py"
-    script.write_text(prelude + INTERRUPT.format(tests=str(FAKES.parent)))
-    process = subprocess.Popen(
-        [sys.executable, str(script), "campaign", "resume", str(out), "--chunk", "8", *options],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
-    )  # fmt: skip
-    return process, out
-
-
-def check_interrupted(process, out):
-    return check_ended(process, out, 130)
-
-
-def check_ended(process, out, code):
-    """The exit code, one sentence, and every finished row kept: how many those are."""
-    _, errors = process.communicate(timeout=60)
-    assert process.returncode == code
-    assert f"skillframe campaign resume {out}" in errors
-    assert "Traceback" not in errors
-    stored = (out / "rows.jsonl").read_bytes().count(b'"trial"')
-    assert len(table(out).splitlines()) == stored + 1
-    assert not read_summary(out)["complete"]
-    return stored
-
-
-@pytest.mark.parametrize("options", [[], ["--workers", "2"]])
-def test_ctrl_c_keeps_what_is_finished_says_how_to_go_on_and_exits_130(tmp_path, options):
-    process, out = interruptible(tmp_path, options)
-    while not (out / "rows.jsonl").exists() or (out / "rows.jsonl").read_bytes().count(b'"trial"') < 20:
-        assert process.poll() is None
-        time.sleep(0.02)
-    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: the workers get it too
-    assert 20 <= check_interrupted(process, out) < 800
-
-
-def test_ctrl_c_while_a_result_is_fetched_from_dask_prints_no_traceback(tmp_path):
-    process, out = interruptible(tmp_path, ["--workers", "2"], prelude=AMID_A_GATHER)
-    assert check_interrupted(process, out) == 24  # three chunks of eight, the fourth was on its way
 
 
 def test_how_far_a_chunk_is_is_told_in_process(out):
