@@ -14,7 +14,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from enum import IntEnum
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from skillframe.frames import Float, Pose
 
 Reasons = NDArray[np.object_]
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 class Status(IntEnum):
@@ -178,7 +179,7 @@ def rows_of(observation: Observation, rows: slice | NDArray[np.intp]) -> Observa
 def stack_commands(commands: Sequence[Command]) -> Command:
     """One command out of commands of single trials."""
 
-    def each(pick: Callable[[Command], NDArray[np.generic]]) -> NDArray[np.generic]:
+    def each(pick: Callable[[Command], NDArray[Scalar]]) -> NDArray[Scalar]:
         return np.concatenate([pick(c) for c in commands])
 
     def matrices(pick: Callable[[Command], Float | None]) -> Float | None:
@@ -190,10 +191,10 @@ def stack_commands(commands: Sequence[Command]) -> Command:
     stiffness = matrices(lambda c: c.impedance.stiffness)
     assert stiffness is not None
     return Command(
-        Pose(each(lambda c: c.pose.position), each(lambda c: c.pose.rotation)),  # type: ignore[arg-type]
-        each(lambda c: c.twist),  # type: ignore[arg-type]
+        Pose(each(lambda c: c.pose.position), each(lambda c: c.pose.rotation)),
+        each(lambda c: c.twist),
         Impedance(stiffness, matrices(lambda c: c.impedance.damping)),
-        each(lambda c: c.feedforward),  # type: ignore[arg-type]
-        each(lambda c: c.status),  # type: ignore[arg-type]
-        each(lambda c: c.reason),  # type: ignore[arg-type]
+        each(lambda c: c.feedforward),
+        each(lambda c: c.status),
+        each(lambda c: c.reason),
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,7 +98,7 @@ def rows_of_command(command: Command, rows: Rows) -> Command:
     )  # fmt: skip
 
 
-def fields_of(command: Command) -> list[np.ndarray]:  # type: ignore[type-arg]
+def fields_of(command: Command) -> list[NDArray[Any]]:
     """What a command holds, in the order of `NAMES`."""
     whole = rows_of_command(command, slice(None))
     damping = np.zeros(0) if whole.impedance.damping is None else whole.impedance.damping

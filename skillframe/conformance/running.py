@@ -10,9 +10,10 @@ import contextlib
 import gc
 import time
 import tracemalloc
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skillframe.conformance.loop import LateError, run
 from skillframe.conformance.play import arms_of
@@ -45,7 +46,7 @@ def lead_of(skill: SkillType, document: Document, trials: int = TRIALS) -> tuple
 class Standing(Skill):
     """Asks for where the tool is: the measure of how long a step takes."""
 
-    def start(self, observation: Observation, rngs: object) -> None:
+    def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
         """Remember nothing."""
 
     def step(self, observation: Observation) -> Command:
@@ -86,8 +87,8 @@ class _Timed(Skill):
     def __init__(self, skill: Skill) -> None:
         self._skill, self.seconds = skill, 0.0
 
-    def start(self, observation: Observation, rngs: object) -> None:
-        self._skill.start(observation, rngs)  # type: ignore[arg-type]
+    def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
+        self._skill.start(observation, rngs)
 
     def step(self, observation: Observation) -> Command:
         began = time.perf_counter()
@@ -133,7 +134,7 @@ class _Bounds:
                 text = f"the feed-forward is {most:.3g} {unit} {when}; bound it, no more than {bound:g} {unit} is taken"
                 self.problems.setdefault(f"force {unit}", text)
 
-    def _speed(self, command: Command, running: np.ndarray, when: str) -> None:  # type: ignore[type-arg]
+    def _speed(self, command: Command, running: NDArray[np.bool_], when: str) -> None:
         pose = (command.pose.position.copy(), command.pose.rotation.copy())
         self._past = [*self._past[-WINDOW:], pose]
         span = (len(self._past) - 1) * DT
@@ -152,7 +153,7 @@ class _Bounds:
                 self.problems.setdefault(f"twist {unit}", text)
 
 
-def _finite(command: Command, running: np.ndarray) -> bool:  # type: ignore[type-arg]
+def _finite(command: Command, running: NDArray[np.bool_]) -> bool:
     return all(np.isfinite(values[running]).all() for values in (*command.pose, command.twist, command.feedforward))
 
 

@@ -21,10 +21,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skillframe.errors import InputError
 from skillframe.frames import Float, Pose, cross, norm, rotation_matrix, unit
-from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
+from skillframe.skill import Command, Impedance, Observation, Reasons, Skill, Status, no_reasons
 from skillframe.world.scene import Vector
 
 LEVER = 0.023  # m per rad: what a turn counts as in the length of a step
@@ -141,7 +142,7 @@ class BlindTeacher(Skill):
         status, reason = self._judge(observation, over=self._tick > self._place.shape[1])
         return Command(Pose(position, rotation), twist, self._impedance, feedforward, status, reason)
 
-    def _judge(self, observation: Observation, over: bool) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+    def _judge(self, observation: Observation, over: bool) -> tuple[NDArray[np.int64], Reasons]:
         """The lowest level of the first second of contact is the surface; from there a drop is felt."""
         depth = (observation.pose.position - self._home.position) @ self._push
         if self._tick * observation.dt <= REST_S:

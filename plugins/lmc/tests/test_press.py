@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -72,7 +73,7 @@ def off(part: Document, direction: Sequence[float]) -> float:
     return float(np.degrees(np.arccos(np.clip(unit(np.array(direction)) @ np.array(part["desired_direction"]), -1, 1))))
 
 
-CASES = {
+CASES: dict[str, dict[str, Any]] = {
     "down": {}, "sideways": {"direction": (1.0, 0.2, 0.0)}, "aslant": {"direction": (0.3, 0.0, -1.0)},
     "up": {"direction": (0.0, 0.1, 1.0)}, "15 N": {"force": 15.0}, "100 N": {"force": 100.0},
     "a shaky hand": {"aim": 12.0}, "a short way": {"length": 0.06}, "1 s": {"hold": 1.0},
@@ -85,7 +86,7 @@ CASES = {
 def test_a_press_is_a_push_and_no_limpness_along_it(case: str, count: int) -> None:
     true = CASES[case].get("direction", (0.0, 0.0, -1.0))
     for seed in range(4):
-        document = learn([press(10 * seed + i, **CASES[case]) for i in range(count)], LearnOptions())  # type: ignore[arg-type]
+        document = learn([press(10 * seed + i, **CASES[case]) for i in range(count)], LearnOptions())
         part = translation(document)
         assert part["desired_direction"] is not None, describe(document)
         # where the way alone decides, one wandering way is all there is; past 45 degrees it would slide, not press
@@ -95,9 +96,9 @@ def test_a_press_is_a_push_and_no_limpness_along_it(case: str, count: int) -> No
         assert max(along, default=0.0) < np.sin(np.radians(45.0))
 
 
-def undecided(count: int, **made: float) -> list[list[Demonstration]]:
+def undecided(count: int) -> list[list[Demonstration]]:
     """Groups of presses of which the way alone gives no direction: by the sensor's word in the air it is free."""
-    groups = [[press(100 * s + i, aim=14.0, residual=3.0, **made) for i in range(count)] for s in range(8)]  # type: ignore[arg-type]
+    groups = [[press(100 * s + i, aim=14.0, residual=3.0) for i in range(count)] for s in range(8)]
     said = [learn(group, LearnOptions()) for group in groups]
     return [g for g, d in zip(groups, said, strict=True) if "stood for" in translation(d)["evidence"]["message"]]
 

@@ -109,15 +109,14 @@ def _frame(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Do
 
 
 def _path(kind: str, settings: Settings, found: Exploration, across: Float) -> Path:
-    chosen: Kind = "ergodic" if settings.algorithm == "ergodic" else "tour"
-    if kind == "spiral" or kind == "random_walk":
-        chosen = kind  # type: ignore[assignment]
+    learned: Kind = "ergodic" if settings.algorithm == "ergodic" else "tour"
+    baselines: dict[str, Kind] = {"spiral": "spiral", "random_walk": "random_walk"}
     moving = across[across > MOVING]
     speed = settings.speed
     if speed is None:
         speed = float(np.clip(np.median(moving) if len(moving) else SLOWEST, SLOWEST, FASTEST))
     return Path(
-        kind=chosen, speed=speed, acceleration=settings.acceleration, pitch=settings.pitch,
+        kind=baselines.get(kind, learned), speed=speed, acceleration=settings.acceleration, pitch=settings.pitch,
         layers=_layers(settings.layers, found), step=settings.step, reach=settings.reach,
     )  # fmt: skip
 
