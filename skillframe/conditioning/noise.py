@@ -9,7 +9,7 @@ forces' and the torques' each on its own. Both are our choice.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,13 +55,12 @@ def noise_figures(time: Float, wrench: Float, alive: NDArray[np.bool_] | None = 
             "wrench", f"{len(time)} samples are too few for noise figures", f"give at least {LEAST_SAMPLES}"
         )
     width, live = _windows(time, alive)
-    count = len(time) // width
     if not len(live):
         raise InputError(
             "wrench", f"repeats one value in every {WINDOW:g} s, so that nothing shows its noise",
             "check the sensor's connection, and record again",
         )  # fmt: skip
-    scatter = detrended_std(np.asarray(wrench, dtype=float)[: count * width].reshape(count, width, 6)[live])
+    scatter = detrended_std(_cut(np.asarray(wrench, dtype=float), width)[live])
     rank = (scatter / np.maximum(np.median(scatter, axis=0), FLOOR)).sum(axis=1)
     quietest = np.argsort(rank, kind="stable")[: max(1, len(live) // 4)]
     return NoiseFigures(
@@ -72,10 +71,14 @@ def noise_figures(time: Float, wrench: Float, alive: NDArray[np.bool_] | None = 
 def _windows(time: Float, alive: NDArray[np.bool_] | None) -> tuple[int, NDArray[np.intp]]:
     """Samples in a window, and the windows that hold no stall."""
     width = int(np.clip(round(WINDOW / float(np.median(np.diff(time)))), LEAST_SAMPLES, len(time)))
-    count = len(time) // width
-    return width, np.arange(count) if alive is None else np.flatnonzero(
-        alive[: count * width].reshape(count, width).all(axis=1)
-    )
+    live = np.ones(len(time), dtype=bool) if alive is None else alive
+    return width, np.flatnonzero(_cut(live, width).all(axis=1))
+
+
+def _cut(samples: NDArray[Any], width: int) -> NDArray[Any]:
+    """Samples (T, ...) as windows (K, width, ...); what fills no window is left out."""
+    count = len(samples) // width
+    return samples[: count * width].reshape(count, width, *samples.shape[1:])
 
 
 def has_window(time: Float, alive: NDArray[np.bool_]) -> bool:

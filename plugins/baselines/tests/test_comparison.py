@@ -24,19 +24,8 @@ def outcomes(tmp_path_factory):
     for world in WORLDS:
         for seed in TEACHINGS:
             folder = tmp_path_factory.mktemp(f"{world}{seed}")
-            demonstrations = [
-                "--world",
-                world,
-                "--robot",
-                "free_tool",
-                "--count",
-                "2",
-                "--seed",
-                str(seed),
-                "--out",
-                f"{folder}/{world}.npz",
-            ]
-            assert run(["demonstration", "record", *demonstrations]) == 0
+            made = f"--world {world} --robot free_tool --count 2 --seed {seed}".split()
+            assert run(["demonstration", "record", *made, "--out", f"{folder}/{world}.npz"]) == 0
             text = (CAMPAIGNS / f"{world}.toml").read_text().replace("seed = 2026", f"seed = {2026 + seed}")
             kept = [line for line in text.splitlines() if not line.startswith('"fixture.')]
             still = "\n".join(kept).replace("trials = 20", f"trials = {IN_PLACE}")

@@ -19,7 +19,6 @@ import numpy as np
 
 from skillframe.config import build
 from skillframe.demonstration.record import Demonstration
-from skillframe.demonstration.together import common_frames
 from skillframe.errors import InputError
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, Pose, norm, rotation_matrix, rotation_vector
@@ -163,7 +162,6 @@ def refuse(name: str, demonstrations: Sequence[Demonstration], options: LearnOpt
     """Refuse what none of these methods can learn from."""
     if not demonstrations:
         raise InputError(name, "learns from demonstrations, got none", "give at least one file")
-    common_frames(demonstrations)
     if options.axes != "base":
         raise InputError(f"{name}: axes", f"is learned in base axes, not {options.axes!r}", "leave --axes away")
 

@@ -52,18 +52,17 @@ class Press(NamedTuple):
     @property
     def sectors(self) -> Sectors:
         """The sectors of the motion in contact, and those of the standing force, which have no width."""
-        moved = sectors(self.motion)
-        none = np.zeros(len(self.votes))
+        moved, count = sectors(self.motion), len(self.votes)
         return Sectors(
-            np.concatenate([moved.motion, self.votes]), np.concatenate([moved.push, 0.0 * self.votes]),
-            np.concatenate([moved.contact, none > 0.0]),
+            np.concatenate([moved.motion, self.votes]), np.concatenate([moved.push, np.zeros((count, 3))]),
+            np.concatenate([moved.contact, np.zeros(count, dtype=bool)]),
         )  # fmt: skip
 
 
 def presses(tracks: Sequence[Track], motions: Sequence[Motion]) -> list[Press] | None:
     """The standing force of every demonstration, or None if one was not pressed."""
-    found = [press(track, motion) for track, motion in zip(tracks, motions, strict=True)]
-    return [p for p in found if p is not None] if found and all(p is not None for p in found) else None
+    found = [p for track, motion in zip(tracks, motions, strict=True) if (p := press(track, motion)) is not None]
+    return found if found and len(found) == len(tracks) else None
 
 
 def press(track: Track, motion: Motion) -> Press | None:
