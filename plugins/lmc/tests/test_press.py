@@ -9,8 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from skillframe_lmc import intervals
 from skillframe_lmc.describe import describe
+from skillframe_lmc.intervals import track
 from skillframe_lmc.learner import learn
+from skillframe_lmc.press import presses
+from skillframe_lmc.settings import Settings
 from synthetic import valley
 
 from skillframe.cli.main import run
@@ -120,6 +124,32 @@ def test_a_standing_force_that_no_one_push_explains_is_refused_and_not_learned_a
     group = [press(s, aim=20.0, residual=3.0, turn=70.0, length=0.1) for s in range(3)]
     with pytest.raises(InputError, match=r"was pressed with \d+ N where it stood.* no one push explains it"):
         learn(group, LearnOptions())
+
+
+def halted(share: float, pushed: Sequence[float]) -> Demonstration:
+    """Straight down by 0.24 m, with a halt of 2 s after that share of it, in which it is pushed so [N]."""
+    way = np.linspace(0.0, 0.24, int(3.0 * RATE))
+    at = round(share * (len(way) - 1))
+    depth = np.concatenate([way[:at], np.full(int(2.0 * RATE), way[at]), way[at:]])
+    stands = np.concatenate([np.zeros(at), np.ones(int(2.0 * RATE)), np.zeros(len(way) - at)])
+    position = np.array([0.4, 0.1, 0.5]) - depth[:, None] * [0.0, 0.0, 1.0]
+    force = -stands[:, None] * np.array(pushed) + [0.5, 0.0, 0.0]
+    wrench = np.concatenate([force, np.zeros_like(force)], axis=1)
+    quaternion = np.tile([1.0, 0.0, 0.0, 0.0], (len(depth), 1))
+    return Demonstration(time=np.arange(len(depth)) / RATE, position=position, quaternion=quaternion, wrench=wrench)
+
+
+@pytest.mark.parametrize(
+    ("share", "pushed", "found"),
+    [(0.8, (0.0, 0.0, -40.0), True), (0.3, (0.0, 0.0, -40.0), False), (0.8, (40.0, 0.0, 0.0), False)],
+    ids=["at its end", "early on its way", "across its way"],
+)
+def test_only_a_push_along_the_way_and_at_its_far_end_is_a_press(
+    share: float, pushed: Sequence[float], found: bool
+) -> None:
+    here = np.zeros(3)
+    blocks = track(halted(share, pushed), here, here, "base")
+    assert (presses([blocks], [intervals.translation(blocks, Settings())]) is not None) == found
 
 
 def test_a_valley_does_not_ask_the_standing_force() -> None:

@@ -124,6 +124,18 @@ def test_a_worker_of_several_threads_gets_no_work_also_if_it_joins_late():
     assert told == ["worker b gets no work: it runs 4 threads; start it with --nthreads 1"]
 
 
+def test_a_worker_that_died_works_again_once_it_is_there_a_little_later(monkeypatch):
+    crew = crew_of(FakeClient(a=tuple(OURS), b=tuple(OURS)), [])
+    look(crew)
+    crew.lost("a")
+    look(crew)
+    assert set(crew.usable) == {"b"}
+    monkeypatch.setattr("skillframe.campaign.crew.BACK_S", 0.0)
+    crew.lost("a")
+    look(crew)
+    assert set(crew.usable) == {"a", "b"}
+
+
 def test_where_no_worker_may_work_the_campaign_stops_and_says_why():
     crew = crew_of(FakeClient(a=tuple(OURS._replace(architecture="aarch64"))), [])
     with pytest.raises(SchedulerError, match=r"no worker may work, of 1; a: a aarch64 processor there"):

@@ -7,6 +7,7 @@ from campaign_fakes import table
 from skillframe.campaign.driver import CampaignError
 from skillframe.campaign.replay import replay_trial
 from skillframe.errors import InputError, MissingDependency, SkillframeError, UnknownName
+from skillframe.fmu.library import find_fmu
 
 
 def test_a_file_that_vanishes_stops_the_campaign_and_resume_ends_in_the_identical_table(out, reference):
@@ -50,6 +51,16 @@ def test_trouble_of_the_environment_has_no_row(out, error):
         fakes.run(out, raising(error), chunk=8)
     assert b"\n37,a.skill.json" not in table(out)
     assert b"error:" not in table(out)
+
+
+def test_an_fmu_that_vanishes_has_no_row(out):
+    def evaluate(job):
+        if fakes._guilty(job):
+            find_fmu(out / "gone.fmu")
+        return fakes.good(job)
+
+    with pytest.raises(CampaignError, match=r"gone\.fmu: no such file.* no row was written"):
+        fakes.run(out, evaluate, chunk=8)
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,7 @@ def pressed(force: float, lever: float, start: float = 12.0, stop: float = 18.0,
 
 
 @pytest.mark.parametrize("mass", [0.05, 0.93, 5.0, 30.0])
-@pytest.mark.parametrize("vibration", [0.02, 0.6])
+@pytest.mark.parametrize("vibration", [0.02, 0.6, 2.0])
 def test_a_real_tool_is_identified_whatever_it_weighs_and_the_robot_vibrates(mass: float, vibration: float) -> None:
     found = remove_bias(swing(mass=mass, vibration=vibration)).payload
     # 6000 force samples over a gravity that moves by 1 g: the standard error is vibration / 9.81 / sqrt(6000) times 3

@@ -87,6 +87,18 @@ def test_damage_in_a_chunk_is_named_with_its_place_and_exit_2(
     assert "is damaged: its chunk at byte" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("part", "words"), [("summary", "its index does not fit"), ("data", "its data do not fit")])
+def test_damage_that_only_the_checksum_of_the_index_or_of_the_data_shows_is_refused(
+    tmp_path: Path, plain: bytes, part: str, words: str
+) -> None:
+    raw = bytearray(with_checksums(plain, chunks=False, data=part == "data", summary=part == "summary"))
+    start = struct.unpack_from("<Q", raw, len(raw) - 8 - 20)[0]
+    raw[start + 12 if part == "summary" else start // 2] ^= 1
+    (tmp_path / "demo.mcap").write_bytes(raw)
+    with pytest.raises(InputError, match=words):
+        read_demonstration(tmp_path / "demo.mcap")
+
+
 def test_a_recording_without_checksums_says_so_and_one_with_them_does_not(tmp_path: Path, plain: bytes) -> None:
     path = tmp_path / "demo.mcap"
     path.write_bytes(plain)

@@ -142,6 +142,10 @@ def test_a_single_channel_that_stalls_is_named(channel: int) -> None:
     ]
 
 
+def test_a_single_channel_that_repeats_for_less_than_a_second_is_no_stall() -> None:
+    assert audit(stalled(recording(), 9.0, 9.8, slice(0, 1))).stalls == []
+
+
 def test_a_pose_that_stands_still_and_jumps_has_stalled_and_one_that_waits_has_not() -> None:
     assert audit(frozen(recording(), 2.0, 3.0)).stalls == [{"what": "pose", "start": 2.0, "stop": 3.0}]
     waiting = recording()
