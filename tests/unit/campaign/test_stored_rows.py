@@ -6,6 +6,7 @@ import campaign_fakes as fakes
 import pytest
 
 from skillframe import files
+from skillframe.campaign.replay import replay_trial
 from skillframe.campaign.status import status_of
 from skillframe.errors import InputError
 from skillframe.report.sources import read_folder
@@ -160,6 +161,10 @@ def test_where_rows_ran_is_kept_with_each_row_and_counted_in_the_summary(out):
     (text,) = status_of(out, fakes.FakeParams)["remarks"]
     assert text.startswith("rows ran on 2 kinds of machine (")
     assert "another one on Linux" in text
+    label = "a.skill.json"
+    own, others = (replay_trial(out, trial, fakes.good, label, fakes.FakeParams).environment for trial in (0, 1))
+    assert any("another one" in line for line in own)
+    assert others == []
 
 
 @pytest.mark.parametrize("name", ["lock", "watch"])

@@ -1,11 +1,17 @@
 """Trouble of the environment never becomes a row; what a skill does wrong does."""
 
+import shutil
+
 import campaign_fakes as fakes
 import pytest
 from campaign_fakes import table
 
+from skillframe.campaign import evaluate
 from skillframe.campaign.driver import CampaignError
+from skillframe.campaign.folder import load
 from skillframe.campaign.replay import replay_trial
+from skillframe.campaign.rows import ChunkJob
+from skillframe.campaign.trouble import attempt
 from skillframe.errors import InputError, MissingDependency, SkillframeError, UnknownName
 from skillframe.fmu.library import find_fmu
 
@@ -53,6 +59,17 @@ def test_trouble_of_the_environment_has_no_row(out, error):
     assert b"error:" not in table(out)
 
 
+def test_a_robot_a_skill_or_a_world_that_cannot_be_loaded_has_no_row(out, monkeypatch):
+    """The fakes' robot is an empty URDF, their skill file holds no skill, and no such world is registered."""
+    job = ChunkJob(spec=load(out, fakes.FakeParams).plain(), folder=str(out), skill=0, trials=(0,))
+    for name, what in (("load_robot_model", "robot"), ("load_skill", "skill a.skill.json"), ("", "world fake")):
+        answer = attempt(evaluate.evaluate, job)
+        assert answer.trouble
+        assert answer.text.startswith(f"the {what} cannot be loaded: ")
+        if name:
+            monkeypatch.setattr(evaluate, name, lambda *arguments: (None, None))
+
+
 def test_an_fmu_that_vanishes_has_no_row(out):
     def evaluate(job):
         if fakes._guilty(job):
@@ -90,16 +107,21 @@ def always_leaves(job):
     raise SystemExit(7)
 
 
-def test_a_folder_that_is_moved_while_it_runs_stops_it_and_is_gone_on_with_where_it_is_now(out, reference, tmp_path):
+@pytest.mark.parametrize("replaced", [False, True])
+def test_a_folder_that_is_moved_while_it_runs_stops_it_and_is_gone_on_with_where_it_is_now(
+    out, reference, tmp_path, replaced
+):
     moved = tmp_path / "moved"
 
     def move(progress):
         if progress.done == 16:
             out.rename(moved)
+            if replaced:
+                shutil.copytree(moved, out)
 
     with pytest.raises(CampaignError, match="moved or deleted while it ran"):
         fakes.run(out, notify=move, chunk=8, traces=0)
-    assert not out.exists()
+    assert out.exists() == replaced
     fakes.run(moved, traces=0)
     assert table(moved) == reference(48)
 
