@@ -10,7 +10,7 @@ read. What it hands back is looked at before it is used:
 
 Rotations are looked at in every tick unless the very same array comes again; an impedance is built once per phase and
 shared, so it is looked at when another array comes. What a skill changes in place in an array it hands back again is
-found within `SLOW_TICKS`.
+found within `SLOW_TICKS`, and a rotation that mirrors within `RARE_TICKS`.
 """
 
 from __future__ import annotations
@@ -53,12 +53,8 @@ def unknown_end(status: int, reason: object) -> str:
 
 def shown(observation: Observation) -> Observation:
     """Copies that a skill can keep and cannot write to; nothing leads from them to what the loop goes by."""
-    time, position, rotation = (
-        observation.time.copy(),
-        observation.pose.position.copy(),
-        observation.pose.rotation.copy(),
-    )
-    twist, wrench = observation.twist.copy(), observation.wrench.copy()
+    time, twist, wrench = observation.time.copy(), observation.twist.copy(), observation.wrench.copy()
+    position, rotation = observation.pose.position.copy(), observation.pose.rotation.copy()
     time.flags.writeable = position.flags.writeable = rotation.flags.writeable = False
     twist.flags.writeable = wrench.flags.writeable = False
     return Observation(time, observation.dt, Pose(position, rotation), twist, wrench)

@@ -17,16 +17,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from skillframe.campaign.rows import JUDGED, OUTCOME
 from skillframe.campaign.statistics import Interval, correction, holm
 from skillframe.campaign.validity import Basis, Plan, Validity, unbroken, validity_of
 from skillframe.errors import InputError
 from skillframe.report.markup import percent
 
 REQUIRED = ("trial", "skill", "success")
-JUDGED = ("stream", "peak_force_filtered_n", "peak_torque_share", "peak_speed_share", "ended_by", "peak_force_10ms_n")
-FIXED = (
-    *REQUIRED, "seed", "failure", "reason", "duration_s", "peak_force_n", "final_error_m", "final_error_rad", *JUDGED,
-)  # fmt: skip
+FIXED = (*REQUIRED, "seed", "reason", "stream", *OUTCOME, *JUDGED)
 TRUTH = {"1": True, "true": True, "1.0": True, "0": False, "false": False, "0.0": False}
 
 

@@ -390,6 +390,6 @@ class Loop:
         }  # fmt: skip
 
 
-def _known(share: float) -> float | None:
-    """A figure that there is."""
-    return None if np.isnan(share) else float(share)
+def _known(figure: float) -> float | None:
+    """A figure for a file; None where there is none."""
+    return None if np.isnan(figure) else float(figure)
