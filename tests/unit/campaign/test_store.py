@@ -55,12 +55,16 @@ def test_rows_of_version_0_1_make_a_table_whose_later_cells_are_empty(out):
     assert not read_results(out / "results.csv").notes
 
 
-def test_a_torn_last_line_cut_at_every_byte_is_taken_off_and_no_more(campaign, tmp_path):
-    out = start(campaign(trials=1), tmp_path / "out")  # its two rows, and a line of every other kind
-    run(out, chunk=1, traces=0)
+def test_a_torn_line_cut_at_every_byte_is_taken_off_and_no_more(out):
+    run(out, chunk=3, traces=0)
     path = out / "rows.jsonl"
     content = path.read_bytes()
-    for cut in range(len(content) + 1):
+    lines = content.splitlines(keepends=True)
+    row = max(i for i, line in enumerate(lines) if b'"trial"' in line)
+    ends = [sum(map(len, lines[:i])) for i in range(len(lines) + 1)]
+    # at every byte of a row, and of every other line around its end
+    cuts = {*range(ends[row], ends[row + 1]), *(end + off for end in ends for off in (-2, -1, 0, 1))}
+    for cut in sorted(cuts & {*range(len(content) + 1)}):
         path.write_bytes(content[:cut])
         done = read_content(out).done
         repair_tail(path)
