@@ -12,8 +12,8 @@ contact with a person over a lasting one. That table is about people and contact
 and parts to it is our choice. An impact that stays below both is no failure: it is marked, by `over` ("peak 105 N for
 under 10 ms").
 
-The mean is that of the force's size, never less than the size of the mean. It is looked at every 10 ms and at the end
-of a trial, over all windows since the last look.
+The mean is that of the force's size, never less than the size of the mean. It is looked at every ten control ticks and
+at the end of a trial, over all windows since the last look.
 """
 
 from __future__ import annotations
@@ -31,29 +31,35 @@ MEAN_S, TRANSIENT = 0.01, 2.0
 class _Window:
     """One quantity of N trials: its largest value, and its largest mean over `width` ticks.
 
-    The ring holds its running sum, so that a mean is the difference of two rows.
+    A tick costs an entry in a list; the rest is done at each look, for all ticks since the last. What is kept is the
+    running sum, so that a mean is the difference of two rows and does not depend on when it is looked at.
     """
 
-    def __init__(self, count: int, width: int, every: int) -> None:
-        self._width, self._ring, self._sum = width, np.zeros((width + every, count)), np.zeros(count)
-        self._ages = np.arange(every)
-        self._tick, self._seen = 0, np.zeros(count)
-        self.peak, self.mean = np.zeros(count), np.zeros(count)
+    def __init__(self, count: int, width: int) -> None:
+        self._width, self._sums = width, np.zeros((width, count))  # at each of the last ticks
+        self._new: list[Float] = []
+        self._peak, self.mean = np.zeros(count), np.zeros(count)
 
     def step(self, size: Float) -> None:
-        self._sum += size
-        self._tick += 1
-        self._ring[self._tick % len(self._ring)] = self._sum
-        np.maximum(self.peak, size, out=self.peak)
+        self._new.append(size)
+
+    @property
+    def peak(self) -> Float:
+        largest: Float = np.max([self._peak, *self._new], axis=0)
+        return largest
 
     def look(self, rows: NDArray[np.int64]) -> None:
         """Bring the largest mean of some trials up to date with the windows that ended since the last look."""
-        if not np.count_nonzero(self._sum[rows] != self._seen[rows]):
-            return  # nothing has touched since
-        self._seen[rows] = self._sum[rows]
-        last = (self._tick - self._ages) % len(self._ring)
-        gained = self._ring.take(last, axis=0) - self._ring.take(last - self._width, axis=0, mode="wrap")
+        if not self._new:
+            return
+        new = np.array(self._new)
+        np.maximum(self._peak, new.max(axis=0), out=self._peak)
+        sums = np.concatenate([self._sums, new])
+        sums[self._width - 1 :] = np.add.accumulate(sums[self._width - 1 :], axis=0)
+        gained = sums[self._width :] - sums[: -self._width]
         self.mean[rows] = np.maximum(self.mean, gained.max(axis=0) / self._width)[rows]
+        self._sums = sums[-self._width :]
+        self._new.clear()
 
 
 class TrueContact:
@@ -63,15 +69,15 @@ class TrueContact:
         limits: of the robot.
         count: N.
         dt: [s] between two ticks.
-        every: ticks between two looks.
     """
 
-    def __init__(self, limits: Limits, count: int, dt: float, every: int) -> None:
+    def __init__(self, limits: Limits, count: int, dt: float) -> None:
         width = max(1, round(MEAN_S / dt))
         self._limits = limits
-        self._force = _Window(count, width, every)
-        self._torque = None if limits.torque_n_m is None else _Window(count, width, every)
+        self._force = _Window(count, width)
+        self._torque = None if limits.torque_n_m is None else _Window(count, width)
         self._squares = np.zeros(count)  # of the largest estimate
+        self._read: list[Float] = []
 
     @property
     def peak(self) -> Float:
@@ -86,8 +92,18 @@ class TrueContact:
     @property
     def estimate(self) -> Float:
         """(N,) largest filtered force so far [N]."""
+        self._take_in()
         largest: Float = np.sqrt(self._squares)
         return largest
+
+    def _take_in(self) -> None:
+        """Bring the largest estimate up to date."""
+        if not self._read:
+            return
+        read = np.array(self._read)[..., :3]
+        of_arms = np.vecdot(read, read).max(axis=0).reshape(len(self._squares), -1)
+        np.maximum(self._squares, of_arms.max(axis=-1), out=self._squares)
+        self._read.clear()
 
     @property
     def wants_torque(self) -> bool:
@@ -95,7 +111,7 @@ class TrueContact:
         return self._torque is not None
 
     def step(self, force: Float, estimate: Float, torque: Float | None) -> None:
-        """Take in a tick.
+        """Take in a tick; the arrays are kept until the next look and must not change.
 
         Args:
             force: (N,) size of the true contact force.
@@ -103,15 +119,13 @@ class TrueContact:
             torque: (N,) size of the true contact torque, where it is limited.
         """
         self._force.step(force)
-        size = np.vecdot(estimate[:, :3], estimate[:, :3])
-        if len(size) != len(force):
-            size = size.reshape(len(force), -1).max(axis=-1)
-        np.maximum(self._squares, size, out=self._squares)
+        self._read.append(estimate)
         if self._torque is not None and torque is not None:
             self._torque.step(torque)
 
     def look(self, rows: NDArray[np.int64]) -> list[Broken]:
         """The trials among `rows` that pushed harder than they may."""
+        self._take_in()
         self._force.look(rows)
         broken = self._broken(rows, self._force, self._limits.force_n, Ended.TRUE_FORCE, "force", "N")
         if self._torque is not None:

@@ -143,7 +143,7 @@ class Loop:
         self.controller = ImpedanceController(self.rows)
         self.motors = self._motors()
         self.guard = LimitGuard(_joint_limits(robot), self.rows, self.dt, self.motors)
-        self.contact = TrueContact(robot.spec.limits, count, self.dt, SLOW_TICKS)
+        self.contact = TrueContact(robot.spec.limits, count, self.dt)
         self.faults: list[Fault] = []
         self.active = np.arange(count)
         self.reason, self.status = no_reasons(count), np.zeros(count, dtype=np.int64)

@@ -14,7 +14,7 @@ DT, EVERY = 1e-3, 10
 
 
 def contact(count=1, force_n=80.0, torque_n_m=None):
-    return TrueContact(Limits(force_n=force_n, torque_n_m=torque_n_m), count, DT, EVERY)
+    return TrueContact(Limits(force_n=force_n, torque_n_m=torque_n_m), count, DT)
 
 
 def looked_at(forces, estimate=71.2, **options):
