@@ -49,14 +49,12 @@ class JointLimits(NamedTuple):
 
     @property
     def silent(self) -> tuple[str, ...]:
-        """Joints that have a range or a speed, and whose effort or velocity the URDF does not give."""
+        """Joints whose effort or velocity the URDF does not give."""
         unknown = np.isinf(self.effort) | np.isinf(self.velocity)
         return tuple(name for name, missing in zip(self.names, unknown, strict=True) if name and missing)
 
 
-def joint_limits(
-    robot: RobotModel, engine: Any, arms: Sequence[NDArray[np.int64]] | None = None
-) -> list[JointLimits]:  # fmt: skip
+def joint_limits(robot: RobotModel, engine: Any, arms: Sequence[NDArray[np.int64]] | None = None) -> list[JointLimits]:
     """What the URDF says of a robot's joints, for each arm, or for the whole robot; empty if it has no joints.
 
     Of a joint that no tool frame is carried by, as a gripper's that is closed, the range is not watched.
@@ -115,7 +113,7 @@ class Motors:
         self._now = np.zeros((count, 4 * nv))
         self._change, self._asked, self._speed, self._place = (self._now[:, k * nv : (k + 1) * nv] for k in range(4))
         self._torque: Float | None = None
-        self._ticks = np.zeros((count, 4 * nv), dtype=np.int64)
+        self._ticks = np.zeros((count, 3 * nv), dtype=np.int64)  # of torque, speed, range
         self._rate_ticks = np.zeros(count, dtype=np.int64)
         self._peak = np.zeros((count, 4 * nv))
         self._persistence = max(1, round(MOTOR_S / dt))
@@ -151,9 +149,8 @@ class Motors:
         torque = np.minimum(np.maximum(torque, -self._effort), self._effort)
         change = torque - last
         fast = np.abs(change) > self._most[:, :nv]
-        over[:, :nv] = fast
         self._ticks += 1
-        self._ticks *= over
+        self._ticks *= over[:, nv:]
         self._rate_ticks = (self._rate_ticks + 1) * fast.any(-1)
         self.counting = True
         if self._rate is None:
@@ -162,11 +159,8 @@ class Motors:
 
     def fine(self) -> NDArray[np.bool_]:
         """(N,) no row beyond for too long."""
-        nv = self._effort.shape[1]
-        lasting: NDArray[np.bool_] = (self._rate_ticks < RATE_PERSISTENCE) & (
-            self._ticks[:, nv:] < self._persistence
-        ).all(-1)
-        return lasting
+        short: NDArray[np.bool_] = (self._ticks < self._persistence).all(-1)
+        return short & (self._rate_ticks < RATE_PERSISTENCE)
 
     def broken(self, i: int) -> Broken | None:
         """Why row i is not fine."""
@@ -174,8 +168,8 @@ class Motors:
             text = f"torque rate limit: above {self._rate:g} Nm/s for {RATE_PERSISTENCE} ticks"
             return Broken(i, Ended.TORQUE_RATE, text)
         nv = self._effort.shape[1]
-        late = np.flatnonzero(self._ticks[i, nv:] >= self._persistence)
-        return None if not len(late) else self._lasting(i, int(late[0]) // nv, int(late[0]) % nv)
+        late = np.flatnonzero(self._ticks[i] >= self._persistence)
+        return None if not len(late) else self._lasting(i, *divmod(int(late[0]), nv))
 
     def _lasting(self, i: int, kind: int, joint: int) -> Broken:
         """What joint `joint` of row i has asked, or done, for too long: 0 torque, 1 speed, 2 range."""

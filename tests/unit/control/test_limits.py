@@ -111,7 +111,7 @@ def test_a_torque_rate_above_the_limit_for_some_ticks_running_stops_the_trial():
     assert run_ramp(1500.0, RATE_PERSISTENCE) == [f"torque rate limit: above 1000 Nm/s for {RATE_PERSISTENCE} ticks"]
 
 
-def test_one_calm_tick_starts_the_count_anew():
+def test_one_calm_tick_starts_the_count_again():
     drive = motors(1)
     for torque in [0.0, *[1e3] * (RATE_PERSISTENCE - 1)]:
         held(drive, [[torque]])

@@ -62,7 +62,7 @@ def test_a_joint_at_its_limits_is_fine():
     assert after(2 * TICKS, torque=(10.0, 0.0), velocity=(-1.0, 0.5), position=(1.0, 0.0))[0].fine().all()
 
 
-def test_a_moment_within_the_limits_starts_the_count_anew():
+def test_a_moment_within_the_limits_starts_the_count_again():
     drive, _ = after(TICKS - 1, torque=(20.0, 0.0))
     zero = np.zeros((1, 2))
     drive.held(zero, zero, zero)
