@@ -19,7 +19,7 @@ from skillframe.robot.link_checks import (
     Given,
     given_inertias,
     impossible_inertias,
-    mending_lines,
+    inertia_fix,
     missing_inertias,
     oversized_inertias,
     toy_masses,
@@ -83,7 +83,7 @@ def mass_matrix_problems(robot: RobotModel, given: dict[str, Given], bodies: lis
     pivots = smallest_pivots(robot.model, robot.home)
     if robot.model.nv and np.abs(pivots.inertia).max() <= SINGULAR:
         moving = [body.links[0] for body in bodies if body.joint is not None or robot.spec.base == "free"]
-        text, fix = "the mass matrix is zero: no joint moves any inertia", mending_lines(moving, given, bodies)
+        text, fix = "the mass matrix is zero: no joint moves any inertia", inertia_fix(moving, given, bodies)
         yield Problem(code="zero_mass_matrix", severity="fatal", where=robot.urdf.root, message=text, fix=fix)
         return
     worst: dict[str, tuple[float, float]] = {}
@@ -93,7 +93,7 @@ def mass_matrix_problems(robot: RobotModel, given: dict[str, Given], bodies: lis
         worst[joint] = min(inertia, float(pivots.inertia[i])), min(ratio, float(pivots.ratio[i]))
     heads = {body.joint or ROOT_JOINT: body.links[0] for body in bodies}
     for joint, (inertia, ratio) in worst.items():
-        fix = mending_lines([heads[joint]], given, bodies)
+        fix = inertia_fix([heads[joint]], given, bodies)
         yield from _joint_problem(joint, inertia, ratio, fix)
 
 

@@ -20,10 +20,8 @@ from skillframe.frames import Float, cross
 
 DENT = 5e-5  # m; what a contact sinks by
 ROUNDING = 1e-6  # of the mesh's size: single precision, some triangles deep
-SMALLEST, LARGEST = (
-    2e-4,
-    10.0,
-)  # m; a part of 0.2 m read a thousand times too small, of 10 mm a thousand times too large
+SMALLEST = 2e-4  # m; a part of 0.2 m read a thousand times too small
+LARGEST = 10.0  # m; a part of 10 mm read a thousand times too large
 _CHUNK = 4_000_000  # pairs of a point and a face at a time: 32 MB
 
 
@@ -138,7 +136,6 @@ def _unfit_surface(vertices: Float, faces: NDArray[np.int64], hull: Hull) -> tup
         return None
     deep = 1000.0 * dent(vertices, faces, hull)
     filled = 100.0 * (hull.volume / max(volume_of(vertices, faces), 1e-30) - 1.0)
-    text = (
-        f"is not convex: its hull holds {filled:.2g} % more, up to {deep:.3g} mm deep; a peg would stand on air there"
-    )
+    more = f"{filled:.2g} % more, up to {deep:.3g} mm deep"
+    text = f"is not convex: its hull holds {more}; a peg would stand on air there"
     return text, "split it into convex pieces, one Geom each, or give it collide = False to be seen only"

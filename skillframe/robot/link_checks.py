@@ -55,12 +55,12 @@ def given_inertias(robot: RobotModel) -> dict[str, Given]:
     return given
 
 
-def mending_lines(links: list[str], given: Mapping[str, Given], bodies: list[Body]) -> str:
-    """The cure: overlay lines for links, with the mass and centre that they have if these are possible."""
+def inertia_fix(links: list[str], given: Mapping[str, Given], bodies: list[Body]) -> str:
+    """The fix: overlay lines for links, with the mass and centre that they have if these are possible."""
     lines = {}
     for body, length, mass in zip(bodies, lengths(bodies), guessed_masses(bodies), strict=True):
         size = size_of(body, bodies)
-        solid = min(length, _SLENDER * size) if size > 0.0 else length  # or the cure would be oversized itself
+        solid = min(length, _SLENDER * size) if size > 0.0 else length  # or the fix would be oversized itself
         for name in (n for n in links if n in body.links):
             own = given.get(name)
             center = own.com if own is not None and np.linalg.norm(own.com) <= max(size, length) else 0.5 * body.far
@@ -82,7 +82,7 @@ def impossible_inertias(robot: RobotModel, given: Mapping[str, Given], bodies: l
             continue
         if text := _impossible(inertia.mass, inertia.principal):
             body = next(body for body in bodies if name in body.links)
-            index, fix = _joint_index(robot, body), mending_lines([name], given, bodies)
+            index, fix = _joint_index(robot, body), inertia_fix([name], given, bodies)
             harm, why = _harm(robot, body, index)
             message = f"link {name!r} {text}{why}"
             yield Problem(code="impossible_inertia", severity=harm, where=name, message=message, fix=fix)
@@ -95,10 +95,8 @@ def _harm(robot: RobotModel, body: Body, index: int | None) -> tuple[Literal["fa
     welded = robot.model.inertias[index]
     if _impossible(float(welded.mass), np.linalg.eigvalsh(np.asarray(welded.inertia))):
         return "fatal", ""
-    return (
-        "warning",
-        f"; the body that it is fixed in ({_some(body.links)}, {welded.mass:.3g} kg) is possible as a whole",
-    )
+    whole = f"{_some(body.links)}, {welded.mass:.3g} kg"
+    return "warning", f"; the body that it is fixed in ({whole}) is possible as a whole"
 
 
 def _impossible(mass: float, principal: Float) -> str:
@@ -126,7 +124,7 @@ def oversized_inertias(robot: RobotModel, given: Mapping[str, Given], bodies: li
         own = [n for n in body.links if n in given]
         large = [n for n in own if _gyration(given[n].mass, given[n].moments) > _GYRATION * size] or own
         text = f"body {_some(body.links)} has a radius of gyration of {gyration:.3g} m but a size of {size:.3g} m"
-        fix = mending_lines(large, given, bodies)
+        fix = inertia_fix(large, given, bodies)
         yield Problem(code="oversized_inertia", severity="fatal", where=large[0], message=text, fix=fix)
 
 
@@ -152,7 +150,7 @@ def missing_inertias(robot: RobotModel, given: Mapping[str, Given], bodies: list
             continue
         name = body.links[0]
         text = f"link {name!r} moves and has no {'mass' if name in given else 'inertia'}"
-        fix = mending_lines([name], given, bodies)
+        fix = inertia_fix([name], given, bodies)
         yield Problem(code="no_inertia", severity="warning", where=name, message=text, fix=fix)
 
 

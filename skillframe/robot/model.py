@@ -156,7 +156,7 @@ def _build(urdf: Urdf, spec: RobotSpec, mimic: bool) -> tuple[pin.Model, str]:
         with _silent() as log:
             return pin.buildModelFromXML(*arguments), fallback if mimic else ""
     except (ValueError, RuntimeError) as error:
-        raise InputError(urdf.path, f"is refused by Pinocchio ({_first_line(log, error)})", "fix the URDF") from None
+        raise InputError(urdf.path, f"is refused by Pinocchio ({_first_line(log, error)})", "correct it") from None
 
 
 def _check_size(urdf: Urdf) -> None:

@@ -28,7 +28,7 @@ class Problem:
 
 
 def overlay_fix(inertias: Mapping[str, LinkInertia]) -> str:
-    """The cure of a message: robot.toml lines that give links an inertia."""
+    """The fix of a message: robot.toml lines that give links an inertia."""
     lines = [_overlay_line(link, inertia) for link, inertia in inertias.items()]
     guessed = [inertia.mass for inertia in inertias.values() if inertia.guessed]
     scale = f" ({sum(guessed):.3g} kg together: scale them to the maker's total)" if len(guessed) > 1 else ""

@@ -95,7 +95,7 @@ def _parse_xml(path: Path, content: bytes) -> ET.Element:
         parser.Parse(content, True)
     except expat.ExpatError as error:
         where = f"{path}: line {error.lineno}"
-        raise InputError(where, f"is not valid XML ({expat.ErrorString(error.code)})", "fix that line") from None
+        raise InputError(where, f"is not valid XML ({expat.ErrorString(error.code)})", "correct that line") from None
     except (LookupError, ValueError) as error:
         raise InputError(path, f"is in an encoding that cannot be read ({error})", "save it as UTF-8") from None
     return builder.close()

@@ -47,7 +47,7 @@ def machine_warnings(robot: RobotModel) -> Iterator[Problem]:
         chain = ClosedChain(robot)
         unfit = [] if slips else problems(chain, chain.minimal(robot.home))
     except SkillframeError as error:
-        text, fix = (error.problem, error.fix) if isinstance(error, InputError) else (str(error), "fix robot.toml")
+        text, fix = (error.problem, error.fix) if isinstance(error, InputError) else (str(error), "correct robot.toml")
         yield _warning("cannot_run", f"{text}: it can be checked and shown, not run", fix)
         return
     for text in unfit:
