@@ -51,7 +51,7 @@ def read_arrays(path: Path, kind: str, fix: str) -> Arrays:
             return {info.filename.removesuffix(ENDING): _array(path, archive, info) for info in archive.infolist()}
     except FileNotFoundError:
         raise InputError(path, "no such file", "check the path") from None
-    except InputError:
+    except (InputError, MemoryError):  # too little memory is no damage to the file
         raise
     except Exception as error:  # foreign bytes: BadZipFile, zlib.error, EOFError, SyntaxError, struct.error ...
         said = " ".join(str(error).split())[:120]

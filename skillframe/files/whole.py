@@ -100,6 +100,7 @@ def _refuse_other_kinds(path: Path) -> None:
 
 
 def _created_beside(path: Path) -> Path:
+    # not `tempfile.mkstemp`: its files are their owner's only, whatever the umask
     temporary = path.with_name(f".{path.name[:LONGEST]}.{secrets.token_hex(RANDOM_BYTES)}")
     os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
     return temporary

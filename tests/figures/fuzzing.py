@@ -184,9 +184,7 @@ def campaigns(folder: Path, skill: bytes) -> list[Case]:
     given, results = {"campaign.toml": CAMPAIGN.encode(), "peg.skill.json": skill}, read(folder / "results")
     results = {name: content for name, content in results.items() if name != "lock"}
     trace = next(name for name in results if name.startswith("traces/"))
-    few = {
-        name: content for name, content in results.items() if name != trace
-    }  # drawing it takes most of a page's time
+    few = {name: content for name, content in results.items() if name != trace}  # most of a page's time is its drawing
     page = [["report", "{}", "--out", "{}/out/a.html"]]
     state = [["campaign", "status", "{}"], ["campaign", "status", "{}", "--json"]]
     prepare = [["campaign", "run", "{}/campaign.toml", "--out", "{}/out/r"]]
@@ -230,12 +228,5 @@ def fmus() -> list[Case]:
     from skillframe.fmu.library import find_fmu
 
     content = Path(find_fmu("hydraulic_cylinder")).read_bytes()
-    return [
-        Case(
-            "fmu",
-            {"a.fmu": content},
-            "a.fmu",
-            [["fmu", "check", "{}/a.fmu"], ["fmu", "check", "{}/a.fmu", "--json"]],
-            0.3,
-        )
-    ]
+    check = ["fmu", "check", "{}/a.fmu"]
+    return [Case("fmu", {"a.fmu": content}, "a.fmu", [check, [*check, "--json"]], 0.3)]

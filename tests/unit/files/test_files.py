@@ -102,7 +102,7 @@ def test_file_and_folder_are_synced_in_the_order_that_survives_a_power_cut(
 
 WRITERS: dict[str, Callable[[Path, Path], list[str]]] = {
     "a page": lambda demo, out: ["report", str(demo.with_name("t.npz")), "--out", f"{out}.html"],
-    "a film": lambda demo, out: [*RUN, str(demo.with_name("s.json")), "--video", f"{out}.mp4"],
+    "a video": lambda demo, out: [*RUN, str(demo.with_name("s.json")), "--video", f"{out}.mp4"],
     "a trace": lambda demo, out: [*RUN, str(demo.with_name("s.json")), "--out", f"{out}.npz"],
 }
 RUN = ["run", "--world", "free", "--robot", "free_tool", "--duration", "0.05"]
