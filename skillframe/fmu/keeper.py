@@ -37,7 +37,7 @@ def keep(given: dict[str, Any]) -> NoReturn:
     """Start the worker, wait for its end or ours; `given` is what `Child` wrote."""
     use = set(given["use"])
     confined: dict[str, Any] = {"namespace": confine.NAMESPACE in use and confine.own_namespaces()}
-    reaper = _first() if confined["namespace"] else 0
+    reaper = _first(given["fd"]) if confined["namespace"] else 0
     confined["subreaper"] = not reaper and confine.SUBREAPER in use and confine.adopt_orphans()
     wake = _waker()
     worker = os.fork()
@@ -51,15 +51,18 @@ def keep(given: dict[str, Any]) -> NoReturn:
     _leave_as(status)
 
 
-def _first() -> int:
-    """The first process of the namespace: it reaps what is left to it, and with it all others end."""
+def _first(fd: int) -> int:
+    """The first process of the namespace: it reaps what is left to it, and with it all others end.
+
+    It holds neither our input nor the worker's socket `fd`, whose end would not be seen otherwise.
+    """
     pid = os.fork()
     if pid:
         return pid
     confine.hide_memory()
     confine.die_with_parent()
     os.setsid()
-    os.closerange(0, 64)
+    os.closerange(0, fd + 1)
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     while True:
         signal.pause()
@@ -67,7 +70,7 @@ def _first() -> int:
 
 def _waker() -> int:
     """A descriptor that can be read when a child ends."""
-    read, write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC) if hasattr(os, "pipe2") else os.pipe()
+    read, write = os.pipe()
     os.set_blocking(read, False)
     os.set_blocking(write, False)
     signal.signal(signal.SIGCHLD, lambda *_: None)

@@ -65,6 +65,7 @@ static void attack(double t);
 AT = "steps++;if(t>0.0045)attack(t);"
 FINE = ""
 STOPPED = r"did not answer within 3 s while .*; it was stopped"
+CLOSED = "closed its end of the pipe and was stopped while"
 LIAR = r"sent .* instead of an answer while .*; it was stopped"
 
 
@@ -99,6 +100,7 @@ ATTACKS = {
     "closes every descriptor": Attack(
         "close_range(0,~0U,0);", r"(left with code \d+|closed its end of the pipe and was stopped|crashed).* while "
     ),
+    "closes every descriptor, and goes on": Attack("close_range(0,~0U,0);for(;;)sleep(1);", CLOSED),
     "leaves in a step": Attack("exit(0);", "left with code 0 while"),
     "aborts": Attack("abort();", r"crashed \(SIGABRT\) while"),
     "segment violation": Attack("*(volatile int*)8=1;", r"crashed \(SIGSEGV\) while"),

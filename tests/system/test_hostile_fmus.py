@@ -145,6 +145,16 @@ def test_however_skillframe_itself_is_ended_nothing_of_an_fmu_goes_on(mark, how)
     nothing_is_left(mark)
 
 
+@pytest.mark.slow
+def test_among_many_open_files_an_fmu_that_closes_its_socket_gets_the_same_sentence(mark):
+    """As in a large campaign: the number of its socket is above 200, and nothing else may hold that open."""
+    name = "closes every descriptor, and goes on"
+    full = "import os; held = [os.open(os.devnull, os.O_RDONLY) for _ in range(200)];"
+    code, out, err, _ = ended_in(mark, full + COMMANDS["simulate"], hostile(mark, name, "simulate"))
+    assert code == 1 and ATTACKS[name].simulate in err, (out, err)
+    nothing_is_left(mark)
+
+
 LESS = {"no namespace": ("landlock", "subreaper"), "no Landlock": ("namespace",), "neither": ("subreaper",)}
 
 
