@@ -7,7 +7,7 @@ from typing import Any
 
 from skillframe.errors import SkillframeError
 from skillframe.fmu.child import Child, SandboxLimits
-from skillframe.fmu.extract import forget, unpack
+from skillframe.fmu.extract import forget, is_unpacked, unpack
 from skillframe.fmu.inspection import FmuFacts, inspect_fmu, problems_of
 from skillframe.fmu.sandbox import loading
 
@@ -43,9 +43,10 @@ def check_fmu(path: Path) -> dict[str, Any]:
 def _try(facts: FmuFacts, state: str) -> tuple[str, dict[str, Any], list[str]]:
     """Load, initialise, step ten times; save and restore where that is claimed. What confined it, and what went wrong.
 
-    What was unpacked of an FMU that does not get through is removed.
+    What was unpacked here of an FMU that does not get through is removed.
     """
     confined: dict[str, Any] = {}
+    before = is_unpacked(facts.path)
     unpack(facts.path)
     child = Child(facts.path, facts.name, LIMITS)
     try:
@@ -54,7 +55,8 @@ def _try(facts: FmuFacts, state: str) -> tuple[str, dict[str, Any], list[str]]:
         if not isinstance(repeats, bool):
             raise child.liar("no yes or no", "being tried out")
     except SkillframeError as error:
-        forget(facts.path)
+        if not before:
+            forget(facts.path)
         return state, confined, [str(error)]
     finally:
         child.close()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import lzma
 import os
+import re
 import shutil
 import stat
 import tempfile
@@ -27,9 +28,8 @@ DESCRIBED_BY = ("modelDescription.xml", "sources/buildDescription.xml")
 MOST_FILES = 20_000
 LONGEST = 1000  # characters of a name
 UNPACKING = "unpacking-"
-_NUMBERS = ("Float32", "Float64", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64")
-_OTHERS = ("Boolean", "String", "Binary", "Enumeration", "Clock")
-VARIABLE_TAGS = (b"<ScalarVariable ", *(f"<{kind} name=".encode() for kind in (*_NUMBERS, *_OTHERS)))
+_FMI2 = re.compile(rb"<ScalarVariable\s")
+_FMI3 = re.compile(rb"<(?:Float(?:32|64)|U?Int(?:8|16|32|64)|Boolean|String|Binary|Enumeration|Clock)\s")
 
 
 def unpack(path: Path) -> Path:
@@ -38,8 +38,8 @@ def unpack(path: Path) -> Path:
     Raises:
         InputError: not a zip, a name that would leave the folder, a link, or too much content.
     """
-    folder = cache_dir("fmus-unpacked") / content_hash(path)[:32]
-    if (folder / "modelDescription.xml").is_file():
+    folder = _place(path)
+    if is_unpacked(path):
         return folder
     _tidy(folder.parent)
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix=UNPACKING) as work:
@@ -47,15 +47,24 @@ def unpack(path: Path) -> Path:
         try:
             os.replace(Path(work) / "fmu", folder)
         except OSError:  # another process was first
-            if not (folder / "modelDescription.xml").is_file():
+            if not is_unpacked(path):
                 raise
     return folder
 
 
+def is_unpacked(path: Path) -> bool:
+    """Whether the content of an FMU is in the cache."""
+    return (_place(path) / "modelDescription.xml").is_file()
+
+
 def forget(path: Path) -> None:
-    """Remove from the cache what was unpacked of an FMU, if anything: it turned out to be of no use."""
+    """Remove from the cache what was unpacked of an FMU; only for who unpacked it, because others may run it."""
     with suppress(SkillframeError):
-        shutil.rmtree(cache_dir("fmus-unpacked") / content_hash(path)[:32], ignore_errors=True)
+        shutil.rmtree(_place(path), ignore_errors=True)
+
+
+def _place(path: Path) -> Path:
+    return cache_dir("fmus-unpacked") / content_hash(path)[:32]
 
 
 def _tidy(folder: Path) -> None:
@@ -80,7 +89,7 @@ def description_folder(path: Path, most: int) -> Iterator[Path]:
     with tempfile.TemporaryDirectory() as work:
         _extract(path, Path(work), DESCRIBED_BY)
         text = (Path(work) / "modelDescription.xml").read_bytes()
-        count = sum(text.count(tag) for tag in VARIABLE_TAGS)
+        count = max(len(kind.findall(text)) for kind in (_FMI2, _FMI3))  # FMI 2 nests some of FMI 3's tags in its own
         if count > most:
             raise InputError(path, f"describes {count} variables, where {most} are the most", "export fewer of them")
         yield Path(work)

@@ -136,17 +136,10 @@ def inspect_fmu(path: Path) -> FmuFacts:
     if known is not None:
         return known
     member_names(path)
-    if is_allowed(path):
-        return inspect_here(path)
-    return _in_child(path, digest)
+    return inspect_here(path) if is_allowed(path) else facts_from(_asked(path, b"i"), path)
 
 
 _KNOWN: dict[tuple[Path, str], FmuFacts] = {}
-
-
-@lru_cache(maxsize=64)
-def _in_child(path: Path, digest: str) -> FmuFacts:
-    return facts_from(_asked(path, b"i"), path)
 
 
 def _asked(path: Path, letter: bytes) -> Any:

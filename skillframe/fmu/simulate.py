@@ -14,7 +14,7 @@ from typing import Any
 
 from skillframe.errors import InputError
 from skillframe.fmu.bindings import Instance, InstanceFailed
-from skillframe.fmu.extract import forget, unpack
+from skillframe.fmu.extract import forget, is_unpacked, unpack
 from skillframe.fmu.inspection import FmuFacts, FmuVariable, inspect_fmu
 from skillframe.fmu.values import values_of
 
@@ -84,8 +84,8 @@ def simulate(request: Request, sandboxed: bool, limit_s: float = 30.0) -> Iterat
     from skillframe.fmu.child import Child, SandboxLimits
     from skillframe.fmu.sandbox import loading
 
+    last, before = -1.0, is_unpacked(facts.path)
     unpack(facts.path)
-    last = -1.0
     child = Child(facts.path, facts.name, SandboxLimits(start_s=limit_s))
     try:
         child.tell(b"m", {**loading(facts), "request": {**asdict(request), "path": ""}})
@@ -101,7 +101,7 @@ def simulate(request: Request, sandboxed: bool, limit_s: float = 30.0) -> Iterat
             raise child.liar("the end", f"simulating from {max(last, 0.0):.6g} s")
     finally:
         child.close()
-        if last < 0.0:
+        if last < 0.0 and not before:
             forget(facts.path)
 
 

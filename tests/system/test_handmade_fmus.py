@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from skillframe.cli.main import run
+from skillframe.fmu.extract import unpack
 from skillframe.fmu.toolchain import find_compiler
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.oracle import fmus
@@ -297,18 +298,24 @@ def test_a_wide_integer_in_a_table_reaches_the_fmu_to_the_last_digit(said, tmp_p
     assert simulated(said, path, tmp_path / "o.csv", "--input", table)["large"][-1] == str(wide)
 
 
-def described(count):
+ROWS = {
+    2: '<ScalarVariable name="v{0}" valueReference="{1}" causality="local"><Real/></ScalarVariable>',
+    3: '<Float64\nvalueReference="{1}" causality="local" name="v{0}"/>',
+}
+
+
+def described(count, version=2):
     """A model description with so many variables more."""
-    row = '<ScalarVariable name="v{0}" valueReference="{1}" causality="local"><Real/></ScalarVariable>'
-    more = "".join(row.format(k, k + 10) for k in range(count))
-    return fmus.describe().replace("</ModelVariables>", more + "</ModelVariables>")
+    more = "".join(ROWS[version].format(k, k + 100) for k in range(count))
+    return fmus.describe(version).replace("</ModelVariables>", more + "</ModelVariables>")
 
 
-def test_a_description_without_end_is_refused_before_it_is_read(said, tmp_path):
-    path = fmus.pack(tmp_path / "many.fmu", described(600_000))
+@pytest.mark.parametrize(("version", "count"), [(2, 600_010), (3, 600_008)])  # its own are 10 and 8
+def test_a_description_without_end_is_refused_before_it_is_read(said, tmp_path, version, count):
+    path = fmus.pack(tmp_path / "many.fmu", described(600_000, version))
     for more in (("check",), ("simulate", "--stop", 1, "--step", 0.1, "--out", tmp_path / "o.csv"), ("build",)):
         code, _, err = said(more[0], path, *more[1:])
-        assert code == 2 and "describes 600010 variables, where 100000 are the most" in err, err
+        assert code == 2 and f"describes {count} variables, where 100000 are the most" in err, err
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < 700 * 1024  # kB; the text alone is 60 MB
 
 
@@ -335,3 +342,6 @@ def test_what_was_unpacked_of_an_fmu_that_does_not_load_is_removed(said, tmp_pat
     code, out, err = said(command, path, *more)
     assert code == 1 and "does not load" in out + err
     assert not [p for p in (tmp_path / "cache").rglob("*") if p.is_file()]
+    kept = unpack(path)  # as a campaign does that runs it
+    assert said(command, path, *more)[0] == 1
+    assert (kept / "modelDescription.xml").is_file()
