@@ -69,14 +69,28 @@ def test_no_limit_is_no_limit_and_no_mark():
 
 
 def test_a_trial_that_has_ended_keeps_its_figures():
-    seen = contact(2)
-    zero = np.zeros((2, 6))
+    """It is no longer stepped, so its last force stands: 90 N for 5 ms are 45 N over 10 ms, and stay that."""
+    seen, zero = contact(2), np.zeros((2, 6))
     for tick in range(40):
-        seen.step(np.array([50.0, 90.0]), zero, None)
+        seen.step(np.full(2, 90.0 * (tick >= 5)), zero, None)
         if tick == 9:
-            seen.look(np.arange(2))
-    assert [broken.row for broken in seen.look(np.array([0]))] == []
+            assert seen.look(np.arange(2)) == []
     assert [broken.row for broken in seen.look(np.array([1]))] == [1]
+    np.testing.assert_allclose(seen.mean, [45.0, 90.0])
+
+
+def test_the_figures_do_not_depend_on_when_they_are_looked_at():
+    """Another trial that ends has all of a batch looked at."""
+    forces, found = np.abs(np.random.default_rng(1).normal(30.0, 20.0, 300)), []
+    for every in (1, 7, 10, 300):
+        seen = contact(force_n=None)
+        for tick, force in enumerate(forces):
+            seen.step(np.array([force]), np.full((1, 6), force), None)
+            if tick % every == 0:
+                seen.look(np.arange(1))
+        seen.look(np.arange(1))
+        found.append((seen.mean[0], seen.peak[0], seen.estimate[0]))
+    assert found == found[:1] * 4  # to the bit
 
 
 def test_torque_is_held_to_its_own_limit():

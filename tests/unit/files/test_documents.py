@@ -211,6 +211,16 @@ def test_an_npy_header_that_claims_more_than_its_member_holds_is_refused_unalloc
         tracemalloc.stop()
 
 
+def test_an_npz_with_two_members_of_one_name_is_refused(tmp_path: Path) -> None:
+    """Which of the two counts would depend on the reader."""
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as made:
+        made.writestr("t.npy", packed(np.zeros(3)))
+        with pytest.warns(UserWarning, match="Duplicate name"):
+            made.writestr("t.npy", packed(np.ones(3)))
+    with pytest.raises(InputError, match="two arrays of one name"):
+        read_demonstration(tmp_path / "a.npz")
+
+
 @pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
 def test_an_npz_packed_in_a_way_that_cannot_be_bounded_is_refused(tmp_path: Path, method: int) -> None:
     with zipfile.ZipFile(tmp_path / "a.npz", "w", method) as made:

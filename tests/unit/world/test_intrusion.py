@@ -138,6 +138,13 @@ def test_every_kind_of_geom_of_a_fixture_is_seen(slide):
         assert found == [(0, "link 'carriage' is 20 mm inside the fixture")], geom.kind
 
 
+def test_a_shape_of_a_fixture_counts_as_it_is_turned(slide):
+    """A bar of 0.6 m along x, turned about z, lies along y, where the sphere is."""
+    bar = Geom(kind="box", size=(0.3, 0.05, 0.05), quaternion=(0.0, 0.0, 0.5**0.5, 0.5**0.5))
+    beside = shape('<sphere radius="0.1"/>', xyz="0 0.28 0")
+    assert causes(slide(beside, [0.1, 0.2], bar)) == [(0, "link 'carriage' is 50 mm inside the fixture")]
+
+
 def test_what_of_a_fixture_is_only_drawn_does_not_count(slide):
     assert causes(slide(SPHERE, [0.0], dataclasses.replace(BOX, collide=False))) == []
 
