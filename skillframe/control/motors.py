@@ -159,8 +159,9 @@ class Motors:
 
     def fine(self) -> NDArray[np.bool_]:
         """(N,) no row beyond for too long."""
-        short: NDArray[np.bool_] = (self._ticks < self._persistence).all(-1)
-        return short & (self._rate_ticks < RATE_PERSISTENCE)
+        lasting: NDArray[np.bool_] = self._rate_ticks < RATE_PERSISTENCE
+        lasting &= (self._ticks < self._persistence).all(-1)
+        return lasting
 
     def broken(self, i: int) -> Broken | None:
         """Why row i is not fine."""
