@@ -1,8 +1,8 @@
 """skillframe: teach robots compliant assembly from human demonstration, and prove the skill.
 
 The story in seven files: `skillframe.demonstration.record`, the LMC plug-in's learner and runtime, `skillframe.skill`,
-`skillframe.control.controller`, `skillframe.world.scene` and `skillframe.run.executor`. Importing the package loads none
-of the scientific libraries.
+`skillframe.control.controller`, `skillframe.world.scene` and `skillframe.run.executor`. Importing the package loads
+none of the scientific libraries.
 """
 
 from typing import TYPE_CHECKING, Any
