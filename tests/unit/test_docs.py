@@ -32,6 +32,7 @@ def test_every_hook_of_the_specification_is_one_that_the_registry_calls():
     assert specified == set(KINDS.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda code: re.search(r"def (skillframe_\w+)", code).group(1))
 def test_every_example_of_a_hook_loads_and_conforms(example, monkeypatch):
     from skillframe.conformance import check_plugin

@@ -70,14 +70,15 @@ def test_workers_give_the_table_of_one_process_listen_on_the_local_host_only_and
     assert workers_of_this_process() == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("misbehave", "cause"),
     [
         (fakes.kills, b"worker died (killed)"),
-        pytest.param(fakes.hoards, b"worker died (memory)", marks=pytest.mark.slow),
-        pytest.param(fakes.raises, b"error: ValueError: the skill tripped", marks=pytest.mark.slow),
-        pytest.param(fakes.hangs, b"worker died (time limit)", marks=pytest.mark.slow),
-        pytest.param(fakes.hangs_holding_the_lock, b"worker died (time limit)", marks=pytest.mark.slow),
+        (fakes.hoards, b"worker died (memory)"),
+        (fakes.raises, b"error: ValueError: the skill tripped"),
+        (fakes.hangs, b"worker died (time limit)"),
+        (fakes.hangs_holding_the_lock, b"worker died (time limit)"),
     ],
 )
 def test_exactly_the_guilty_trial_is_named(out, reference, misbehave, cause):

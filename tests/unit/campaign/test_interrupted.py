@@ -87,6 +87,7 @@ distributed.Client._gather = interrupted
 """
 
 
+@pytest.mark.slow
 def test_ctrl_c_while_a_result_is_fetched_from_dask_prints_no_traceback(tmp_path):
     process, out = client(tmp_path, ["--workers", "2"], prelude=AMID_A_GATHER)
     assert check_ended(process, out, 130) == 24  # three chunks of eight, the fourth was on its way

@@ -85,6 +85,7 @@ def test_a_plugin_made_by_new_is_found_and_passes_its_checks(made, capsys):
     assert "skill:glide_slowly: passes" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_plugin_made_by_new_passes_its_own_tests_wherever_it_lies(made):
     (made.parent / "conftest.py").write_text("raise ImportError('of another project')\n")
     (made.parent / "pyproject.toml").write_text("[tool.pytest.ini_options]\n")

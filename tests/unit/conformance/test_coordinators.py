@@ -1,6 +1,7 @@
 """A coordinator obeys the laws of a skill, with a dimension of arms; the checks see it when it does not."""
 
 import numpy as np
+import pytest
 
 from skillframe.conformance import check_skill
 from skillframe.extend.records import CoordinatorType
@@ -33,6 +34,7 @@ def kind(alter=lambda command, observation: command, arms=3):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_coordinator_of_any_number_of_arms_that_keeps_the_contract_has_no_problems():
     assert all(check_skill(kind(arms=arms)) == [] for arms in (1, 2, 3))
 

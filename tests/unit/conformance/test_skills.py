@@ -99,6 +99,7 @@ def test_a_skill_that_keeps_the_contract_has_no_problems():
     assert check_skill(kind()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", BREAKING)
 def test_a_skill_that_breaks_a_law_is_caught_by_its_check(what):
     alter, check = BREAKING[what]
@@ -147,6 +148,7 @@ def test_a_kind_of_skill_that_is_wrong_is_told_in_words(changes, said):
         assert any(said in problem for problem in problems)
 
 
+@pytest.mark.slow
 def test_pictures_that_are_svg_pass_with_or_without_a_namespace():
     for svg in ("<svg/>", '<svg xmlns="http://www.w3.org/2000/svg"/>'):
         assert check_skill(kind(explain=lambda document, svg=svg: [Illustration("t", "c", svg)])) == []

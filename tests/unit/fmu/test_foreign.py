@@ -51,6 +51,7 @@ def run(bank, steps=10):
         bank.active[bank.status != 0] = 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "words"),
     [

@@ -38,6 +38,7 @@ def carried(payload):
     return crane(payload).model.inertias[CARRIER + 1].mass
 
 
+@pytest.mark.slow
 def test_the_load_is_found_over_the_whole_rating_and_the_law_goes_by_it():
     """Told of 475 kg; found within 3 kg, as near the nominal one, and the tool is back where the swing began."""
     loads = np.array([0.0, 100.0, 200.0, 320.0])

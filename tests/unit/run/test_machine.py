@@ -54,6 +54,7 @@ def runs():
     return run([0, 1]), [run([0]), run([1])]
 
 
+@pytest.mark.slow
 def test_a_trial_is_the_same_to_the_last_bit_alone_and_beside_another(runs):
     together, alone = runs
     for i, single in enumerate(alone):

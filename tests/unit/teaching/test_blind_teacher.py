@@ -94,6 +94,7 @@ def test_there_must_be_a_surface():
         record_blind(load_robot_model("free_tool"), load_world("free", {}), BlindSettings(), count=1, seed=0)
 
 
+@pytest.mark.slow
 def test_searches_are_kept_whether_they_found_it_or_not_and_repeat_with_their_seed():
     robot, scene = load_robot_model("free_tool"), load_world("peg_in_hole", {"fillet": 0.0008})
     settings = BlindSettings(time_s=2.0)
