@@ -22,7 +22,7 @@ from skillframe.machine.law.hydraulic import Measured, Terms
 from skillframe.machine.law.vdc_reference import ToolTask
 from skillframe.world.convert import SOLIMP, SOLREF, build_spec
 from skillframe.world.scene import Geom, Scene, Tool
-from skillframe.world.scene import ToolTask as SceneTask
+from skillframe.world.scene import Task as SceneTask
 from tests.crane_terms import terms
 from tests.laws.vdc_loop import crane, quintic
 
