@@ -81,6 +81,7 @@ def _write(skill: Path, form: str, out: Path, phase: int | None, coc: str | None
     from skillframe.demonstration.record import resolve_point
     from skillframe.document.export import FORMATS, settings_text
     from skillframe.document.file import load
+    from skillframe.document.frame import read_frame, with_center
     from skillframe.document.impedance import moving_impedance
     from skillframe.errors import UnknownName
     from skillframe.extend.registry import registry
@@ -92,8 +93,7 @@ def _write(skill: Path, form: str, out: Path, phase: int | None, coc: str | None
     kind = registry().behaviour(document["type"])
     words = kind.describe(document)[:1] if kind.describe is not None else []
     if coc is not None:
-        frame = document["frame"]
-        frame["center_of_compliance"] = resolve_point(coc, frame.get("frames", {})).tolist()
+        document = with_center(document, resolve_point(coc, read_frame(document).points).tolist())
     turned = None if attitude is None else _attitude(attitude)
     moving = moving_impedance(document, phase, FORMATS[form].axes, turned, str(skill))
     write_whole(out, settings_text(FORMATS[form], moving, [f"{skill.name}: {line}" for line in words]).encode())

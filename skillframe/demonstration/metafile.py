@@ -66,10 +66,7 @@ def check_meta(source: str, meta: Mapping[str, Any]) -> None:
     if meta.get("hand") is not None and not isinstance(meta["hand"], str):
         points["hand"] = meta["hand"]
     for name, point in points.items():
-        if not _is_point(point):
-            raise InputError(
-                f"{source}: {name}", f"is no point: {point!r}", "give [x, y, z] in metres, in the tool frame"
-            )
+        point_of(point, f"{source}: {name}")
     _check_noise(source, meta.get("sensor"))
 
 
@@ -89,8 +86,15 @@ def _warn_free_choice(source: str, key: str, value: object) -> None:
         raise InputError(f"{source}: {key}", str(UnknownName("value", str(value), TEACHERS)))
 
 
-def _is_point(point: object) -> bool:
-    return isinstance(point, list | tuple) and len(point) == 3 and all(map(_is_number, point))
+def point_of(point: Any, where: str) -> list[float]:
+    """A point of the tool frame [m] from metadata.
+
+    Raises:
+        InputError: it is not three finite numbers.
+    """
+    if not (isinstance(point, list | tuple) and len(point) == 3 and all(map(_is_number, point))):
+        raise InputError(where, f"is no point: {point!r}", "give [x, y, z] in metres, in the tool frame")
+    return [float(x) for x in point]
 
 
 def _is_number(value: Any) -> bool:

@@ -7,6 +7,7 @@ nothing after them asks again.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -106,7 +107,7 @@ class Demonstration:
         return resolve_point(name, self.meta.get("frames", {}))
 
 
-def resolve_point(text: str | None, frames: dict[str, Any], where: str = "") -> Float:
+def resolve_point(text: str | None, frames: Mapping[str, Any], where: str = "") -> Float:
     """A point in tool coordinates [m] from "x,y,z" or a frame's name; None and "tool" are the tool point.
 
     Raises:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from skillframe.demonstration.metafile import point_of
 from skillframe.demonstration.record import Demonstration
 from skillframe.demonstration.stalls import refuse_stalls
 from skillframe.errors import InputError
@@ -37,11 +38,11 @@ def common_frames(demonstrations: Sequence[Demonstration]) -> dict[str, list[flo
     frames: dict[str, list[float]] = {}
     for demonstration in demonstrations:
         for name, point in demonstration.meta.get("frames", {}).items():
-            values = np.array(point, dtype=float).reshape(3)
-            if norm(values - frames.setdefault(name, values.tolist())) > SAME_POINT_M:
+            values = point_of(point, f"{demonstration.source or 'demonstration'}: frames.{name}")
+            if norm(np.subtract(values, frames.setdefault(name, values))) > SAME_POINT_M:
                 raise InputError(
                     demonstration.source or "demonstration",
-                    f"has its point {name!r} at {values.tolist()}, another demonstration at {frames[name]}",
+                    f"has its point {name!r} at {values}, another demonstration at {frames[name]}",
                     "learn from demonstrations of one tool",
                 )
     return frames

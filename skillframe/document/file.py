@@ -1,10 +1,9 @@
 """The skill file: one readable JSON document that says what was learned, from what, by whom, and in which frame.
 
 Layout (fixed outside, so that scripts can rely on it): `format`, `version`, `type`, `type_version`, `created_by`,
-`learned_from` [{`file`, `sha256`}], `frame` {`work_at`, `learned_at`, `center_of_compliance`: points of the tool frame
-[m]; `axes`: "base" or "phase_start"; `frames`: the tool's named points} and `phases`, a list whose items belong to the
-type. Keys are sorted, a row of numbers stands on one line, and every number comes back to the last bit: Python writes
-the shortest decimal that does.
+`learned_from` [{`file`, `sha256`}], `frame` (points and axes, see `skillframe.document.frame`) and `phases`, a list
+whose items belong to the type. Keys are sorted, a row of numbers stands on one line, and every number comes back to the
+last bit: Python writes the shortest decimal that does.
 """
 
 from __future__ import annotations
@@ -19,6 +18,8 @@ from typing import Any
 
 from skillframe import __version__
 from skillframe.demonstration.record import Demonstration
+from skillframe.document.frame import read_frame
+from skillframe.document.keys import demand
 from skillframe.errors import InputError, UnknownName
 from skillframe.extend.records import CoordinatorType, Document, SkillType
 from skillframe.extend.registry import registry
@@ -27,14 +28,11 @@ from skillframe.files.documents import check_plain, parse_json, read_text, shown
 
 LARGEST = 1e100  # beyond it squares overflow
 FORMAT, VERSION = "skillframe.skill", 1
-AXES = ("base", "phase_start")
-POINTS = ("work_at", "learned_at", "center_of_compliance")
 _KINDS = {
     "format": str, "version": int, "type": str, "created_by": dict, "learned_from": list,
     "frame": dict, "phases": list,
 }  # fmt: skip
 _GIVE, _AGAIN = "give a file written by skillframe learn", "learn the skill again"
-_WORDS = {str: "text", int: "a whole number", dict: "an object", list: "a list"}
 
 
 def new_document(skill: SkillType, body: Document, demonstrations: Sequence[Demonstration] = ()) -> Document:
@@ -168,48 +166,22 @@ def _check(document: Document, where: str) -> None:
     if isinstance(version, int) and version > VERSION:
         raise InputError(where, f"is a skill file of version {version}, newer than {VERSION}", "update skillframe")
     for key, kind in _KINDS.items():
-        _demand(document, key, kind, where, "")
+        demand(document, key, kind, where)
     if "type_version" in document:
-        _demand(document, "type_version", int, where, "")
+        demand(document, "type_version", int, where)
     for key in ("version", "type_version"):
         if document.get(key, 1) < 1:
             raise InputError(f"{where}: {key}", f"is {document[key]}, and versions count from 1", "fix it")
     for spot, problem in _no_numbers(document, ""):
         raise InputError(f"{where}: {spot}", problem, "correct it, or learn the skill again")
     check_plain(document, where, _AGAIN)
-    _check_frame(document["frame"], where)
+    read_frame(document, where)
     for i, source in enumerate(document["learned_from"]):
         for key in ("file", "sha256"):
-            _demand(source, key, str, where, f"learned_from[{i}]")
+            demand(source, key, str, where, f"learned_from[{i}]")
     for i, phase in enumerate(document["phases"]):
         if not isinstance(phase, dict):
             raise InputError(f"{where}: phases[{i}]", "is not an object", _AGAIN)
-
-
-def _demand(values: Any, key: str, kind: type, where: str, inside: str) -> None:
-    name = f"{inside}.{key}" if inside else key
-    if not isinstance(values, dict) or key not in values:
-        raise InputError(where, f"lacks the key {name!r}", "add it, or learn the skill again")
-    if not isinstance(values[key], kind) or isinstance(values[key], bool):
-        raise InputError(f"{where}: {name}", f"should be {_WORDS[kind]}", "fix it, or learn the skill again")
-
-
-def _check_frame(frame: Document, where: str) -> None:
-    for key in POINTS:
-        _demand(frame, key, list, where, "frame")
-        _check_point(frame[key], f"{where}: frame.{key}")
-    _demand(frame, "axes", str, where, "frame")
-    if frame["axes"] not in AXES:
-        raise InputError(f"{where}: frame.axes", str(UnknownName("axes", frame["axes"], AXES)))
-    if "frames" in frame:
-        _demand(frame, "frames", dict, where, "frame")
-    for name, point in frame.get("frames", {}).items():
-        _check_point(point, f"{where}: frame.frames.{name}")
-
-
-def _check_point(point: Any, where: str) -> None:
-    if not isinstance(point, list) or len(point) != 3 or not all(type(x) in (int, float) for x in point):
-        raise InputError(where, "should be a point [x, y, z] of the tool frame in metres", "fix it")
 
 
 def _no_numbers(value: Any, spot: str) -> Iterator[tuple[str, str]]:

@@ -18,6 +18,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from skillframe.document.frame import read_frame
 from skillframe.errors import InputError
 from skillframe.extend.records import Document
 from skillframe.frames import Float
@@ -66,12 +67,13 @@ def moving_impedance(
         InputError: no such phase, no impedance in it, or the attitude is needed and not given.
     """
     phase = _phase(document, number, where)
-    turn = _turn(document["frame"]["axes"], axes, attitude)
+    frame = read_frame(document, where)
+    turn = _turn(frame.axes, axes, attitude)
     blocks = np.zeros((6, 6))
     blocks[:3, :3] = blocks[3:, 3:] = turn
     return MovingImpedance(
         axes=axes,
-        center=np.array(document["frame"]["center_of_compliance"], dtype=float),
+        center=frame.center_of_compliance,
         twist=blocks @ np.concatenate([_velocity(phase[part]) for part in PARTS]),
         stiffness=_turned(phase, "stiffness", blocks),
         damping=_turned(phase, "damping", blocks),

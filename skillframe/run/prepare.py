@@ -16,6 +16,7 @@ import numpy as np
 from skillframe.config.units import si
 from skillframe.demonstration.record import resolve_point
 from skillframe.document.file import understood
+from skillframe.document.frame import read_frame, with_center
 from skillframe.errors import InputError, UnknownName
 from skillframe.extend.records import CoordinatorType, Document
 from skillframe.extend.registry import registry
@@ -89,9 +90,8 @@ def center_of_compliance(document: Document, scene: Scene, coc: str | None) -> F
     Raises:
         UnknownName: `coc` is neither three numbers nor a frame of the tool.
     """
-    if coc is None:
-        return np.array(document["frame"]["center_of_compliance"], dtype=float)
-    return resolve_point(coc, {**document["frame"].get("frames", {}), **scene.tool.frames})
+    frame = read_frame(document)
+    return frame.center_of_compliance if coc is None else resolve_point(coc, {**frame.points, **scene.tool.frames})
 
 
 def prepare(robot: RobotModel, scene: Scene, document: Document, coc: str | None = None) -> tuple[Skill, Setup]:
@@ -108,7 +108,7 @@ def prepare(robot: RobotModel, scene: Scene, document: Document, coc: str | None
             coordinator = kind.build(document)
         return coordinator, Setup(robot=robot, scene=scene, center_of_compliance=_centers(kind, document, scene, coc))
     center = center_of_compliance(document, scene, coc)
-    placed = {**document, "frame": {**document["frame"], "center_of_compliance": center.tolist()}}
+    placed = with_center(document, center.tolist())
     with understood(what):
         skill = kind.build(placed)
         area = None if kind.area is None else kind.area(document)
@@ -132,7 +132,7 @@ def _check_area(robot: RobotModel, scene: Scene, document: Document, area: Float
     The workspace is `limits.workspace_m`; without one, an arm's is what it reaches in the attitude of the start.
     """
     start = start_poses(robot, scene, {}, 1)
-    turn = start.rotation[0] if document["frame"]["axes"] == "phase_start" else np.eye(3)
+    turn = start.rotation[0] if read_frame(document).from_start else np.eye(3)
     corners = np.array(list(itertools.product(*area.T))) @ turn.T + start.position[0]
     if _inside(robot, corners, start.rotation[0]):
         return

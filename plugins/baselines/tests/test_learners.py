@@ -154,7 +154,7 @@ def test_settings_that_make_no_sense_are_refused(kind, settings, said):
 def test_axes_of_the_start_and_no_demonstration_are_refused(kind):
     with pytest.raises(InputError, match="base axes"):
         learn(kind, axes="phase_start")
-    with pytest.raises(InputError, match="got none"):
+    with pytest.raises(InputError, match="no demonstration given"):
         registry().skill(kind).learn([], LearnOptions())
 
 
@@ -268,7 +268,7 @@ def test_the_fit_recovers_a_stable_linear_system_from_its_own_paths():
 
 
 def test_the_fit_follows_what_was_demonstrated_better_than_one_linear_system(documents):
-    recorded = align.recorded(both_sides(), None)
+    recorded = align.recorded(both_sides(), np.zeros(3))
 
     def error(document):
         skill, scale = seds.build(document), np.array(document["model"]["scale"])

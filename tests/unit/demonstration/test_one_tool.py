@@ -10,10 +10,13 @@ import pytest
 
 from skillframe.cli.main import run
 from skillframe.conformance.examples import example_demonstrations
+from skillframe.errors import InputError
 from skillframe.extend.reading import write_demonstration
+from skillframe.extend.records import LearnOptions
+from skillframe.extend.registry import registry
 
 pytestmark = pytest.mark.needs_plugins
-KINDS = ["lmc", "dmp", "gmr", "seds", "search", "spiral", "random_walk", "dual_arm"]
+KINDS = ["lmc", "replay", "dmp", "gmr", "seds", "search", "spiral", "random_walk", "dual_arm"]
 
 
 @pytest.fixture
@@ -40,6 +43,20 @@ def test_two_tools_are_refused_by_every_learner_in_one_sentence(
     assert "has its point 'wrist' at" in said
     assert "learn from demonstrations of one tool" in said
     assert not out.exists()
+
+
+@pytest.mark.parametrize("kind", [*(k for k in KINDS if k != "replay"), "policy"])  # replay takes one only
+def test_a_learner_called_by_itself_says_the_same_sentence(kind: str) -> None:
+    one, other = example_demonstrations()
+    other = replace(other, source="other.npz", meta={**other.meta, "frames": {"wrist": [0.0, 0.0, -0.25]}})
+    learn = registry().behaviour(kind).learn
+    assert learn is not None
+    with pytest.raises(InputError) as caught:
+        learn([one, other], LearnOptions())
+    assert str(caught.value) == (
+        "other.npz: has its point 'wrist' at [0.0, 0.0, -0.25], another demonstration at [0.0, 0.0, -0.15]; "
+        "learn from demonstrations of one tool"
+    )
 
 
 def test_segment_refuses_two_tools_and_takes_one(pair: Callable[[float], list[str]], tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import pytest
 import yaml
 
 from skillframe.document.export import FORMATS, settings_text
+from skillframe.document.frame import frame_at
 from skillframe.document.impedance import moving_impedance
 from skillframe.errors import InputError
 
@@ -26,7 +27,7 @@ def phase(stiffness=1000.0, damped=0.1):
         "translation": part(np.diag([0.0, stiffness, stiffness]), [0.0, 0.0, -1.0], 0.02),
         "rotation": part(np.diag([20.0, 0.0, 20.0]), [0.0, 1.0, 0.0], 0.05), "stop": STOP,
     }  # fmt: skip
-    frame = {"center_of_compliance": [0.0, 0.0, 0.2], "axes": "base"}
+    frame = frame_at([0.0, 0.0, 0.2], axes="base")
     return moving_impedance({"type": "lmc", "frame": frame, "phases": [body]}, None, "base", None, "peg")
 
 

@@ -48,8 +48,8 @@ class Aligned(NamedTuple):
     wrench: Float
 
 
-def recorded(demonstrations: Sequence[Demonstration], at: str | None) -> Recorded:
-    """States and wrenches of the learning point.
+def recorded(demonstrations: Sequence[Demonstration], at: Float) -> Recorded:
+    """States and wrenches of the learning point (3,), tool frame [m].
 
     Raises:
         InputError: demonstrations that end too far apart, or turn too far.
@@ -58,7 +58,7 @@ def recorded(demonstrations: Sequence[Demonstration], at: str | None) -> Recorde
     for demonstration in demonstrations:
         sampled = {name: np.asarray(value) for name, value in resampled(demonstration).items()}
         tool = Pose(sampled["position"], matrix_from_quaternion(sampled["quaternion"]))
-        pose = tool.at(demonstration.point(at))
+        pose = tool.at(at)
         poses.append(pose)
         wrenches.append(move_wrench(sampled["wrench"], pose.position - tool.position))
         times.append(sampled["time"])

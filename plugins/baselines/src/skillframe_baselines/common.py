@@ -19,10 +19,11 @@ import numpy as np
 
 from skillframe.config import build
 from skillframe.demonstration.record import Demonstration
+from skillframe.document.frame import frame_of, read_frame
 from skillframe.errors import InputError
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, Pose, norm, rotation_matrix, rotation_vector
-from skillframe_baselines.document import Stiffness, Stop, frame_of
+from skillframe_baselines.document import Stiffness, Stop
 
 LARGEST_TURN = 2.5  # rad from the goal's attitude; beyond it a rotation vector is a poor coordinate
 LEARN_AGAIN = "learn the skill again"
@@ -61,10 +62,7 @@ class Phase:
         return np.diag(np.repeat([self.stiffness.translation, self.stiffness.rotation], 3))
 
 
-def body(
-    name: str, demonstrations: Sequence[Demonstration], options: LearnOptions, how: Following, model: Document,
-    stop: float,
-) -> Document:  # fmt: skip
+def body(name: str, frame: Document, how: Following, model: Document, stop: float) -> Document:
     """A document's `frame`, `phases` and `model`, checked."""
     phase = {
         "name": name,
@@ -73,7 +71,7 @@ def body(
         "blend": how.blend,
         "stop": {"time": stop},
     }
-    document = {"frame": frame_of(demonstrations[0], options), "phases": [phase], "model": model}
+    document = {"frame": frame, "phases": [phase], "model": model}
     phase_of(document, name)
     return document
 
@@ -128,9 +126,7 @@ def goal_model(goal: Pose) -> Document:
 
 def point_offset(document: Document) -> Float:
     """Centre of compliance minus learning point (3,), tool frame."""
-    frame = document["frame"]
-    result: Float = np.asarray(frame["center_of_compliance"], float) - np.asarray(frame["learned_at"], float)
-    return result
+    return read_frame(document).moved
 
 
 def state_of(pose: Pose, goal: Pose) -> Float:
@@ -158,12 +154,15 @@ def common_goal(ends: Sequence[Pose]) -> Pose:
     return Pose(np.mean([end.position for end in ends], axis=0), rotation_matrix(turns.mean(0)) @ first)
 
 
-def refuse(name: str, demonstrations: Sequence[Demonstration], options: LearnOptions) -> None:
-    """Refuse what none of these methods can learn from."""
-    if not demonstrations:
-        raise InputError(name, "learns from demonstrations, got none", "give at least one file")
+def frame_in_base(name: str, demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
+    """The document's `frame`; none of these methods learns in other axes than those of base.
+
+    Raises:
+        InputError: no demonstration, demonstrations of different tools, or other axes.
+    """
     if options.axes != "base":
         raise InputError(f"{name}: axes", f"is learned in base axes, not {options.axes!r}", "leave --axes away")
+    return frame_of(demonstrations, options)
 
 
 def positive(how: Following, name: str) -> None:

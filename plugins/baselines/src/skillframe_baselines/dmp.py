@@ -30,13 +30,13 @@ from skillframe_baselines.common import (
     array,
     body,
     following_words,
+    frame_in_base,
     goal_model,
     goal_of,
     phase_of,
     point_offset,
     pose_of,
     positive,
-    refuse,
     state_of,
 )  # fmt: skip
 from skillframe_baselines.document import SETTLE
@@ -92,16 +92,14 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
         MissingDependency: `movement_primitives` is not installed.
     """
     settings = configured(DmpSettings, options.settings, "dmp settings")
-    refuse("dmp", demonstrations, options)
+    frame = frame_in_base("dmp", demonstrations, options)
     positive(settings, "dmp")
     if settings.weights < 2 or settings.regularization < 0.0:
         raise InputError("dmp settings", "weights must be 2 or more, regularization 0 or more", "correct them")
-    common = align.aligned(align.recorded(demonstrations, options.at))
+    common = align.aligned(align.recorded(demonstrations, np.array(frame["learned_at"])))
     model = _fitted(common, settings)
     tau = float(common.time[-1])
-    return body(
-        "dmp", demonstrations, options, settings, {**goal_model(common.goal), **model}, (1.0 + SPRING) * tau + SETTLE
-    )
+    return body("dmp", frame, settings, {**goal_model(common.goal), **model}, (1.0 + SPRING) * tau + SETTLE)
 
 
 def _fitted(common: align.Aligned, settings: DmpSettings) -> dict[str, Any]:
@@ -250,6 +248,7 @@ def describe(document: Document) -> list[str]:
 def example() -> Document:
     """A primitive of two seconds without forcing, 50 mm below where the example demonstrations start."""
     from skillframe.document.file import new_document
+    from skillframe.document.frame import frame_of
     from skillframe.extend.registry import registry
     from skillframe.testing import example_demonstrations
 
@@ -260,5 +259,5 @@ def example() -> Document:
         **goal_model(goal), "tau": 2.0, "alpha_z": -float(np.log(0.01)), "centers": [1.0, 0.1, 0.01],
         "widths": [1.0, 10.0, 10.0], "weights": zero, "wrench_weights": zero,
     }  # fmt: skip
-    made = body("dmp", demonstrations, LearnOptions(), Following(), model, 3.0 + SETTLE)
+    made = body("dmp", frame_of(demonstrations, LearnOptions()), Following(), model, 3.0 + SETTLE)
     return new_document(registry().skill("dmp"), made, demonstrations)

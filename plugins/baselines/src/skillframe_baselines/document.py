@@ -14,6 +14,7 @@ import numpy as np
 
 from skillframe.config import build
 from skillframe.demonstration.record import Demonstration
+from skillframe.document.frame import frame_of
 from skillframe.errors import InputError
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, norm
@@ -102,22 +103,9 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
         blend=settings.blend,
         stop=Stop(time=trajectory["time"][-1] + SETTLE),
     )
-    body = {"frame": frame_of(demonstration, options), "phases": [asdict(phase)], "trajectory": trajectory}
+    body = {"frame": frame_of(demonstrations, options), "phases": [asdict(phase)], "trajectory": trajectory}
     phase_of(body)
     return body
-
-
-def frame_of(demonstration: Demonstration, options: LearnOptions) -> Document:
-    """The points of the contract; a replay takes no work anywhere, so that `work_at` is for the record only."""
-    at = demonstration.point(options.at).tolist()
-    hand = options.hand or demonstration.meta.get("hand")
-    return {
-        "learned_at": at,
-        "work_at": demonstration.point(hand).tolist() if isinstance(hand, str) else list(hand or at),
-        "center_of_compliance": at,
-        "axes": options.axes,
-        "frames": demonstration.meta.get("frames", {}),
-    }
 
 
 def resampled(demonstration: Demonstration) -> dict[str, list[Any]]:

@@ -28,13 +28,13 @@ from skillframe_baselines.common import (
     array,
     body,
     following_words,
+    frame_in_base,
     goal_model,
     goal_of,
     phase_of,
     point_offset,
     pose_of,
     positive,
-    refuse,
 )  # fmt: skip
 from skillframe_baselines.document import RATE, SETTLE
 from skillframe_baselines.replay import Motion, Replay, motion
@@ -63,11 +63,11 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
         InputError: no demonstration, or demonstrations or settings that do not suit.
     """
     settings = configured(GmrSettings, options.settings, "gmr settings")
-    refuse("gmr", demonstrations, options)
+    frame = frame_in_base("gmr", demonstrations, options)
     positive(settings, "gmr")
     if not 1 <= settings.least_components <= settings.most_components:
         raise InputError("gmr settings", "need 1 <= least_components <= most_components", "correct them")
-    common = align.aligned(align.recorded(demonstrations, options.at))
+    common = align.aligned(align.recorded(demonstrations, np.array(frame["learned_at"])))
     rows = np.concatenate(
         [np.column_stack([common.time, y, w]) for y, w in zip(common.state, common.wrench, strict=True)]
     )
@@ -79,7 +79,7 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     duration = float(common.time[-1])
     model: dict[str, Any] = {**goal_model(common.goal), "duration": duration}
     model |= {name: getattr(mixture, name).tolist() for name in mixture._fields}
-    return body("gmr", demonstrations, options, settings, model, duration + SETTLE)
+    return body("gmr", frame, settings, model, duration + SETTLE)
 
 
 def mixture_of(document: Document) -> gmm.Mixture:

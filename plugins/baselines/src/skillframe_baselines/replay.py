@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from skillframe.document.frame import read_frame
 from skillframe.errors import InputError
 from skillframe.extend.records import Document
 from skillframe.frames import (
@@ -168,11 +169,11 @@ def build(document: Document) -> Skill:
     Raises:
         InputError: the document holds no usable trajectory or phase.
     """
-    phase, frame = phase_of(document), document["frame"]
+    phase, frame = phase_of(document), read_frame(document)
     return Replay(
-        motion(document.get("trajectory", {}), np.asarray(frame["center_of_compliance"], dtype=float)),
+        motion(document.get("trajectory", {}), frame.center_of_compliance),
         absolute=phase.mode == "absolute",
-        turned=frame["axes"] == "phase_start",
+        turned=frame.from_start,
         stiffness=np.diag(np.repeat([phase.stiffness.translation, phase.stiffness.rotation], 3)),
         feedforward=phase.feedforward,
         blend=phase.blend,

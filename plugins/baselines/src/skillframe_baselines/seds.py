@@ -29,13 +29,13 @@ from skillframe_baselines.common import (
     array,
     body,
     following_words,
+    frame_in_base,
     goal_model,
     goal_of,
     phase_of,
     point_offset,
     pose_of,
     positive,
-    refuse,
     state_of,
 )  # fmt: skip
 from skillframe_baselines.document import RATE, SETTLE
@@ -96,11 +96,11 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     from skillframe_baselines.seds_fit import fit
 
     settings = configured(SedsSettings, options.settings, "seds settings")
-    refuse("seds", demonstrations, options)
+    frame = frame_in_base("seds", demonstrations, options)
     positive(settings, "seds")
     if settings.most_components < 1:
         raise InputError("seds settings.most_components", "must be 1 or more", "correct it")
-    recorded = align.recorded(demonstrations, options.at)
+    recorded = align.recorded(demonstrations, np.array(frame["learned_at"]))
     scale = np.maximum(np.sqrt(np.mean(np.concatenate(recorded.state) ** 2, axis=0)), LEAST)
     chosen = [_samples(state / scale) for state in recorded.state]
     states, velocities = (np.concatenate([part[i] for part in chosen]) for i in (0, 1))
@@ -109,7 +109,7 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     model = {**goal_model(recorded.goal), "scale": scale.tolist(), "fastest": fastest}
     model |= {name: getattr(dynamics, name).tolist() for name in dynamics._fields}
     longest = max(float(time[-1]) for time in recorded.time)
-    return body("seds", demonstrations, options, settings, model, PATIENCE * longest + SETTLE)
+    return body("seds", frame, settings, model, PATIENCE * longest + SETTLE)
 
 
 def _samples(states: Float) -> tuple[Float, Float]:

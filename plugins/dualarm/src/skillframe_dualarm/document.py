@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from skillframe.config import build
+from skillframe.document.frame import frame_at
 from skillframe.errors import InputError, UnknownName
 from skillframe.extend.records import Document
 from skillframe.frames import Float, norm
@@ -108,8 +109,7 @@ def relative(phase: Phase) -> Phase:
 
 def body(phase: Phase) -> Document:
     """The part of a skill document that this kind writes: `frame` and `phases`."""
-    point = list(phase.arms[0].center_of_compliance)
-    frame = {"work_at": point, "learned_at": point, "center_of_compliance": point, "axes": "phase_start"}
+    frame = frame_at(phase.arms[0].center_of_compliance, axes="phase_start")
     return {"frame": frame, "phases": [_plain(asdict(phase))]}
 
 

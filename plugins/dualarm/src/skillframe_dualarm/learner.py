@@ -7,14 +7,14 @@ relative task. Speed, stiffness and lead are this plug-in's, not the learner's.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from skillframe.config import build
 from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration.together import common_frames
 from skillframe.errors import InputError
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.extend.registry import registry
@@ -49,8 +49,8 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     ours = {key: value for key, value in options.settings.items() if key in Settings.__dataclass_fields__}
     theirs = {key: value for key, value in options.settings.items() if key not in ours}
     settings = build(Settings, ours, "--set")
-    frames = _frames(demonstrations)
-    known = demonstrations[0].meta.get("frames", {})  # without a tip of its own, it is the recorded tool point
+    known = common_frames(demonstrations)  # without a tip of its own, it is the recorded tool point
+    frames = _frames(known)
     at = options.at or ("tip" if "tip" in known else None)
     wanted = replace(options, at=at, axes="phase_start", settings=theirs)
     learner = registry().skill(PRIMITIVE).learn
@@ -59,9 +59,8 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     return body(relative(phase) if settings.mode == "relative" else phase)
 
 
-def _frames(demonstrations: Sequence[Demonstration]) -> dict[str, Vector]:
-    frames: dict[str, Any] = demonstrations[0].meta.get("frames", {})
-    return {"wrist": (0.0, 0.0, 0.0), "tip": (0.0, 0.0, 0.0)} | {k: (v[0], v[1], v[2]) for k, v in frames.items()}
+def _frames(known: Mapping[str, Sequence[float]]) -> dict[str, Vector]:
+    return {"wrist": (0.0, 0.0, 0.0), "tip": (0.0, 0.0, 0.0)} | {k: (v[0], v[1], v[2]) for k, v in known.items()}
 
 
 def phase_from(learned: Document, frames: dict[str, Vector], configuration: str) -> Phase:

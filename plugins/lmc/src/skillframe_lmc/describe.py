@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from math import degrees
-from typing import Any
 
 import numpy as np
 
+from skillframe.document.frame import SkillFrame, read_frame
 from skillframe.extend.records import Document
 from skillframe_lmc.phase import Part, Phase, read_phase
 from skillframe_lmc.words import axis_words, direction_words, exact_words, listed
@@ -15,7 +15,7 @@ from skillframe_lmc.words import axis_words, direction_words, exact_words, liste
 def describe(document: Document) -> list[str]:
     """The skill in words, the headline first."""
     phase = read_phase(document)
-    return [headline(phase), *_details(phase), *_messages(phase), _stops(phase), _frame(document["frame"])]
+    return [headline(phase), *_details(phase), *_messages(phase), _stops(phase), _frame(read_frame(document))]
 
 
 def headline(phase: Phase) -> str:
@@ -97,8 +97,11 @@ def _stops(phase: Phase) -> str:
     )
 
 
-def _frame(frame: dict[str, Any]) -> str:
-    axes = "base axes" if frame["axes"] == "base" else "axes of the tool's attitude at the start of the phase"
-    named = (("learned at", "learned_at"), ("hand at", "work_at"), ("centre of compliance", "center_of_compliance"))
-    points = [f"{what} ({', '.join(f'{x:g}' for x in frame[key])})" for what, key in named]
+def _frame(frame: SkillFrame) -> str:
+    axes = "axes of the tool's attitude at the start of the phase" if frame.from_start else "base axes"
+    named = (
+        ("learned at", frame.learned_at), ("hand at", frame.work_at),
+        ("centre of compliance", frame.center_of_compliance),
+    )  # fmt: skip
+    points = [f"{what} ({', '.join(f'{x:g}' for x in point)})" for what, point in named]
     return f"{axes}; {', '.join(points)} (m, tool frame)"

@@ -23,8 +23,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from skillframe.config import build
-from skillframe.demonstration.record import Demonstration, resolve_point
-from skillframe.demonstration.together import common_frames
+from skillframe.demonstration.record import Demonstration
+from skillframe.document.frame import frame_of
 from skillframe.errors import InputError
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, norm, unit
@@ -96,7 +96,7 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
         UnknownName: a point's name that the demonstrations do not know, or unknown axes.
     """
     settings = build(Settings, options.settings, "--set")
-    frame = _frame(demonstrations, options)
+    frame = frame_of(demonstrations, options)
     at, hand = np.array(frame["learned_at"]), np.array(frame["work_at"])
     tracks = [intervals.track(d, at, hand, options.axes) for d in demonstrations]
     translation = _learn_part("translation", tracks, intervals.translation, settings)
@@ -106,32 +106,6 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
         "phases": [_phase(translation, rotation, settings)],
         "settings": asdict(settings),
     }
-
-
-def _frame(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
-    frames = common_frames(demonstrations)
-    if options.axes not in ("base", "phase_start"):
-        raise InputError("--axes", f"{options.axes!r} is neither base nor phase_start", "choose one of the two")
-    at = resolve_point(options.at, frames)
-    hand = _hand(demonstrations[0], options, frames)
-    point = at.tolist()
-    return {
-        "work_at": point if hand is None else hand.tolist(),
-        "learned_at": point,
-        "center_of_compliance": point,
-        "axes": options.axes,
-        "frames": frames,
-    }
-
-
-def _hand(demonstration: Demonstration, options: LearnOptions, frames: dict[str, list[float]]) -> Float | None:
-    """Where the hand holds: the option, else the demonstration's own, else None."""
-    if options.hand is not None:
-        return resolve_point(options.hand, frames)
-    own = demonstration.meta.get("hand")
-    if isinstance(own, str):
-        return resolve_point(own, frames, f"{demonstration.source or 'demonstration'}: hand")
-    return None if own is None else np.array(own, dtype=float).reshape(3)
 
 
 def _learn_part(

@@ -14,6 +14,7 @@ import numpy as np
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.document.file import new_document
+from skillframe.document.frame import frame_at
 from skillframe.document.source import learned
 from skillframe.extend.records import Document, Illustration, LearnOptions, RowResult, RowRun
 from skillframe.extend.registry import registry
@@ -115,12 +116,11 @@ def _tilted_push() -> Document:
         }  # fmt: skip
 
     tip = list(load_world("valley", {}).tool.frames["tip"])
-    frame = {"work_at": tip, "learned_at": tip, "center_of_compliance": tip, "axes": "phase_start"}
     phase = {
         "translation": part([0.0, 0.0, 1.0], [[1.0, 0.0, 0.0]], np.array([0.0, 1000.0, 1000.0]), 0.03),
         "rotation": part(None, [], np.full(3, 20.0), 0.0), "pitch": None, "stop": {"stall_s": 0.6},
     }  # fmt: skip
-    return new_document(registry().skill("lmc"), {"frame": frame, "phases": [phase]})
+    return new_document(registry().skill("lmc"), {"frame": frame_at(tip, axes="phase_start"), "phases": [phase]})
 
 
 def _slides(job: RowRun, slope: float, friction: Float, tilt: Float, side: Float) -> np.ndarray:

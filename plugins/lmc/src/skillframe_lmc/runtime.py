@@ -18,6 +18,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.document.frame import read_frame
 from skillframe.extend.records import Document
 from skillframe.frames import Float, Pose, rotate, rotation_matrix, rotation_vector
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons, rows_of
@@ -33,7 +34,7 @@ def build(document: Document) -> LmcSkill:
     Raises:
         InputError: the document's phase is not as it should be.
     """
-    return LmcSkill(read_phase(document), document["frame"]["axes"] == "phase_start")
+    return LmcSkill(read_phase(document), read_frame(document).from_start)
 
 
 class LmcSkill(Skill):

@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 
 from skillframe.config import build
-from skillframe.demonstration.record import Demonstration, resolve_point
-from skillframe.demonstration.together import common_frames
+from skillframe.demonstration.record import Demonstration
+from skillframe.document.frame import frame_of
 from skillframe.errors import InputError
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, norm
@@ -22,7 +22,6 @@ from skillframe_search.phase import Kind, Path, Phase, Push, Stiffness, Stop
 SLOWEST, FASTEST = 0.005, 0.02  # what a demonstrated speed is held to [m/s]
 MOVING = 0.002  # m/s: slower is a dwell
 KEPT = 300  # places in the evidence, for the picture
-AXES = ("base", "phase_start")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +64,7 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions, kind: 
         UnknownName: a point that the demonstrations do not know.
     """
     settings = build(Settings, options.settings, "--set")
-    frame = _frame(demonstrations, options)
+    frame = frame_of(demonstrations, options)
     at, turned = np.array(frame["learned_at"]), options.axes == "phase_start"
     every = [samples(demonstration, at, turned) for demonstration in demonstrations]
     push = push_direction(every, settings.contact_n)
@@ -90,22 +89,6 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions, kind: 
     )
     body = {"frame": frame, "phases": [_plain(asdict(phase))], "settings": asdict(settings)}
     return body
-
-
-def _frame(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
-    """The points of the contract; a search takes no work anywhere, so that `work_at` is for the record only."""
-    frames = common_frames(demonstrations)
-    if options.axes not in AXES:
-        raise InputError("--axes", f"{options.axes!r} is neither base nor phase_start", "choose one of the two")
-    at = resolve_point(options.at, frames).tolist()
-    hand = options.hand or demonstrations[0].meta.get("hand")
-    return {
-        "learned_at": at,
-        "work_at": resolve_point(hand, frames).tolist() if isinstance(hand, str) else list(hand or at),
-        "center_of_compliance": at,
-        "axes": options.axes,
-        "frames": frames,
-    }
 
 
 def _path(kind: str, settings: Settings, found: Exploration, across: Float) -> Path:

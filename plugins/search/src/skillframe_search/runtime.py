@@ -15,6 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.document.frame import read_frame
 from skillframe.extend.records import Document
 from skillframe.frames import Float, Pose, move_wrench, rotate, rotate_spatial, rotation_matrix
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons, rows_of
@@ -37,9 +38,8 @@ def build(document: Document) -> SearchSkill:
     Raises:
         InputError: the document's phase is not as it should be.
     """
-    frame = document["frame"]
-    shift = np.array(frame["center_of_compliance"], dtype=float) - np.array(frame["learned_at"], dtype=float)
-    return SearchSkill(read_phase(document), frame["axes"] == "phase_start", shift)
+    frame = read_frame(document)
+    return SearchSkill(read_phase(document), frame.from_start, frame.moved)
 
 
 class SearchSkill(Skill):

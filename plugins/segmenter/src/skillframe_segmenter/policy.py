@@ -18,6 +18,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from skillframe.document.frame import read_frame
 from skillframe.extend.records import Document
 from skillframe.extend.registry import registry
 from skillframe.frames import Float
@@ -34,7 +35,7 @@ def build(document: Document) -> Policy:
     """The runnable policy of a checked document."""
     policy = read(document)
     parts = [Part(f"phase {i + 1}", _maker(sub)) for i, sub in enumerate(policy.skills)]
-    center = np.array(document["frame"]["center_of_compliance"], dtype=float)
+    center = read_frame(document).center_of_compliance
     return Policy(parts, policy, None if policy.model is None else Gate(policy.model, center))
 
 

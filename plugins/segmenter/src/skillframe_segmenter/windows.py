@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.demonstration.record import Demonstration, resolve_point
+from skillframe.demonstration.together import common_frames
 from skillframe.errors import InputError
 from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, norm, rotate, rotation_vector
 from skillframe_segmenter.settings import WINDOW_S
@@ -119,11 +120,8 @@ def cut_all(demonstrations: Sequence[Demonstration], at: str | None, axes: str) 
     """Windows of all demonstrations, and the point of the tool frame (3,) that was looked at.
 
     Raises:
-        InputError: no demonstration, or one that cannot be cut.
+        InputError: no demonstration, demonstrations of different tools, or one that cannot be cut.
         UnknownName: the point is no frame of the tool.
     """
-    if not demonstrations:
-        raise InputError("segment", "no demonstration given", "name at least one file")
-    frames = {name: point for d in demonstrations for name, point in d.meta.get("frames", {}).items()}
-    point = resolve_point(at, frames)
+    point = resolve_point(at, common_frames(demonstrations))
     return [windows(d, point, axes) for d in demonstrations], point
