@@ -23,10 +23,10 @@ from pathlib import Path
 from typing import Any
 
 from skillframe.campaign.axes import Value
-from skillframe.campaign.entries import parse_entry
 from skillframe.campaign.provenance import combined_hash, file_hashes
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.config import build, read_toml
+from skillframe.document.source import parse_source
 from skillframe.errors import InputError, UnknownName
 from skillframe.files import remove_temporary, sync_folder, write_whole
 from skillframe.paths import data_dirs
@@ -123,7 +123,7 @@ def _copy_skills(spec: CampaignSpec, target: Path) -> tuple[str, ...]:
             shutil.copyfile(part, target / "skills" / part.name)
         return f"skills/{source.name}"
 
-    return tuple(parse_entry(text).moved(place).text for text in spec.skills)
+    return tuple(parse_source(text, spec.folder).moved(place).text for text in spec.skills)
 
 
 def _copy_robot(spec: CampaignSpec, target: Path) -> str:

@@ -14,9 +14,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from skillframe.campaign.entries import parse_entry
 from skillframe.campaign.provenance import LIBRARIES, environment
 from skillframe.campaign.spec import CampaignSpec
+from skillframe.document.source import parse_source
 
 SAME = ("python", *LIBRARIES)
 
@@ -61,7 +61,7 @@ def needed_plugins(spec: CampaignSpec, ours: Identity) -> set[str]:
     """
     words, readers = {spec.world}, False
     for text in spec.skills:
-        entry = parse_entry(text)
+        entry = parse_source(text, spec.folder)
         readers |= bool(entry.kind)
         words |= {entry.kind} if entry.kind else set(_words(_document(spec.folder / entry.files[0])))
     return {

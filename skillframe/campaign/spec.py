@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from skillframe.campaign.axes import Axis, Value, cells_of, parse_axis
-from skillframe.campaign.entries import parse_entry
 from skillframe.campaign.quantities import GROUPS, check_axis, check_name, check_value, in_si
 from skillframe.campaign.validity import Plan, plan_of
 from skillframe.config import build, read_toml
+from skillframe.document.source import SkillSource, parse_source
 from skillframe.errors import InputError
 
 DURATION_S = 20.0
@@ -78,7 +78,7 @@ class CampaignSpec:
         trials: total number per skill.
         robot: a robot's name or a path to a robot.toml or its folder, relative to `folder`.
         world: a world's name.
-        skills: "FILE.skill.json" or "TYPE:DEMO,..." (see `entries`), relative to `folder`.
+        skills: "FILE.skill.json" or "TYPE:DEMO,..." (see `document.source`), relative to `folder`.
         vary: what varies, by quantity.
         fixed: quantities at one other value than the default, `[set]` in the file.
         coc: centre of compliance, "x,y,z" in the tool frame or a frame's name; None for the skill's own.
@@ -103,7 +103,7 @@ class CampaignSpec:
     @property
     def labels(self) -> tuple[str, ...]:
         """What the skills are called in results: "peg.skill.json", "replay:demo1.npz"."""
-        return tuple(parse_entry(text).label for text in self.skills)
+        return tuple(parse_source(text, self.folder).label for text in self.skills)
 
     @property
     def robot_name(self) -> str:
@@ -207,19 +207,24 @@ def _check_numbers(file: _File, path: Path) -> None:
 def _check_skills(file: _File, path: Path) -> None:
     if not file.skills:
         raise InputError(f"{path}: skills", "is empty", "name at least one skill file")
-    entries = [parse_entry(text) for text in file.skills]
+    entries = [_source(text, path, i) for i, text in enumerate(file.skills)]
     labels = [entry.label for entry in entries]
     for i, entry in enumerate(entries):
         where = f"{path}: skills[{i}]"
         if labels.index(entry.label) != i:
             raise InputError(where, f"a second skill is called {entry.label!r}", "rename one of the files")
-        if not entry.files:
-            raise InputError(where, f"{entry.text!r} names no file", f"write for example {entry.kind}:demo.npz")
         missing = [name for name in entry.files if not (path.parent / name).is_file()]
         if missing:
             raise InputError(where, f"no such file: {missing[0]}", "paths are relative to the campaign file")
     if file.expect.skill is not None and file.expect.skill not in labels:
         raise InputError(f"{path}: expect.skill", f"no skill is called {file.expect.skill!r}; there are {labels}")
+
+
+def _source(text: str, path: Path, index: int) -> SkillSource:
+    try:
+        return parse_source(text, path.parent)
+    except InputError as error:
+        raise InputError(f"{path}: skills[{index}]", f"{error.where!r} {error.problem}", error.fix) from None
 
 
 def _axis(name: str, value: Any, params: type, file: _File, path: Path) -> Axis:

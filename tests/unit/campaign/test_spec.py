@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from skillframe.campaign.axes import Axis
 from skillframe.campaign.folder import load, prepare, to_toml
 from skillframe.campaign.spec import CampaignSpec
+from skillframe.document.source import parse_source
 from skillframe.errors import InputError, SkillframeError
 
 
@@ -102,7 +103,10 @@ TOP = {
     ('["a.skill.json", "replay:demo.npz"]', "[]"): "name at least one skill",
     ('["a.skill.json", "replay:demo.npz"]', '["b.skill.json"]'): "no such file: b.skill.json",
     ('["a.skill.json", "replay:demo.npz"]', '["a.skill.json", "./a.skill.json"]'): "a second skill is called",
-    ('["a.skill.json", "replay:demo.npz"]', '["replay:"]'): "names no file",
+    (
+        '["a.skill.json", "replay:demo.npz"]',
+        '["replay:"]',
+    ): "skills[0]: 'replay:' names no demonstration; write for example replay:demo.npz",
     ("seed = 7", "seed = 7\nseed = 8"): "is not valid TOML",
 }
 
@@ -153,6 +157,35 @@ def test_a_prepared_folder_needs_nothing_but_itself(campaign, tmp_path):
     assert (spec.folder / spec.robot).is_file()
     assert (spec.folder / "robots" / "box" / "box.urdf").is_file()
     assert spec.fixed == {"world.clearance": 0.00025, "world.profile": "round", "world.segments": 48}
+
+
+AWKWARD = [  # text, label, files
+    ("v1:peg.skill.json", "v1:peg.skill.json", ["v1:peg.skill.json"]),
+    ("C:\\\\peg.skill.json", "C:\\peg.skill.json", ["C:\\peg.skill.json"]),
+    ("sub dir/a=b,c.skill.json", "a=b,c.skill.json", ["sub dir/a=b,c.skill.json"]),
+    ("lmc:sub dir/a,b.npz,t=1.npz,mode=x", "lmc:a,b.npz,t=1.npz,mode=x", ["sub dir/a,b.npz", "t=1.npz"]),
+    ("lmc:sub dir/t:1.npz,x.npz", "lmc:t:1.npz,x.npz", ["sub dir/t:1.npz", "x.npz"]),
+]
+
+
+@pytest.mark.parametrize(("text", "label", "files"), AWKWARD)
+def test_a_campaign_takes_skills_apart_as_run_does_and_so_does_its_folder(tmp_path, text, label, files):
+    from campaign_fakes import TEXT
+
+    (tmp_path / "sub dir").mkdir()
+    for file in files:
+        (tmp_path / file).write_text(file)
+    spec = read(write_campaign(tmp_path, text=TEXT.replace('"a.skill.json", "replay:demo.npz"', f'"{text}"')))
+    assert spec.labels == (label,)
+    assert list(parse_source(spec.skills[0], tmp_path).files) == files
+    copy = prepare(spec, tmp_path / "out", lambda spec: {"fixture": []}, FakeParams)
+    again = parse_source(copy.skills[0], copy.folder)
+    assert [(copy.folder / file).read_text() for file in again.files] == files
+    assert (again.kind, again.settings) == parse_source(spec.skills[0], tmp_path)[::2]
+    assert copy.labels == (label,)
+    for file in again.files:  # a report on a folder without its skills calls them the same
+        (copy.folder / file).unlink()
+    assert copy.labels == (label,)
 
 
 def test_fmu_files_beside_a_robot_are_copied_and_named_ones_are_not(campaign, tmp_path):
