@@ -12,7 +12,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-__all__ = ["absolute", "ceil", "clip", "copysign", "exp", "expm1", "maximum", "minimum", "sqrt", "stack", "where"]
+__all__ = [
+    "absolute", "both", "ceil", "clip", "copysign", "exp", "expm1", "maximum", "minimum", "sign", "sqrt", "square_sum",
+    "stack", "tanh", "where",
+]  # fmt: skip
 
 
 def absolute(x: Any) -> Any:
@@ -38,6 +41,26 @@ def exp(x: Any) -> Any:
 def expm1(x: Any) -> Any:
     """e^x - 1, exact for small x."""
     return ca.expm1(x) if isinstance(x, ca.SX) else np.expm1(x)
+
+
+def tanh(x: Any) -> Any:
+    """Hyperbolic tangent."""
+    return ca.tanh(x) if isinstance(x, ca.SX) else np.tanh(x)
+
+
+def sign(x: Any) -> Any:
+    """-1, 0 or 1."""
+    return ca.sign(x) if isinstance(x, ca.SX) else np.sign(x)
+
+
+def square_sum(x: Any) -> Any:
+    """Sum of the squares of a vector's components, (..., 1) of arrays (..., n)."""
+    return ca.sumsqr(x) if isinstance(x, ca.SX) else np.sum(np.square(x), axis=-1, keepdims=True)
+
+
+def both(one: Any, other: Any) -> Any:
+    """Whether both conditions hold."""
+    return ca.logic_and(one, other) if isinstance(one, ca.SX) else np.logical_and(one, other)
 
 
 def copysign(x: Any, sign: Any) -> Any:

@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from skillframe.frames import Float
+
+
+def rate_after(value: Any, rate: Any, shown: Any, w: Any, dt: Any) -> tuple[Any, Any]:
+    """Value and rate of the filter w^2 / (s + w)^2 after a sample of dt [s]; arrays or casadi expressions."""
+    rate = rate + dt * (w**2 * (shown - value) - 2.0 * w * rate)
+    return value + dt * rate, rate
 
 
 class RateFilter:
@@ -28,6 +36,5 @@ class RateFilter:
 
     def step(self, value: Float) -> Float:
         """The rate after a sample."""
-        self.rate = self.rate + self._dt * (self._w**2 * (value - self.value) - 2.0 * self._w * self.rate)
-        self.value = self.value + self._dt * self.rate
+        self.value, self.rate = rate_after(self.value, self.rate, value, self._w, self._dt)
         return self.rate

@@ -11,17 +11,26 @@ into a corner hunted with 60 to 800 N. The eighth power keeps a slide at 0.1 m/s
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
 
-from skillframe.frames import Float
+from skillframe.either import maximum, square_sum
 
 CONTACT, SETTING_OUT = 2.0, 1.5  # sigmas: from where on a force is contact, and an imbalance worth a motion
 LEAST = 1e-3  # N, for a force that is known
 
 
-def pursued(imbalance: Float, force: Float, sigma: Float) -> Float:
-    """Share (..., 1) of an imbalance T (..., 2) that is pursued, with a force (..., 2) known to sigma (..., 2) [N]."""
-    certain = np.maximum(sigma, LEAST)
-    touch = np.sum(np.square(force / (CONTACT * certain)), axis=-1, keepdims=True) ** 2
-    worth = np.sum(np.square(imbalance / (SETTING_OUT * certain)), axis=-1, keepdims=True) ** 4
-    return np.asarray(1.0 - touch / (1.0 + touch) / (1.0 + worth))
+def left_undone(imbalance: Any, force: Any, sigma: Any) -> Any:
+    """Share s / (1 + p) of an imbalance T that is not pursued; arrays or casadi expressions (`either`).
+
+    Args:
+        imbalance: T (..., 2) [N].
+        force: on the tool (..., 2) [N].
+        sigma: its standard deviation (..., 2) [N].
+
+    Returns:
+        (..., 1), from 0 to 1.
+    """
+    certain = maximum(sigma, LEAST)
+    touch = square_sum(force / (CONTACT * certain)) ** 2
+    worth = square_sum(imbalance / (SETTING_OUT * certain)) ** 4
+    return touch / (1.0 + touch) / (1.0 + worth)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from skillframe.errors import InputError
 from skillframe.frames import Float
-from skillframe.machine.law.doubt import pursued
+from skillframe.machine.law.doubt import left_undone
 from skillframe.machine.law.vdc import Bodies, Reduced, bodies, net_forces, parameters, piston_forces, reduced
 from skillframe.machine.law.vdc_actuator import (
     ContactFriction,
@@ -286,7 +286,7 @@ class HydraulicLaw:
         """(2,) f + f_ff, less what of the imbalance is not pursued."""
         pushing, error = measured.force[i] + reference.push[i], reference.position[i] - self._task.position(state)[:2]
         imbalance = reference.damping[i] @ reference.velocity[i] + reference.stiffness[i] @ error + pushing
-        return np.asarray(pushing - (1.0 - pursued(imbalance, measured.force[i], measured.sigma[i])) * imbalance)
+        return np.asarray(pushing - left_undone(imbalance, measured.force[i], measured.sigma[i]) * imbalance)
 
     def _pushed(self, state: ChainState, force: Float) -> Float:
         in_base = np.zeros(3)
@@ -297,7 +297,7 @@ class HydraulicLaw:
         if self.learning and self.gains.adaptation > 0.0:
             drive = np.einsum("bij,bi->bj", motion.regressor, motion.error)
             low, high = self._bounds
-            self.theta[i] = adapt(self.theta[i], drive, self.gains.adaptation, (low[i], high[i]), self._dt)
+            self.theta[i] = adapt(self.theta[i], self.gains.adaptation * drive, (low[i], high[i]), self._dt)
 
     def _slide(self, rate_r: Float, force: Float, ids: NDArray[np.int64]) -> Float:
         """Y_f (N, 2, k) at required velocities (N, k)."""
@@ -306,7 +306,7 @@ class HydraulicLaw:
 
     def _rub(self, shape: Float, error: Float, ids: NDArray[np.int64]) -> None:
         drive = np.array(self.gains.friction)[:, None] * shape * error[:, None, :]
-        moved = adapt(self.friction, drive, 1.0, self._friction_bounds, self._dt)
+        moved = adapt(self.friction, drive, self._friction_bounds, self._dt)
         self.friction[ids] = moved[ids]
 
     def _valves(self, measured: Measured, force: Float, motion: tuple[Float, Float, Float]) -> Demand:

@@ -13,12 +13,25 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from skillframe.either import clip
 from skillframe.frames import Float
-from skillframe.machine.law.doubt import CONTACT, LEAST, SETTING_OUT
-from skillframe.machine.law.vdc_actuator import ACROSS, Cylinders
+from skillframe.machine.law.doubt import left_undone
+from skillframe.machine.law.vdc_actuator import (
+    ContactFriction,
+    CylinderGains,
+    Cylinders,
+    across_deadband,
+    bristle_after,
+    coulomb_shape,
+    flow_demand,
+    inverse_valve,
+    pressure_force,
+)
+from skillframe.machine.law.vdc_adaptation import adapt
 from skillframe.machine.law.vdc_body import PARAMETERS
 from skillframe.robot.chain import ClosedChain
 from skillframe.robot.symbolic import BodyMotion, Expression, SymbolicChain, Twist
+from skillframe.signals.rates import rate_after
 
 CYLINDER = tuple(Cylinders.__dataclass_fields__)
 SCALARS = ("body", "adaptation", "coulomb", "viscous", "joint", "corner", "touch", "sliding", "dt", "fresh")
@@ -63,7 +76,7 @@ def law_function(chain: ClosedChain, axes: tuple[int, int]) -> ca.Function:
     rub_bounds = [_rows(f"friction_{name}", 2, k) for name in ("lower", "upper")]
     table, cylinder = _rows("cylinder", len(CYLINDER), k)
     k_x, k_f, deadband, supply = (ca.SX.sym(name, k) for name in ("k_x", "k_f", "deadband", "supply"))
-    c = {name: cylinder[i, :].T for i, name in enumerate(CYLINDER)} | {"supply_pressure": supply, "deadband": deadband}
+    c = Cylinders(**{name: cylinder[i, :].T for i, name in enumerate(CYLINDER)})
 
     tip = s.frame(chain.robot.tool_frames[0]).origin[list(axes)]
     rate, acceleration = _required(s, tip, reference, (force, sigma), gain["joint"])
@@ -73,22 +86,33 @@ def law_function(chain: ClosedChain, axes: tuple[int, int]) -> ca.Function:
     piston = s.q[chain.driven.tolist()]
     arms = ca.jacobian(piston, s.z)
     speed, speed_r = arms @ s.zd, arms @ rate
-    coulomb, bristle = _slid(c, kept, speed_r, force, gain)
+    bristle = bristle_after(c, _unless_fresh(kept[2, :].T, ca.SX(k, 1), gain), speed_r, gain["dt"])
+    contact = ContactFriction(force=gain["touch"], sliding=gain["sliding"])
+    coulomb = coulomb_shape(bristle, speed_r, force, contact)
     shape = ca.horzcat(coulomb, speed_r).T
     f_pr = ca.solve(arms.T, needed) + ca.sum1(shape * friction).T
-    value, slope = _filtered(f_pr, kept, gain)
-    valve = _valve(c, (p_a, p_b), (piston, speed, speed_r), (f_pr, slope), (k_x, k_f))
-    learned = _adapted(rows, gain["adaptation"] * ca.horzcat(*drive).T, [b[1] for b in bounds], gain["dt"])
+    value, slope = (_unless_fresh(old, new, gain) for old, new in ((kept[0, :].T, f_pr), (kept[1, :].T, 0.0 * f_pr)))
+    value, slope = rate_after(value, slope, f_pr, 2.0 * np.pi * gain["corner"], gain["dt"])
+    gains = CylinderGains(velocity=k_x, force=k_f)
+    demand = flow_demand(c, gains, (piston, speed, speed_r), (f_pr, slope), (p_a, p_b))
+    opened = inverse_valve(c, demand, piston, (p_a, p_b), supply)
+    valve = clip(across_deadband(deadband, opened), -1.0, 1.0)
+    lower, upper = (b[1] for b in bounds)
+    learned = adapt(rows, gain["adaptation"] * ca.horzcat(*drive).T, (lower, upper), gain["dt"])
     speeds = ca.vertcat(gain["coulomb"], gain["viscous"])
     drive_f = ca.repmat(speeds, 1, k) * shape * ca.repmat((speed_r - speed).T, 2, 1)
-    rubbed = _adapted(friction, drive_f, [b[1] for b in rub_bounds], gain["dt"])
+    lower, upper = (b[1] for b in rub_bounds)
+    rubbed = adapt(friction, drive_f, (lower, upper), gain["dt"])
     limits = (b[0] for b in (*bounds, *rub_bounds))
     inputs = (
         s.z, s.zd, p_a, p_b, force, sigma, *reference, theta, rub, memory, deadband, supply, *limits, table, k_x, k_f,
         scalars,
     )  # fmt: skip
-    present = c["area_a"] * p_a - c["area_b"] * p_b
-    return _function("law", inputs, (valve, f_pr, present, learned, rubbed, ca.vertcat(value.T, slope.T, bristle.T)))
+    return _function(
+        "law",
+        inputs,
+        (valve, f_pr, pressure_force(c, p_a, p_b), learned, rubbed, ca.vertcat(value.T, slope.T, bristle.T)),
+    )
 
 
 def _rows(name: str, rows: int, columns: int) -> tuple[Expression, Expression]:
@@ -131,7 +155,7 @@ def _required(
     s: SymbolicChain, tip: Expression, reference: list[Expression], force: tuple[Expression, Expression],
     joint_gain: Expression,
 ) -> tuple[Expression, Expression]:  # fmt: skip
-    """zd_r and zdd_r, equation (1) of `hydraulic`, `doubt.pursued` and `vdc_reference.required_motion`."""
+    """zd_r and zdd_r, equation (1) of `hydraulic`, `doubt` and `vdc_reference.required_motion`."""
     position, velocity, stiffness, damping, push, joint, joint_rate, given = reference
     n = s.z.shape[0]
     k, d = (ca.reshape(x, 2, 2).T for x in (stiffness, damping))
@@ -140,19 +164,12 @@ def _required(
     at, wanted = ca.vertcat(tip, s.z[2:]), ca.vertcat(position, joint)
     pushing = force[0] + push
     imbalance = d @ velocity + k @ (position - tip) + pushing
-    pushing = pushing - _left(imbalance, *force) * imbalance
+    pushing = pushing - left_undone(imbalance, *force) * imbalance
     ahead, pushed = ca.vertcat(velocity, joint_rate), ca.vertcat(inverse @ pushing, ca.SX(n - 2, 1))
     jacobian = ca.jacobian(at, s.z)
     rate = ca.solve(jacobian, ahead + lead @ (wanted - at) + pushed)
     acceleration = given + lead @ (ahead - jacobian @ s.zd) - s.drift_of(jacobian, rate)
     return rate, ca.solve(jacobian, acceleration)
-
-
-def _left(imbalance: Expression, force: Expression, sigma: Expression) -> Expression:
-    """1 less `doubt.pursued`."""
-    certain = ca.fmax(sigma, LEAST)
-    touch = ca.sumsqr(force / (CONTACT * certain)) ** 2
-    return touch / (1.0 + touch) / (1.0 + ca.sumsqr(imbalance / (SETTING_OUT * certain)) ** 4)
 
 
 def _needed(
@@ -188,52 +205,9 @@ def _moments(w: Expression) -> Expression:
     return ca.vertcat(*(ca.horzcat(*row) for row in rows))
 
 
-def _filtered(force: Expression, memory: Expression, gain: dict[str, Expression]) -> tuple[Expression, Expression]:
-    """Value and rate of the required force's filter, which starts at the first force it is shown."""
-    value = ca.if_else(gain["fresh"] > 0, force, memory[0, :].T)
-    slope = ca.if_else(gain["fresh"] > 0, 0.0 * force, memory[1, :].T)
-    w = 2.0 * np.pi * gain["corner"]
-    slope = slope + gain["dt"] * (w**2 * (force - value) - 2.0 * w * slope)
-    return value + gain["dt"] * slope, slope
-
-
-def _slid(
-    c: dict[str, Expression], kept: Expression, speed: Expression, force: Expression, gain: dict[str, Expression]
-) -> tuple[Expression, Expression]:
-    """Shape y and the bristles of `vdc_actuator`."""
-    way, before = ca.sign(speed), ca.if_else(gain["fresh"] > 0, ca.SX(*speed.shape), kept[2, :].T)
-    bristle = way + (before - way) * ca.exp(-ca.fabs(speed) * gain["dt"] / c["presliding_length"])
-    square = ca.sumsqr(force)
-    share = square / (square + gain["touch"] ** 2)
-    return bristle + share * (ca.tanh(speed / gain["sliding"]) - bristle), bristle
-
-
-def _valve(
-    c: dict[str, Expression], pressures: tuple[Any, ...], motion: tuple[Any, ...], force: tuple[Any, ...],
-    gains: tuple[Any, ...],
-) -> Expression:  # fmt: skip
-    """Valve commands of `vdc_actuator`, limited."""
-    (p_a, p_b), (x, xd, xd_r), (f_pr, slope), (k_x, k_f) = pressures, motion, force, gains
-    a, b = 1.0 / (c["arm_a"] + x), 1.0 / (c["arm_b"] + c["stroke"] - x)
-    feedback = k_x * (xd_r - xd) + k_f * (f_pr - (c["area_a"] * p_a - c["area_b"] * p_b))
-    leak = c["leakage"] * (a + b) * (p_a - p_b)
-    flow = feedback + slope / c["bulk_modulus"] + (c["area_a"] * a + c["area_b"] * b) * xd + leak
-
-    def root(drop: Expression) -> Expression:
-        return ca.sqrt(ca.fmax(drop, c["laminar_pressure"]))
-
-    high, low = c["supply_pressure"], c["return_pressure"]
-    extend = root(high - p_a) * a + root(p_b - low) * b
-    retract = root(high - p_b) * b + root(p_a - low) * a
-    opening = flow / (c["edge"] * ca.if_else(flow > 0, extend, retract))
-    overlap = c["deadband"]
-    return ca.fmin(ca.fmax((1.0 - overlap) * opening + overlap * ca.tanh(opening / ACROSS), -1.0), 1.0)
-
-
-def _adapted(rows: Expression, rate: Expression, bounds: list[Expression], dt: Expression) -> Expression:
-    """Parameters after a sample, `vdc_adaptation`: clipping says the same as projecting first."""
-    moved = rows + dt * rate
-    return ca.fmin(ca.fmax(moved, bounds[0]), bounds[1])
+def _unless_fresh(kept: Expression, new: Expression, gain: dict[str, Expression]) -> Expression:
+    """What was kept; at the first sample after a start, something new."""
+    return ca.if_else(gain["fresh"] > 0, new, kept)
 
 
 def cylinder_table(cylinders: Cylinders) -> Float:

@@ -152,7 +152,7 @@ class VdcController:
         """Adapt the parameters over a step of dt [s]."""
         if self.gains.adaptation > 0.0:
             drive = np.einsum("bij,bi->bj", motion.regressor, motion.error)
-            self.theta = adapt(self.theta, drive, self.gains.adaptation, self._bounds, dt)
+            self.theta = adapt(self.theta, self.gains.adaptation * drive, self._bounds, dt)
 
 
 def accompanying(motion: Bodies, true: Float, estimate: Float, gain: float) -> float:

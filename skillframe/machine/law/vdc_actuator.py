@@ -17,9 +17,11 @@ of u_e would throw a spool to and fro (an exact inverse has a step of 2 b).
 
 Where no force is fed back (c = 0) friction has a bristle's state z, as published (Zhu and Piedboeuf, 2005): a piston
 that stops keeps the friction it had, and turns it round over z_ss. Where one is, it is a flat function of the required
-velocity (our choice): there xd_r depends on the estimated force f, which a bristle answers a quarter of a period late
-and a steep tanh too strongly, so that the machine swung by 1 kN where it should have stood. f_0 is small, so that the
-two do not change places while a tool lands: with 1 kN it hopped.
+velocity (our choice): there xd_r depends on the estimated force f, which a bristle answers a quarter of a period late and
+a steep tanh too strongly, so that the machine swung by 1 kN where it should have stood. f_0 is small, so that the two
+do not change places while a tool lands: with 1 kN it hopped.
+
+The formulas of the law take arrays (..., n) or casadi expressions (n, 1), and cylinders and gains that hold either.
 """
 
 from __future__ import annotations
@@ -27,9 +29,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from skillframe.either import absolute, copysign, exp, maximum, sign, sqrt, square_sum, tanh, where
 from skillframe.errors import InputError
 from skillframe.frames import Float
 from skillframe.robot.driven import Actuation
@@ -105,9 +109,9 @@ def cylinders(actuation: Sequence[Actuation], where: object = "robot.toml") -> C
     )  # fmt: skip
 
 
-def pressure_force(c: Cylinders, pressure_a: Float, pressure_b: Float) -> Float:
+def pressure_force(c: Any, pressure_a: Any, pressure_b: Any) -> Any:
     """f_p (..., n) of chamber pressures [N]."""
-    return np.asarray(c.area_a * pressure_a - c.area_b * pressure_b)
+    return c.area_a * pressure_a - c.area_b * pressure_b
 
 
 def friction(c: Cylinders, velocity: Float) -> Float:
@@ -128,10 +132,10 @@ def friction_regressor(velocity: Float, shape: Float | None = None) -> Float:
     return np.stack([np.tanh(velocity / _SLIDING) if shape is None else shape, velocity], axis=-2)
 
 
-def bristle_after(c: Cylinders, bristle: Float, velocity: Float, dt: float) -> Float:
+def bristle_after(c: Any, bristle: Any, velocity: Any, dt: Any) -> Any:
     """Bristles z (..., n) after a sample of dt [s] at one velocity, exactly."""
-    way = np.sign(velocity)
-    return np.asarray(way + (bristle - way) * np.exp(-np.abs(velocity) * dt / c.presliding_length))
+    way = sign(velocity)
+    return way + (bristle - way) * exp(-absolute(velocity) * dt / c.presliding_length)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,11 +146,11 @@ class ContactFriction:
     sliding: float = 1e-2
 
 
-def coulomb_shape(bristle: Float, velocity: Float, force: Float, contact: ContactFriction) -> Float:
+def coulomb_shape(bristle: Any, velocity: Any, force: Any, contact: Any) -> Any:
     """Shape y (..., n) of bristles and required velocities (..., n), and the force (..., 2) on the tool."""
-    square = np.sum(np.square(force), axis=-1, keepdims=True)
+    square = square_sum(force)
     share = square / (square + contact.force**2)
-    return np.asarray(bristle + share * (np.tanh(velocity / contact.sliding) - bristle))
+    return bristle + share * (tanh(velocity / contact.sliding) - bristle)
 
 
 def pressure_rates(
@@ -163,15 +167,12 @@ def pressure_rates(
     return rate_a, rate_b
 
 
-def flow_demand(
-    c: Cylinders, gains: CylinderGains, motion: tuple[Float, Float, Float], force: tuple[Float, Float],
-    pressures: tuple[Float, Float],
-) -> Float:  # fmt: skip
+def flow_demand(c: Any, gains: Any, motion: tuple[Any, ...], force: tuple[Any, ...], pressures: tuple[Any, ...]) -> Any:
     """u_f (..., n).
 
     Args:
         c: the cylinders.
-        gains: k_x and k_f.
+        gains: k_x and k_f, as `CylinderGains` has them.
         motion: piston position, velocity and required velocity.
         force: required pressure force f_pr and its rate [N, N/s].
         pressures: of both chambers [Pa].
@@ -180,29 +181,27 @@ def flow_demand(
     a, b = 1.0 / (c.arm_a + x), 1.0 / (c.arm_b + c.stroke - x)
     feedback = gains.velocity * (xd_r - xd) + gains.force * (f_pr - pressure_force(c, p_a, p_b))
     leak = c.leakage * (a + b) * (p_a - p_b)
-    return np.asarray(feedback + rate / c.bulk_modulus + (c.area_a * a + c.area_b * b) * xd + leak)
+    return feedback + rate / c.bulk_modulus + (c.area_a * a + c.area_b * b) * xd + leak
 
 
-def inverse_valve(
-    c: Cylinders, demand: Float, x: Float, pressures: tuple[Float, Float], supply: Float | None = None
-) -> Float:  # fmt: skip
+def inverse_valve(c: Any, demand: Any, x: Any, pressures: tuple[Any, ...], supply: Any = None) -> Any:
     """Opening u_e (..., n) of the edges, not limited, that makes the flow demand; supply: p_S, nominal if not given."""
     (p_a, p_b), high = pressures, c.supply_pressure if supply is None else supply
     a, b = 1.0 / (c.arm_a + x), 1.0 / (c.arm_b + c.stroke - x)
-    extend = np.sqrt(_drop(c, high - p_a)) * a + np.sqrt(_drop(c, p_b - c.return_pressure)) * b
-    retract = np.sqrt(_drop(c, high - p_b)) * b + np.sqrt(_drop(c, p_a - c.return_pressure)) * a
-    return np.asarray(demand / (c.edge * np.where(demand > 0.0, extend, retract)))
+    extend = sqrt(_drop(c, high - p_a)) * a + sqrt(_drop(c, p_b - c.return_pressure)) * b
+    retract = sqrt(_drop(c, high - p_b)) * b + sqrt(_drop(c, p_a - c.return_pressure)) * a
+    return demand / (c.edge * where(demand > 0.0, extend, retract))
 
 
-def opening(deadband: Float, command: Float) -> Float:
+def opening(deadband: Any, command: Any) -> Any:
     """u_e (..., n) that a command opens; the overlap opens nothing."""
-    return np.asarray(np.copysign(np.maximum(np.abs(command) - deadband, 0.0) / (1.0 - deadband), command))
+    return copysign(maximum(absolute(command) - deadband, 0.0) / (1.0 - deadband), command)
 
 
-def across_deadband(deadband: Float, opening: Float) -> Float:
+def across_deadband(deadband: Any, opening: Any) -> Any:
     """Command u (..., n) that opens a valve of overlap b as wanted, u_e."""
-    return np.asarray((1.0 - deadband) * opening + deadband * np.tanh(opening / ACROSS))
+    return (1.0 - deadband) * opening + deadband * tanh(opening / ACROSS)
 
 
-def _drop(c: Cylinders, drop: Float) -> Float:
-    return np.maximum(drop, c.laminar_pressure)
+def _drop(c: Any, drop: Any) -> Any:
+    return maximum(drop, c.laminar_pressure)

@@ -9,8 +9,11 @@ accompanying function needs.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from skillframe.either import clip
 from skillframe.frames import Float
 
 
@@ -20,10 +23,18 @@ def projected_rate(estimate: Float, drive: Float, gain: float, lower: Float, upp
     return np.where(outward, 0.0, gain * drive)
 
 
-def adapt(estimate: Float, drive: Float, gain: float, bounds: tuple[Float, Float], dt: float) -> Float:
-    """Parameters after a step of dt [s], kept within the bounds."""
-    lower, upper = bounds
-    return np.clip(estimate + dt * projected_rate(estimate, drive, gain, lower, upper), lower, upper)
+def adapt(estimate: Any, rate: Any, bounds: tuple[Any, Any], dt: Any) -> Any:
+    """Parameters after a step of dt [s]; arrays or casadi expressions (`either`).
+
+    From within the bounds, to clip says the same as to set the rate to zero at them first.
+
+    Args:
+        estimate: parameters (...).
+        rate: rho s of each.
+        bounds: lower and upper, of each.
+        dt: [s].
+    """
+    return clip(estimate + dt * rate, *bounds)
 
 
 def relative_bounds(nominal: Float, share: float) -> tuple[Float, Float]:

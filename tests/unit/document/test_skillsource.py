@@ -174,7 +174,7 @@ def test_files_that_do_not_exist_are_told_apart_by_the_form_of_the_text(text, ki
 
 @pytest.mark.parametrize("text", ["lmc:", "lmc:,", "lmc:mode=absolute"])
 def test_a_kind_without_a_demonstration_says_what_to_write(text):
-    with pytest.raises(InputError, match="names no demonstration; write for example lmc:demo.npz"):
+    with pytest.raises(InputError, match=r"names no demonstration; write for example lmc:demo.npz"):
         parse_source(text)
 
 

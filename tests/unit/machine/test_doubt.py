@@ -5,11 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from skillframe.machine.law.doubt import pursued
+from skillframe.machine.law.doubt import left_undone
 
 SIGMA = np.array([[1000.0, 500.0]])
 ANY = st.floats(-1e4, 1e4)
 FAR = 1e5 * SIGMA / 1000.0  # a hundred sigmas
+
+
+def pursued(imbalance, force, sigma):
+    return 1.0 - left_undone(imbalance, force, sigma)
 
 
 @given(ANY, ANY)
