@@ -13,8 +13,8 @@ import casadi as ca
 import numpy as np
 
 __all__ = [
-    "absolute", "both", "ceil", "clip", "copysign", "exp", "expm1", "maximum", "minimum", "sign", "sqrt", "square_sum",
-    "stack", "tanh", "where",
+    "absolute", "both", "ceil", "clip", "copysign", "dot", "exp", "expm1", "maximum", "minimum", "sign", "sqrt",
+    "square_sum", "stack", "tanh", "where",
 ]  # fmt: skip
 
 
@@ -56,6 +56,11 @@ def sign(x: Any) -> Any:
 def square_sum(x: Any) -> Any:
     """Sum of the squares of a vector's components, (..., 1) of arrays (..., n)."""
     return ca.sumsqr(x) if isinstance(x, ca.SX) else np.sum(np.square(x), axis=-1, keepdims=True)
+
+
+def dot(x: Any, y: Any) -> Any:
+    """Product of two vectors, (...) of arrays (..., n)."""
+    return ca.dot(x, y) if isinstance(x, ca.SX) else np.sum(x * y, axis=-1)
 
 
 def both(one: Any, other: Any) -> Any:

@@ -118,11 +118,18 @@ def steady_gain(noise: Float, walk: Float, dt: float) -> Gain:
     return Gain(p[..., 0, 0] / innovation, p[..., 1, 0] / innovation / dt, innovation)
 
 
+def steady_step(value: Any, slope: Any, measured: Any, gain: Gain, dt: float) -> tuple[Any, Any]:
+    """Equation (1): value and slope after a measurement; arrays (..., n) or casadi expressions."""
+    value = value + dt * slope
+    error = measured - value
+    return value + gain.value * error, slope + gain.slope * error
+
+
 class SteadyWrenchFilter:
     """The converged filter for N wrenches in lock-step, equation (1): array arithmetic only, each row for itself."""
 
     def __init__(self, gain: Gain, dt: float) -> None:
-        self._value_gain, self._slope_gain, self._dt = gain.value, gain.slope, dt
+        self._gain, self._dt = gain, dt
         self._value = np.zeros((0, 6))
         self._slope = np.zeros((0, 6))
 
@@ -133,14 +140,8 @@ class SteadyWrenchFilter:
 
     def step(self, wrench: Float) -> Float:
         """Take in one measurement (N, 6) and return the filtered wrench (N, 6), a fresh array."""
-        value = self._slope * self._dt
-        value += self._value
-        error = wrench - value
-        self._slope += self._slope_gain * error
-        error *= self._value_gain
-        value += error
-        self._value = value
-        return value.copy()
+        self._value, self._slope = steady_step(self._value, self._slope, wrench, self._gain, self._dt)
+        return self._value.copy()
 
 
 class WrenchFilter:

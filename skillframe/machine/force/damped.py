@@ -10,6 +10,8 @@ other half smooths better than L (`impulse`).
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from skillframe.frames import Float
@@ -18,6 +20,28 @@ from skillframe.frames import Float
 def share_of(corner: float, dt: float) -> float:
     """Share a for a corner K / 2 pi [Hz] and a sample time [s]."""
     return float(-np.expm1(-2.0 * np.pi * corner * dt))
+
+
+def damped(middle: Any, value: Any, shown: Any, share: float) -> tuple[Any, Any]:
+    """Both poles of L after a sample, the second one's value last; arrays or casadi expressions."""
+    middle = middle + share * (shown - middle)
+    return middle, value + share * (middle - value)
+
+
+def undamped(middle: Any, before: Any, value: Any, inverse: float) -> tuple[Any, Any]:
+    """Equation (1), arrays or casadi expressions.
+
+    Args:
+        middle: the first pole, before.
+        before: what L said before.
+        value: what L says now.
+        inverse: 1/a.
+
+    Returns:
+        The first pole now, and what L was shown.
+    """
+    now = before + inverse * (value - before)
+    return now, middle + inverse * (now - middle)
 
 
 class CriticallyDamped:
@@ -41,12 +65,7 @@ class CriticallyDamped:
         """Filtered value, to be read and not kept."""
         if self._middle is None:
             self._middle, self._value = value.copy(), value.copy()
-        left = value - self._middle
-        left *= self._share
-        self._middle += left
-        np.subtract(self._middle, self._value, out=left)
-        left *= self._share
-        self._value += left
+        self._middle, self._value = damped(self._middle, self._value, value, self._share)
         return self._value
 
 
@@ -63,7 +82,6 @@ class Undamped:
 
     def step(self, value: Float) -> Float:
         """What L was given when it answered with a value."""
-        middle = self._value + self._inverse * (value - self._value)
-        result = self._middle + self._inverse * (middle - self._middle)
-        self._middle, self._value = middle, value.copy()
+        self._middle, result = undamped(self._middle, self._value, value, self._inverse)
+        self._value = value.copy()
         return np.asarray(result)

@@ -15,6 +15,9 @@ Only Y's and P's errors are kept, so that nothing grows with time.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from skillframe.errors import SkillframeError
@@ -25,6 +28,25 @@ def gains(corner: float) -> Float:
     """Gains of equation (2) for w / 2 pi [Hz]."""
     w, first, second = 2.0 * np.pi * corner, 2.0 * np.sqrt(1.0 + np.sqrt(0.5)), 2.0 + np.sqrt(2.0)
     return np.array([first * w, second * w**2, first * w**3, w**4])
+
+
+class Impulse(NamedTuple):
+    """The filter's state, arrays or casadi expressions: f [N], s [N/s], and the errors of P and Y."""
+
+    force: Any
+    slope: Any
+    once: Any
+    twice: Any
+
+    def after(self, shown: Any, dt: float, gain: Sequence[float]) -> Impulse:
+        """The state after a sample of a force, with `gains` times dt [s]."""
+        to_twice, to_once, to_force, to_slope = gain
+        left = shown - self.force
+        error = self.twice + dt * self.once + (0.5 * dt * dt) * left
+        return Impulse(
+            force=self.force + dt * self.slope + to_force * error, slope=self.slope + to_slope * error,
+            once=self.once + dt * left - to_once * error, twice=error - to_twice * error,
+        )  # fmt: skip
 
 
 class ImpulseFilter:
@@ -45,20 +67,13 @@ class ImpulseFilter:
 
     def start(self, force: Float) -> None:
         """Begin at a force (N, m) with no slope."""
-        self._force: Float = force.copy()
-        self._slope, self._once, self._twice = (np.zeros_like(force) for _ in range(3))
+        self._state = Impulse(force.copy(), *(np.zeros_like(force) for _ in range(3)))
 
     def step(self, force: Float) -> Float:
         """The filtered force (N, m) after a sample of it."""
-        h, (to_twice, to_once, to_force, to_slope) = self._dt, self._gains
-        left = force - self._force
-        error = self._twice + h * self._once + (0.5 * h * h) * left
-        self._once = self._once + h * left - to_once * error
-        self._twice = error - to_twice * error
-        self._force = self._force + h * self._slope + to_force * error
-        self._slope = self._slope + to_slope * error
-        return self._force
+        self._state = self._state.after(force, self._dt, self._gains)
+        return np.asarray(self._state.force)
 
     def ahead(self, time: float) -> Float:
         """The force (N, m) that the slope promises for `time` [s] after the last sample, f + s time."""
-        return np.asarray(self._force + time * self._slope)
+        return np.asarray(self._state.force + time * self._state.slope)

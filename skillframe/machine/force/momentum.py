@@ -16,16 +16,18 @@ of the crane's cylinders are some 400 N at the tool, whatever is done).
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.either import absolute, both, dot, exp, square_sum, where
 from skillframe.errors import SkillframeError
 from skillframe.frames import Float
 from skillframe.machine.force.damped import CriticallyDamped, Undamped
 from skillframe.machine.force.identification import Identification, IdentificationSettings
 from skillframe.machine.force.impulse import ImpulseFilter
+from skillframe.machine.law.vdc_actuator import pressure_force
 from skillframe.signals.kalman import Gain, SteadyWrenchFilter, steady_gain
 
 if TYPE_CHECKING:
@@ -33,7 +35,7 @@ if TYPE_CHECKING:
     from skillframe.machine.law.vdc_actuator import Cylinders
     from skillframe.robot.chain import ClosedChain
 
-__all__ = ["Estimate", "ForceEstimator", "ForceSettings", "MomentumRate", "force_from_residual", "standing_out"]
+__all__ = ["Estimate", "ForceEstimator", "ForceSettings", "force_from_residual", "standing_out", "unaccounted"]
 
 
 class Estimate(NamedTuple):
@@ -100,52 +102,65 @@ class ForceSettings:
                 raise SkillframeError(f"force estimate: {name} must be positive, got {getattr(self, name)}")
 
 
-class MomentumRate:
-    """What known forces leave of p', for N machines in lock-step; p' is a difference over a sample of dt [s]."""
-
-    def __init__(self, dt: float) -> None:
-        self._dt = dt
-        self._momentum: Float | None = None
-
-    def start(self) -> None:
-        """Forget the past; the next step takes the machine to be in balance."""
-        self._momentum = None
-
-    def step(self, momentum: Float, known: Float) -> Float:
-        """(N, n) p' less the rate of it that is accounted for, of p (N, n)."""
-        before = momentum if self._momentum is None else self._momentum
-        self._momentum = momentum
-        return np.asarray((momentum - before) / self._dt - known)
+# The formulas of one sample: arrays over machines or casadi expressions of one (`either`).
 
 
-def force_from_residual(jacobian: Float, residual: Float, variance: Float) -> tuple[Float, Float]:
-    """Equation (2): the force (N, 2) that explains residuals (N, n) of variances (N, n) best, and its sigma (N, 2).
+def unaccounted(momentum: Any, before: Any, known: Any, dt: float) -> Any:
+    """What known forces leave of p' (..., n), the difference of p over a sample of dt [s]."""
+    return (momentum - before) / dt - known
+
+
+def sliding_push(c: Any, pressures: tuple[Any, Any], shape: Any, speed: Any) -> Any:
+    """F_p - F_f (..., k) [N] of pistons.
 
     Args:
-        jacobian: J (N, 2, n) of the tool's point.
+        c: the cylinders.
+        pressures: of both chambers (..., k) [Pa].
+        shape: of Coulomb friction (..., k), from -1 to 1.
+        speed: of the pistons (..., k) [m/s].
+    """
+    return pressure_force(c, *pressures) - c.coulomb_friction * shape - c.viscous_friction * speed
+
+
+def slid_since(since: Any, rate: Any, before: Any, s: ForceSettings, dt: float) -> Any:
+    """For how long pistons (..., k) have been going one way [s], from their filtered rates now and before [m/s]."""
+    going = both(absolute(rate) > s.least_speed, rate * before > 0.0)
+    return where(going, since + dt, 0.0)
+
+
+def hidden_friction(c: Any, rate: Any, sliding: Any, s: ForceSettings) -> Any:
+    """Coulomb friction (..., k) [N] that pistons may hide, all of it where they do not slide."""
+    return c.coulomb_friction * where(sliding, exp(-((rate / s.stiction_speed) ** 2)), 1.0)
+
+
+def force_from_residual(x: Any, z: Any, residual: Any, variance: Any) -> tuple[Any, Any, Any, Any]:
+    """Equation (2): the force that explains residuals (..., n) of variances (..., n) best.
+
+    Args:
+        x: J's first row (..., n), of the tool's point along base x.
+        z: its second, along base z.
         residual: what is left for J^T f.
         variance: diagonal of W^-1.
+
+    Returns:
+        Components (...) of the force along x and z [N], and the variance of each [N^2].
     """
-    weighted = jacobian / variance[:, None, :]
-    a = weighted @ np.swapaxes(jacobian, -1, -2)
-    determinant = a[:, 0, 0] * a[:, 1, 1] - a[:, 0, 1] * a[:, 1, 0]
-    covariance = a[:, ::-1, ::-1] * _COFACTORS / determinant[:, None, None]  # inverse of a symmetric 2 x 2 matrix
-    force = covariance @ (weighted @ residual[..., None])
-    return force[..., 0], np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
+    by_x, by_z = x / variance, z / variance
+    xx, xz, zx, zz = dot(by_x, x), dot(by_x, z), dot(by_z, x), dot(by_z, z)
+    felt_x, felt_z, determinant = dot(by_x, residual), dot(by_z, residual), xx * zz - xz * zx
+    along_x, along_z = (zz * felt_x - xz * felt_z) / determinant, (xx * felt_z - zx * felt_x) / determinant
+    return along_x, along_z, zz / determinant, xx / determinant
 
 
-def standing_out(force: Float, sigma: Float, doubted: float) -> Float:
-    """What of forces (N, 2) stands out of their sigma: f d^4 / (1 + d^4), d^2 the sum of (f_i / (doubted sigma_i))^2.
+def standing_out(force: Any, sigma: Any, doubted: float) -> Any:
+    """What of forces (..., 2) stands out of their sigma: f d^4 / (1 + d^4), d^2 the sum of (f_i / (doubted sigma_i))^2.
 
     Our choice, because a law that answers a force which standing pistons only seem to show sets them moving, and the
     force turns round: with its tool in the air the crane swung by 60 mm/s where it should have stood. The fourth power
     leaves 8 kN as they are, to 0.1 %.
     """
-    power = np.square(np.sum(np.square(force / (doubted * sigma)), axis=-1, keepdims=True))
-    return np.asarray(force * (power / (1.0 + power)))
-
-
-_COFACTORS = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    power = square_sum(force / (doubted * sigma)) ** 2
+    return force * (power / (1.0 + power))
 
 
 class ForceEstimator:
@@ -171,7 +186,7 @@ class ForceEstimator:
         self.settings, self._chain, self._cylinders, self._dt = settings or ForceSettings(), chain, cylinders, dt
         s = self.settings
         self.identification = Identification(count, len(cylinders.area_a), s.identify)
-        self._left, self._filter = MomentumRate(dt), CriticallyDamped(s.corner, dt)
+        self._filter = CriticallyDamped(s.corner, dt)
         self._rate_share = float(-np.expm1(-2.0 * np.pi * s.rate_corner * dt))
         self._wrench = None if s.force_corner is None else ImpulseFilter(s.force_corner, dt)
         self._undamped, self._feedback = Undamped(s.corner, dt), force_filter(s.feedback_corner, dt)
@@ -193,7 +208,7 @@ class ForceEstimator:
     def start(self, measured: Measured) -> None:
         """Begin at a measurement, the machine at rest."""
         count = len(measured.z)
-        self._left.start()
+        self._momentum: Float | None = None
         self._filter.start()
         self._rate: Float = np.zeros((count, len(self._cylinders.area_a)))
         self._since: Float = np.zeros_like(self._rate)
@@ -208,11 +223,12 @@ class ForceEstimator:
         before = self._rate
         self._rate = before + self._rate_share * (terms.piston_rate - self._rate)
         shape = np.tanh(self._rate / self.settings.sliding_speed)
-        push = c.area_a * measured.pressure_a - c.area_b * measured.pressure_b
-        push -= c.coulomb_friction * shape + c.viscous_friction * terms.piston_rate
+        push = sliding_push(c, (measured.pressure_a, measured.pressure_b), shape, terms.piston_rate)
         known = pull(terms.arms, push) + terms.drift - terms.gravity
         momentum = (terms.mass @ measured.rate[..., None])[..., 0]
-        columns = self._filter.step(self._fill(self._left.step(momentum, known), terms, shape))
+        left = unaccounted(momentum, momentum if self._momentum is None else self._momentum, known, self._dt)
+        self._momentum = momentum
+        columns = self._filter.step(self._fill(left, terms, shape))
         residual, jacobian, phi = columns[..., 0], np.swapaxes(columns[..., 1:3], -1, -2), columns[..., 3:]
         sliding = self._sliding(before)
         if self.calibrating and self._tick % self._every == 0:
@@ -220,7 +236,9 @@ class ForceEstimator:
             self.identification.update(phi, residual, self._noise, rows)
         self.regressors = phi
         self.residual = residual - (phi @ self.identification.theta[..., None])[..., 0]
-        self.raw, sigma = force_from_residual(jacobian, self.residual, self._variance(terms.arms, sliding))
+        variance = self._variance(terms.arms, sliding)
+        explained = force_from_residual(jacobian[..., 0, :], jacobian[..., 1, :], self.residual, variance)
+        self.raw, sigma = np.stack(explained[:2], axis=-1), np.sqrt(np.stack(explained[2:], axis=-1))
         if self._tick == 0:
             self._begin()
         self._tick += 1
@@ -248,17 +266,15 @@ class ForceEstimator:
 
     def _sliding(self, before: Float) -> NDArray[np.bool_]:
         """(N, k) has the piston been going one way for long enough?"""
-        going = (np.abs(self._rate) > self.settings.least_speed) & (self._rate * before > 0.0)
-        self._since = np.where(going, self._since + self._dt, 0.0)
+        self._since = slid_since(self._since, self._rate, before, self.settings, self._dt)
         return np.asarray(self._since >= self.settings.settle)
 
     def _variance(self, arms: Float, sliding: NDArray[np.bool_]) -> Float:
         """(N, n) of each joint's residual: noise, and what its pistons' stiction may hide."""
         if not self.settings.weighted:
             return np.broadcast_to(self._noise.mean(), sliding.shape)
-        speed = self._rate / self.settings.stiction_speed
-        share = np.where(sliding, np.exp(-np.square(speed)), 1.0)
-        return self._noise + pull(np.square(arms), np.square(self._cylinders.coulomb_friction * share))
+        hidden = hidden_friction(self._cylinders, self._rate, sliding, self.settings)
+        return self._noise + pull(np.square(arms), np.square(hidden))
 
     def _begin(self) -> None:
         self._feedback.start(self.raw)

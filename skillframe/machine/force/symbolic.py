@@ -13,12 +13,20 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from skillframe.machine.force.damped import share_of
-from skillframe.machine.force.impulse import gains
-from skillframe.machine.force.momentum import ForceSettings
+from skillframe.machine.force.damped import damped, share_of, undamped
+from skillframe.machine.force.impulse import Impulse, gains
+from skillframe.machine.force.momentum import (
+    ForceSettings,
+    force_from_residual,
+    hidden_friction,
+    slid_since,
+    sliding_push,
+    standing_out,
+    unaccounted,
+)
 from skillframe.machine.law.vdc_actuator import Cylinders
 from skillframe.robot.symbolic import Expression
-from skillframe.signals.kalman import Gain
+from skillframe.signals.kalman import Gain, steady_step
 
 
 class Memory:
@@ -68,19 +76,17 @@ def look_function(c: Cylinders, s: ForceSettings, n: int, dt: float) -> ca.Funct
     before = m["rate"]
     rate = before + float(-np.expm1(-2.0 * np.pi * s.rate_corner * dt)) * (v["piston_rate"] - before)
     shape = ca.tanh(rate / s.sliding_speed)
-    push = ca.DM(c.area_a) * v["p_a"] - ca.DM(c.area_b) * v["p_b"]
-    push = push - ca.DM(c.coulomb_friction) * shape - ca.DM(c.viscous_friction) * v["piston_rate"]
-    momentum = v["mass"] @ v["rate"]
-    started = ca.if_else(fresh > 0, momentum, m["momentum"])
-    left = (momentum - started) / dt - (v["arms"].T @ push + v["drift"] - v["gravity"])
+    c = Cylinders(**{name: ca.DM(getattr(c, name)) for name in Cylinders.__dataclass_fields__})
+    push = sliding_push(c, (v["p_a"], v["p_b"]), shape, v["piston_rate"])
+    momentum, known = v["mass"] @ v["rate"], v["arms"].T @ push + v["drift"] - v["gravity"]
+    left = unaccounted(momentum, ca.if_else(fresh > 0, momentum, m["momentum"]), known, dt)
     spread = v["arms"].T
     columns = ca.horzcat(
         left, v["jacobian"].T, -spread * ca.repmat(shape.T, n, 1), -spread * ca.repmat(v["piston_rate"].T, n, 1),
         -v["load"],
     )  # fmt: skip
     columns = _damped(m, columns, fresh, share_of(s.corner, dt))
-    going = ca.logic_and(ca.fabs(rate) > s.least_speed, rate * before > 0.0)
-    since = ca.if_else(going, m["since"] + dt, 0.0)
+    since = slid_since(m["since"], rate, before, s, dt)
     sliding = since >= s.settle
     m["rate"], m["since"], m["momentum"] = rate, since, momentum
     level, variance = sliding + (since >= s.settle + s.memory), _variance(c, s, v["arms"], rate, sliding)
@@ -101,16 +107,13 @@ def weigh_function(s: ForceSettings, n: int, k: int, feedback: Gain, dt: float) 
     fresh = ca.SX.sym("fresh")
     m = Memory("memory", **dict.fromkeys(("middle", "seen", *_KALMAN, *_FEEDBACK), (2, 1)))
     left = residual - phi @ theta
-    weighted = jacobian / ca.repmat(variance.T, 2, 1)
-    a, b = weighted @ jacobian.T, weighted @ left
-    determinant = a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0]
-    raw = ca.vertcat(a[1, 1] * b[0] - a[0, 1] * b[1], a[0, 0] * b[1] - a[1, 0] * b[0]) / determinant
-    sigma = ca.sqrt(ca.vertcat(a[1, 1], a[0, 0]) / determinant)
+    explained = force_from_residual(jacobian[0, :].T, jacobian[1, :].T, left, variance)
+    raw, sigma = ca.vertcat(*explained[:2]), ca.sqrt(ca.vertcat(*explained[2:]))
     force = _smooth(m, raw, fresh, s, dt)
     late = _steady(m, raw, fresh, feedback, dt)
-    power = ca.sumsqr(late / (s.doubted * sigma)) ** 2
+    answered = standing_out(late, sigma, s.doubted)
     inputs = [*(pair[0] for pair in given), m.symbol, fresh]
-    return _function("weigh", inputs, [left, raw, force, sigma, late, late * (power / (1.0 + power)), m.after()])
+    return _function("weigh", inputs, [left, raw, force, sigma, late, answered, m.after()])
 
 
 _KALMAN, _FEEDBACK = ("force", "slope", "once", "twice"), ("late", "late_slope")
@@ -119,9 +122,7 @@ _KALMAN, _FEEDBACK = ("force", "slope", "once", "twice"), ("late", "late_slope")
 def _damped(m: Memory, x: Expression, fresh: Expression, share: float) -> Expression:
     """`CriticallyDamped`."""
     middle, value = (ca.if_else(fresh > 0, x, m[part]) for part in ("middle", "value"))
-    middle = middle + share * (x - middle)
-    value = value + share * (middle - value)
-    m["middle"], m["value"] = middle, value
+    m["middle"], m["value"] = middle, value = damped(middle, value, x, share)
     return value
 
 
@@ -129,8 +130,7 @@ def _variance(c: Cylinders, s: ForceSettings, arms: Expression, rate: Expression
     noise = np.square(np.array(s.row_noise))
     if not s.weighted:
         return ca.SX(np.full(len(noise), noise.mean()))
-    share = ca.if_else(sliding, ca.exp(-((rate / s.stiction_speed) ** 2)), 1.0)
-    return ca.DM(noise) + (arms**2).T @ ((ca.DM(c.coulomb_friction) * share) ** 2)
+    return ca.DM(noise) + (arms**2).T @ hidden_friction(c, rate, sliding, s) ** 2
 
 
 def _smooth(m: Memory, raw: Expression, fresh: Expression, s: ForceSettings, dt: float) -> Expression:
@@ -140,29 +140,21 @@ def _smooth(m: Memory, raw: Expression, fresh: Expression, s: ForceSettings, dt:
             m[part] = m[part]
         return raw
     middle, seen = (ca.if_else(fresh > 0, raw, m[part]) for part in ("middle", "seen"))
-    inverse = 1.0 / share_of(s.corner, dt)
-    now = seen + inverse * (raw - seen)
-    taken = middle + inverse * (now - middle)
+    now, taken = undamped(middle, seen, raw, 1.0 / share_of(s.corner, dt))
     m["middle"], m["seen"] = now, raw
-    before, (slope, once, twice) = (
-        ca.if_else(fresh > 0, raw, m["force"]), (ca.if_else(fresh > 0, 0.0, m[part]) for part in _KALMAN[1:])
-    )  # fmt: skip
-    to_twice, to_once, to_force, to_slope = (float(g) for g in dt * gains(s.force_corner))
-    left = taken - before
-    error = twice + dt * once + (0.5 * dt * dt) * left
-    m["once"], m["twice"] = once + dt * left - to_once * error, error - to_twice * error
-    force, m["slope"] = before + dt * slope + to_force * error, slope + to_slope * error
-    m["force"] = force
-    return force + (slope + to_slope * error) / (np.pi * s.sensor_corner)
+    begun = Impulse(raw, *(ca.SX(0.0),) * 3)
+    before = Impulse(*(ca.if_else(fresh > 0, new, m[part]) for new, part in zip(begun, _KALMAN, strict=True)))
+    after = before.after(taken, dt, tuple(float(g) for g in dt * gains(s.force_corner)))
+    for part, value in zip(_KALMAN, after, strict=True):
+        m[part] = value
+    return after.force + after.slope / (np.pi * s.sensor_corner)
 
 
 def _steady(m: Memory, raw: Expression, fresh: Expression, gain: Gain, dt: float) -> Expression:
     """`SteadyWrenchFilter`."""
-    slope = ca.if_else(fresh > 0, 0.0, m["late_slope"])
-    value = ca.if_else(fresh > 0, raw, m["late"]) + dt * slope
-    error = raw - value
-    m["late"], m["late_slope"] = value + ca.DM(gain.value) * error, slope + ca.DM(gain.slope) * error
-    return value + ca.DM(gain.value) * error
+    value, slope = ca.if_else(fresh > 0, raw, m["late"]), ca.if_else(fresh > 0, 0.0, m["late_slope"])
+    m["late"], m["late_slope"] = value, slope = steady_step(value, slope, raw, Gain(*map(ca.DM, gain)), dt)
+    return value
 
 
 def _matrix(name: str, rows: int, columns: int) -> tuple[Expression, Expression]:
