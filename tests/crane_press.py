@@ -25,6 +25,7 @@ from skillframe.world.scene import Geom, Scene, Tool
 from skillframe.world.scene import Task as SceneTask
 from tests.crane_terms import terms
 from tests.laws.vdc_loop import crane, quintic
+from tests.oracle import valve_law
 
 DT, AIR, LANDED = 1e-3, 9.0, 14.0  # s: a row, end of the air phase, begin of sliding
 START, SURFACE, RADIUS = np.array([3.0, 0.95, 0.5]), 0.45, 0.05
@@ -181,7 +182,9 @@ class Law:
         tau = (at.mass @ acceleration[..., None])[..., 0] + at.gravity
         tau -= (np.swapaxes(at.jacobian, -1, -2) @ measured.force[..., None])[..., 0]
         speed = (at.arms @ zr[..., None])[..., 0]
-        force = np.linalg.solve(np.swapaxes(at.arms, -1, -2), tau[..., None])[..., 0] + act.friction(cylinders(), speed)
+        force = np.linalg.solve(np.swapaxes(at.arms, -1, -2), tau[..., None])[..., 0] + valve_law.friction(
+            cylinders(), speed
+        )
         self.needed = self.needed or Filter(force, 2 * np.pi * 8.0)
         change = self.needed.step(force)[1]
         pressures = (measured.pressure_a, measured.pressure_b)

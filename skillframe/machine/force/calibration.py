@@ -11,7 +11,6 @@ import numpy as np
 from skillframe.frames import Float
 from skillframe.machine.force.identification import Identification
 from skillframe.machine.force.load import carrier, inertias
-from skillframe.machine.law.hydraulic import HydraulicLaw
 from skillframe.machine.law.hydraulic_compiled import CompiledLaw
 from skillframe.machine.law.vdc_actuator import friction_parameters
 from skillframe.machine.law.vdc_adaptation import relative_bounds
@@ -39,7 +38,7 @@ def _displacement(time: float) -> Float:
     )
 
 
-def hold_what_was_found(law: HydraulicLaw | CompiledLaw, found: Identification) -> None:
+def hold_what_was_found(law: CompiledLaw, found: Identification) -> None:
     """Let a law compensate the friction and the payload that were found, and learn no more.
 
     The load may be any within the rating, and what carries it heavier or lighter by `share`. What the law's adaptation
@@ -57,7 +56,7 @@ def hold_what_was_found(law: HydraulicLaw | CompiledLaw, found: Identification) 
     law.theta[:, row] *= (np.clip(mass + found.payload, least, most) / mass)[:, None]
 
 
-def carried_bounds(law: HydraulicLaw | CompiledLaw) -> tuple[float, float]:
+def carried_bounds(law: CompiledLaw) -> tuple[float, float]:
     """Least and largest mass of the body that carries the load, load included [kg]."""
     payload, share = law.chain.robot.spec.payload, law.gains.share
     assert payload is not None  # else the estimate has refused the robot

@@ -20,14 +20,13 @@ if TYPE_CHECKING:
     from skillframe.machine.force.identification import Identification
     from skillframe.machine.force.load import BelievedLoad
     from skillframe.machine.force.valve import ValveIdentification
-    from skillframe.machine.law.hydraulic import HydraulicLaw
     from skillframe.machine.law.hydraulic_compiled import CompiledLaw
 
 _FRICTION = (("coulomb_friction", "N"), ("viscous_friction", "N s/m"))
 
 
 def findings(
-    law: HydraulicLaw | CompiledLaw, load: BelievedLoad, found: Identification, valves: ValveIdentification
+    law: CompiledLaw, load: BelievedLoad, found: Identification, valves: ValveIdentification
 ) -> list[list[str]]:
     """Sentences of every trial, in order; none where all is as told, or was found within its bounds."""
     count = len(load.mass)
@@ -43,7 +42,7 @@ def _weighed(load: BelievedLoad, i: int) -> Iterator[str]:
         yield f"the controller was told of {told}; at rest the cylinders' pressures hold {held}, and it goes by these"
 
 
-def _load(law: HydraulicLaw | CompiledLaw, load: BelievedLoad, found: Identification, i: int) -> Iterator[str]:
+def _load(law: CompiledLaw, load: BelievedLoad, found: Identification, i: int) -> Iterator[str]:
     mass = law.told[i, carrier(law.chain), 0]
     for bound, beyond in zip(carried_bounds(law), (np.less, np.greater), strict=True):
         if beyond(mass + found.payload[i], bound):
@@ -51,7 +50,7 @@ def _load(law: HydraulicLaw | CompiledLaw, load: BelievedLoad, found: Identifica
             yield f"{text}; expect the tool to sag or to rise, and check payload.mass and the masses in the URDF"
 
 
-def _rubbing(law: HydraulicLaw | CompiledLaw, found: Identification, i: int) -> Iterator[str]:
+def _rubbing(law: CompiledLaw, found: Identification, i: int) -> Iterator[str]:
     nominal = friction_parameters(law.cylinders)
     lower, upper = relative_bounds(nominal, law.gains.friction_share)
     seen = nominal + np.stack([found.coulomb[i], found.viscous[i]])
@@ -61,7 +60,7 @@ def _rubbing(law: HydraulicLaw | CompiledLaw, found: Identification, i: int) -> 
                 yield _bounded(f"{name} of {joint}", seen[row, k], law.friction[i, row, k], unit)
 
 
-def _valves(law: HydraulicLaw | CompiledLaw, valves: ValveIdentification, i: int) -> Iterator[str]:
+def _valves(law: CompiledLaw, valves: ValveIdentification, i: int) -> Iterator[str]:
     for k, joint in enumerate(law.chain.actuated):
         if valves.overlap[i, k] - valves.overlap_deviation[i, k] > (most := valves.settings.largest):
             yield _bounded(f"deadband of {joint}", 100.0 * valves.overlap[i, k], 100.0 * most, "% of the travel")

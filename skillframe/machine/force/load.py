@@ -19,11 +19,11 @@ import numpy as np
 from skillframe.frames import Float
 from skillframe.machine.checks.figures import CYLINDER
 from skillframe.machine.force.momentum import pull
-from skillframe.machine.law.vdc import parameters
+from skillframe.machine.law.vdc_body import parameters
 from skillframe.robot.carried import loaded_inertias
 
 if TYPE_CHECKING:
-    from skillframe.machine.law.hydraulic import HydraulicLaw, Measured, Terms
+    from skillframe.machine.law.hydraulic import Measured, Terms
     from skillframe.machine.law.hydraulic_compiled import CompiledLaw
     from skillframe.machine.law.vdc_actuator import Cylinders
     from skillframe.robot.chain import ClosedChain
@@ -95,7 +95,7 @@ class BelievedLoad:
         InputError: it is told of a load that is negative, or above the rating.
     """
 
-    def __init__(self, law: HydraulicLaw | CompiledLaw, draws: Draws, count: int) -> None:
+    def __init__(self, law: CompiledLaw, draws: Draws, count: int) -> None:
         payload = law.chain.robot.spec.payload
         assert payload is not None  # else the force estimate has refused the robot
         self._law, self._rating = law, payload.rating

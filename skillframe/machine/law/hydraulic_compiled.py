@@ -1,7 +1,7 @@
-r"""The law of `hydraulic` in generated C: the same inputs, outputs and numbers, some fifty times faster for one trial.
+r"""The law of `hydraulic` with its memory, for N trials, in generated C.
 
 `hydraulic_symbolic` writes one sample of it as casadi expressions from the very `pinocchio.Model`; `generated` makes C
-of them and steps all trials in one call. Read `hydraulic` to understand the law, use this to run it.
+of them and steps all trials in one call. The tests hold it against a law over arrays, trial by trial.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from skillframe.frames import Float
 from skillframe.machine.law.generated import Batch
 from skillframe.machine.law.hydraulic import Demand, HydraulicGains, Measured, Reference, Terms, plane_axes
 from skillframe.machine.law.hydraulic_symbolic import cylinder_table, law_function, terms_function
-from skillframe.machine.law.vdc import parameters
 from skillframe.machine.law.vdc_actuator import Cylinders, friction_parameters
 from skillframe.machine.law.vdc_adaptation import relative_bounds
+from skillframe.machine.law.vdc_body import parameters
 from skillframe.robot.chain import ClosedChain
 
 _SHARED = tuple(range(21, 27))  # inputs of the law that are one for all: bounds of friction, cylinders, gains, scalars
 
 
 class CompiledLaw:
-    """As `HydraulicLaw`.
+    """The law with its memory, for N trials.
 
     Args:
         chain: the controller's model.

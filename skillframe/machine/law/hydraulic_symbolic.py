@@ -15,7 +15,7 @@ import numpy as np
 
 from skillframe.either import clip
 from skillframe.frames import Float
-from skillframe.machine.law.doubt import left_undone
+from skillframe.machine.law.vdc import needed_forces
 from skillframe.machine.law.vdc_actuator import (
     ContactFriction,
     CylinderGains,
@@ -28,9 +28,10 @@ from skillframe.machine.law.vdc_actuator import (
     pressure_force,
 )
 from skillframe.machine.law.vdc_adaptation import adapt
-from skillframe.machine.law.vdc_body import PARAMETERS
+from skillframe.machine.law.vdc_body import PARAMETERS, kinetic_energy
+from skillframe.machine.law.vdc_reference import required_motion
 from skillframe.robot.chain import ClosedChain
-from skillframe.robot.symbolic import BodyMotion, Expression, SymbolicChain, Twist
+from skillframe.robot.symbolic import Expression, SymbolicChain
 from skillframe.signals.rates import rate_after
 
 CYLINDER = tuple(Cylinders.__dataclass_fields__)
@@ -42,7 +43,7 @@ def terms_function(chain: ClosedChain, axes: tuple[int, int]) -> ca.Function:
     s = SymbolicChain(chain)
     theta, rows = _rows("theta", chain.model.njoints - 1, PARAMETERS)
     moving = s.bodies(ca.SX(s.zd.shape[0], 1), ca.SX(s.zd.shape[0], 1))
-    kinetic = sum(_kinetic(body.velocity, rows[b, :].T) for b, body in enumerate(moving))
+    kinetic = sum(kinetic_energy(body.velocity, rows[b, :].T) for b, body in enumerate(moving))
     mass = ca.jacobian(ca.gradient(kinetic, s.zd), s.zd)
     tip = s.frame(chain.robot.tool_frames[0]).origin[list(axes)]
     jacobian, driven = ca.jacobian(tip, s.z), s.q[chain.driven.tolist()]
@@ -79,9 +80,9 @@ def law_function(chain: ClosedChain, axes: tuple[int, int]) -> ca.Function:
     c = Cylinders(**{name: cylinder[i, :].T for i, name in enumerate(CYLINDER)})
 
     tip = s.frame(chain.robot.tool_frames[0]).origin[list(axes)]
-    rate, acceleration = _required(s, tip, reference, (force, sigma), gain["joint"])
+    rate, acceleration = required_motion(s, tip, reference, (force, sigma), gain["joint"])
     moving = s.bodies(rate, acceleration)
-    needed, drive = _needed(s, moving, rows, gain["body"], rate)
+    needed, drive = needed_forces(s, moving, rows, gain["body"], rate)
     needed = needed - ca.jacobian(tip, s.z).T @ force
     piston = s.q[chain.driven.tolist()]
     arms = ca.jacobian(piston, s.z)
@@ -126,83 +127,12 @@ def _function(name: str, inputs: tuple[Any, ...], outputs: tuple[Any, ...]) -> c
     return ca.Function(name, list(inputs), dense)
 
 
-def _kinetic(v: Twist, theta: Expression) -> Expression:
-    """1/2 V^T M V."""
-    momentum = _inertia_times(theta, v)
-    return 0.5 * (ca.dot(v.linear, momentum.linear) + ca.dot(v.angular, momentum.angular))
-
-
-def _inertia_times(theta: Expression, v: Twist) -> Twist:
-    """M V with M of `vdc_body`."""
-    m, mr, inertia = theta[0], theta[1:4], _moment(theta)
-    return Twist(m * v.linear - ca.cross(mr, v.angular), ca.cross(mr, v.linear) + inertia @ v.angular)
-
-
-def _moment(theta: Expression) -> Expression:
-    xx, xy, yy, xz, yz, zz = ca.vertsplit(theta[4:10])
-    return ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
-
-
 def _potential(s: SymbolicChain, rows: Expression) -> Expression:
     gravity, total = ca.SX(np.array(s.model.gravity.linear, dtype=float)), ca.SX(1, 1)
     for b in range(s.model.njoints - 1):
         placed = s.joint(b + 1)
         total = total - ca.dot(gravity, rows[b, 0] * placed.origin + placed.rotation @ rows[b, 1:4].T)
     return total
-
-
-def _required(
-    s: SymbolicChain, tip: Expression, reference: list[Expression], force: tuple[Expression, Expression],
-    joint_gain: Expression,
-) -> tuple[Expression, Expression]:  # fmt: skip
-    """zd_r and zdd_r, equation (1) of `hydraulic`, `doubt` and `vdc_reference.required_motion`."""
-    position, velocity, stiffness, damping, push, joint, joint_rate, given = reference
-    n = s.z.shape[0]
-    k, d = (ca.reshape(x, 2, 2).T for x in (stiffness, damping))
-    inverse = ca.inv(d)
-    lead = ca.diagcat(inverse @ k, joint_gain * ca.SX.eye(n - 2))
-    at, wanted = ca.vertcat(tip, s.z[2:]), ca.vertcat(position, joint)
-    pushing = force[0] + push
-    imbalance = d @ velocity + k @ (position - tip) + pushing
-    pushing = pushing - left_undone(imbalance, *force) * imbalance
-    ahead, pushed = ca.vertcat(velocity, joint_rate), ca.vertcat(inverse @ pushing, ca.SX(n - 2, 1))
-    jacobian = ca.jacobian(at, s.z)
-    rate = ca.solve(jacobian, ahead + lead @ (wanted - at) + pushed)
-    acceleration = given + lead @ (ahead - jacobian @ s.zd) - s.drift_of(jacobian, rate)
-    return rate, ca.solve(jacobian, acceleration)
-
-
-def _needed(
-    s: SymbolicChain, moving: list[BodyMotion], rows: Expression, body_gain: Expression, rate: Expression
-) -> tuple[Expression, list[Expression]]:
-    """Generalised forces (n,) without the tool's, and Y^T (V_r - V) (10,) of every body."""
-    damping = s.embedding.T @ (ca.SX(np.array(s.model.damping, dtype=float)) * (s.embedding @ rate))
-    total, drive = damping, []
-    for b, body in enumerate(moving):
-        velocity = ca.vertcat(*body.velocity)
-        error = ca.vertcat(*body.required) - velocity
-        y = _regressor(body)
-        net = y @ rows[b, :].T + body_gain * error
-        total = total + ca.jacobian(velocity, s.zd).T @ net
-        drive.append(y.T @ error)
-    return total, drive
-
-
-def _regressor(body: BodyMotion) -> Expression:
-    """Y (6, 10) of `vdc_body`."""
-    w, w_r, turn = body.velocity.angular, body.required.angular, body.rate.angular
-    linear = body.rate.linear - body.gravity + ca.cross(w, body.required.linear)
-    upper = ca.horzcat(linear, ca.skew(turn) + ca.skew(w) @ ca.skew(w_r), ca.SX(3, 6))
-    lower = ca.horzcat(ca.SX(3, 1), -ca.skew(linear), _moments(turn) + ca.skew(w_r) @ _moments(w))
-    return ca.vertcat(upper, lower)
-
-
-def _moments(w: Expression) -> Expression:
-    """L (3, 6) of `vdc_body.moment_matrix`."""
-    x, y, z = ca.vertsplit(w)
-    o = ca.SX(1, 1)
-    rows = [[x, y, o, z, o, o], [o, x, y, o, z, o], [o, o, o, x, y, z]]
-    return ca.vertcat(*(ca.horzcat(*row) for row in rows))
 
 
 def _unless_fresh(kept: Expression, new: Expression, gain: dict[str, Expression]) -> Expression:

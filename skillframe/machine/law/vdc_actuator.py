@@ -33,12 +33,11 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.either import absolute, copysign, exp, maximum, sign, sqrt, square_sum, tanh, where
+from skillframe.either import absolute, exp, maximum, sign, sqrt, square_sum, tanh, where
 from skillframe.errors import InputError
 from skillframe.frames import Float
 from skillframe.robot.driven import Actuation
 
-_SLIDING = 5e-3  # m/s at which friction without a state has risen to tanh(1)
 ACROSS = 2e-3  # w, share of the valve's travel
 _NAMES = (
     "bore", "rod", "stroke", "dead_volume_a", "dead_volume_b", "bulk_modulus", "rated_flow", "rated_pressure_drop",
@@ -114,22 +113,9 @@ def pressure_force(c: Any, pressure_a: Any, pressure_b: Any) -> Any:
     return c.area_a * pressure_a - c.area_b * pressure_b
 
 
-def friction(c: Cylinders, velocity: Float) -> Float:
-    """Coulomb and viscous friction (..., n) against a sliding piston [N]."""
-    return np.asarray(c.coulomb_friction * np.tanh(velocity / _SLIDING) + c.viscous_friction * velocity)
-
-
 def friction_parameters(c: Cylinders) -> Float:
     """theta_f (2, n) of the friction law: F_C [N] and F_v [N s/m], as the controller knows them."""
     return np.stack([c.coulomb_friction, c.viscous_friction])
-
-
-def friction_regressor(velocity: Float, shape: Float | None = None) -> Float:
-    """Y_f (..., 2, n) of velocities (..., n): friction is the sum of Y_f theta_f over the second axis from the end.
-
-    shape: y (..., n); tanh(v / 5 mm/s) where it is not given.
-    """
-    return np.stack([np.tanh(velocity / _SLIDING) if shape is None else shape, velocity], axis=-2)
 
 
 def bristle_after(c: Any, bristle: Any, velocity: Any, dt: Any) -> Any:
@@ -151,20 +137,6 @@ def coulomb_shape(bristle: Any, velocity: Any, force: Any, contact: Any) -> Any:
     square = square_sum(force)
     share = square / (square + contact.force**2)
     return bristle + share * (tanh(velocity / contact.sliding) - bristle)
-
-
-def pressure_rates(
-    c: Cylinders, pressures: tuple[Float, Float], x: Float, xd: Float, command: Float
-) -> tuple[Float, Float]:
-    """Rates of both chamber pressures with a valve that follows at once; the model that the law inverts."""
-    p_a, p_b = pressures
-    out, u_e = command > 0.0, opening(c.deadband, command)
-    q_a = u_e * c.edge * np.sqrt(np.where(out, _drop(c, c.supply_pressure - p_a), _drop(c, p_a - c.return_pressure)))
-    q_b = u_e * c.edge * np.sqrt(np.where(out, _drop(c, p_b - c.return_pressure), _drop(c, c.supply_pressure - p_b)))
-    leak = c.leakage * (p_a - p_b)
-    rate_a = c.bulk_modulus / (c.area_a * (c.arm_a + x)) * (q_a - leak - c.area_a * xd)
-    rate_b = c.bulk_modulus / (c.area_b * (c.arm_b + c.stroke - x)) * (leak + c.area_b * xd - q_b)
-    return rate_a, rate_b
 
 
 def flow_demand(c: Any, gains: Any, motion: tuple[Any, ...], force: tuple[Any, ...], pressures: tuple[Any, ...]) -> Any:
@@ -191,11 +163,6 @@ def inverse_valve(c: Any, demand: Any, x: Any, pressures: tuple[Any, ...], suppl
     extend = sqrt(_drop(c, high - p_a)) * a + sqrt(_drop(c, p_b - c.return_pressure)) * b
     retract = sqrt(_drop(c, high - p_b)) * b + sqrt(_drop(c, p_a - c.return_pressure)) * a
     return demand / (c.edge * where(demand > 0.0, extend, retract))
-
-
-def opening(deadband: Any, command: Any) -> Any:
-    """u_e (..., n) that a command opens; the overlap opens nothing."""
-    return copysign(maximum(absolute(command) - deadband, 0.0) / (1.0 - deadband), command)
 
 
 def across_deadband(deadband: Any, opening: Any) -> Any:

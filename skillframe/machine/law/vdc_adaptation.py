@@ -17,12 +17,6 @@ from skillframe.either import clip
 from skillframe.frames import Float
 
 
-def projected_rate(estimate: Float, drive: Float, gain: float, lower: Float, upper: Float) -> Float:
-    """Rate of parameters (...): gain times drive, zero where it points out of the bounds at a bound."""
-    outward = ((estimate >= upper) & (drive > 0.0)) | ((estimate <= lower) & (drive < 0.0))
-    return np.where(outward, 0.0, gain * drive)
-
-
 def adapt(estimate: Any, rate: Any, bounds: tuple[Any, Any], dt: Any) -> Any:
     """Parameters after a step of dt [s]; arrays or casadi expressions (`either`).
 

@@ -13,48 +13,50 @@ theta = (m, m r, Ixx, Ixy, Iyy, Ixz, Iyz, Izz), inertia about the body's frame.
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
+import pinocchio as pin
 
-from skillframe.frames import Float, cross, skew
+from skillframe.frames import Float
+from skillframe.robot.symbolic import BodyMotion, Expression, Twist
 
 PARAMETERS = 10
 
 
-def moment_matrix(w: Float) -> Float:
-    """L (..., 3, 6) with I w = L(w) (Ixx, Ixy, Iyy, Ixz, Iyz, Izz)."""
-    x, y, z = w[..., 0], w[..., 1], w[..., 2]
-    o = np.zeros_like(x)
+def parameters(model: pin.Model) -> Float:
+    """Inertial parameters theta (B, 10) of a model's moving bodies."""
+    return np.array([model.inertias[j].toDynamicParameters() for j in range(1, model.njoints)])
+
+
+def regressor(body: BodyMotion) -> Expression:
+    """Y (6, 10): net force and moment on a body are Y theta."""
+    w, w_r, turn = body.velocity.angular, body.required.angular, body.rate.angular
+    linear = body.rate.linear - body.gravity + ca.cross(w, body.required.linear)
+    upper = ca.horzcat(linear, ca.skew(turn) + ca.skew(w) @ ca.skew(w_r), ca.SX(3, 6))
+    lower = ca.horzcat(ca.SX(3, 1), -ca.skew(linear), moment_matrix(turn) + ca.skew(w_r) @ moment_matrix(w))
+    return ca.vertcat(upper, lower)
+
+
+def moment_matrix(w: Expression) -> Expression:
+    """L (3, 6) with I w = L(w) (Ixx, Ixy, Iyy, Ixz, Iyz, Izz)."""
+    x, y, z = ca.vertsplit(w)
+    o = ca.SX(1, 1)
     rows = [[x, y, o, z, o, o], [o, x, y, o, z, o], [o, o, o, x, y, z]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    return ca.vertcat(*(ca.horzcat(*row) for row in rows))
 
 
-def regressor(rate: Float, required: Float, velocity: Float, gravity: Float) -> Float:
-    """Y (..., 6, 10): net force and moment on a body are Y theta.
-
-    Args:
-        rate: dV_r/dt (..., 6), derivative of the components in body axes.
-        required: V_r (..., 6).
-        velocity: V (..., 6).
-        gravity: (..., 3) in body axes [m/s^2].
-    """
-    w, v_r, w_r, turn = velocity[..., 3:], required[..., :3], required[..., 3:], rate[..., 3:]
-    linear = rate[..., :3] - gravity + cross(w, v_r)
-    y = np.zeros((*linear.shape[:-1], 6, PARAMETERS))
-    y[..., :3, 0] = linear
-    y[..., :3, 1:4] = skew(turn) + skew(w) @ skew(w_r)
-    y[..., 3:, 1:4] = -skew(linear)
-    y[..., 3:, 4:] = moment_matrix(turn) + skew(w_r) @ moment_matrix(w)
-    return y
+def inertia_times(theta: Expression, v: Twist) -> Twist:
+    """M V (6,)."""
+    m, mr, inertia = theta[0], theta[1:4], _moment(theta)
+    return Twist(m * v.linear - ca.cross(mr, v.angular), ca.cross(mr, v.linear) + inertia @ v.angular)
 
 
-def mass_matrix(theta: Float) -> Float:
-    """M (..., 6, 6) of parameters (..., 10)."""
-    m, mr = theta[..., 0], theta[..., 1:4]
-    xx, xy, yy, xz, yz, zz = np.moveaxis(theta[..., 4:], -1, 0)
-    result = np.zeros((*m.shape, 6, 6))
-    result[..., :3, :3] = m[..., None, None] * np.eye(3)
-    result[..., 3:, :3] = skew(mr)
-    result[..., :3, 3:] = -skew(mr)
-    inertia = np.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], axis=-1)
-    result[..., 3:, 3:] = inertia.reshape(*m.shape, 3, 3)
-    return result
+def _moment(theta: Expression) -> Expression:
+    xx, xy, yy, xz, yz, zz = ca.vertsplit(theta[4:10])
+    return ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
+
+
+def kinetic_energy(v: Twist, theta: Expression) -> Expression:
+    """1/2 V^T M V [J]."""
+    momentum = inertia_times(theta, v)
+    return 0.5 * (ca.dot(v.linear, momentum.linear) + ca.dot(v.angular, momentum.angular))

@@ -14,28 +14,15 @@ are a square task Jacobian J_t, and zd_r = J_t^-1 X_r', zdd_r = J_t^-1 (X_r'' - 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
+import casadi as ca
 import numpy as np
 
 from skillframe.errors import InputError
 from skillframe.frames import Float
+from skillframe.machine.law.doubt import left_undone
 from skillframe.robot.chain import ChainState, ClosedChain
-
-
-class Path(NamedTuple):
-    """Desired position, velocity and acceleration of the task's rows (n,): tool coordinates [m], then joints."""
-
-    position: Float
-    velocity: Float
-    acceleration: Float
-
-
-class Required(NamedTuple):
-    """Required rates zd_r and their derivative zdd_r (n,) in minimal coordinates."""
-
-    rate: Float
-    acceleration: Float
+from skillframe.robot.symbolic import Expression, SymbolicChain
 
 
 class ToolTask:
@@ -99,26 +86,29 @@ class ToolTask:
 
 
 def required_motion(
-    task: ToolTask,
-    state: ChainState,
-    path: Path,
-    stiffness: Float,
-    push: Float | None = None,
-    push_rate: Float | None = None,
-) -> Required:
-    """Required rates.
+    s: SymbolicChain, tip: Expression, reference: list[Expression], force: tuple[Expression, Expression],
+    joint_gain: Expression,
+) -> tuple[Expression, Expression]:  # fmt: skip
+    """Required rates zd_r and their derivative zdd_r (n,) of one trial, equation (1) of `hydraulic`.
 
     Args:
-        task: what is commanded.
-        state: measured.
-        path: desired, (n,) each.
-        stiffness: Lambda (n, n) [1/s].
-        push: D^-1 (f - f_d) (n,) [m/s], zero where not given.
-        push_rate: its rate.
+        s: the chain.
+        tip: position of the tool's point in its plane (2,) [m].
+        reference: the fields of `Reference`, as vectors row by row.
+        force: of the environment on the tool (2,) and its standard deviation [N].
+        joint_gain: lambda [1/s].
     """
-    jacobian, zero = task.jacobian(state), np.zeros(len(state.z))
-    velocity = path.velocity + stiffness @ (path.position - task.position(state)) + (zero if push is None else push)
-    rate = np.asarray(np.linalg.solve(jacobian, velocity), dtype=float)
-    acceleration = path.acceleration + stiffness @ (path.velocity - jacobian @ state.zd)
-    acceleration = acceleration + (zero if push_rate is None else push_rate) - task.drift(state, rate)
-    return Required(rate, np.asarray(np.linalg.solve(jacobian, acceleration), dtype=float))
+    position, velocity, stiffness, damping, push, joint, joint_rate, given = reference
+    n = s.z.shape[0]
+    k, d = (ca.reshape(x, 2, 2).T for x in (stiffness, damping))
+    inverse = ca.inv(d)
+    lead = ca.diagcat(inverse @ k, joint_gain * ca.SX.eye(n - 2))
+    at, wanted = ca.vertcat(tip, s.z[2:]), ca.vertcat(position, joint)
+    pushing = force[0] + push
+    imbalance = d @ velocity + k @ (position - tip) + pushing
+    pushing = pushing - left_undone(imbalance, *force) * imbalance
+    ahead, pushed = ca.vertcat(velocity, joint_rate), ca.vertcat(inverse @ pushing, ca.SX(n - 2, 1))
+    jacobian = ca.jacobian(at, s.z)
+    rate = ca.solve(jacobian, ahead + lead @ (wanted - at) + pushed)
+    acceleration = given + lead @ (ahead - jacobian @ s.zd) - s.drift_of(jacobian, rate)
+    return rate, ca.solve(jacobian, acceleration)

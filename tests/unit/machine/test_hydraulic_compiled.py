@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from skillframe.machine.law.generated import NOTE, source
-from skillframe.machine.law.hydraulic import HydraulicGains, HydraulicLaw, Measured, Reference, terms
+from skillframe.machine.law.hydraulic import HydraulicGains, Measured, Reference
 from skillframe.machine.law.hydraulic_compiled import CompiledLaw
 from skillframe.machine.law.hydraulic_symbolic import law_function
 from skillframe.machine.law.vdc_actuator import cylinders
 from tests.laws.vdc_loop import START, crane
+from tests.oracle.hydraulic_law import HydraulicLaw, terms
 
 DT = 1e-3
 SAME = 1e-9  # relative; both do some thousand operations in double precision, in another order

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from skillframe.errors import InputError
-from skillframe.machine.law.hydraulic import Measured, terms
+from skillframe.machine.law.hydraulic import Measured
 from skillframe.machine.law.vdc_actuator import cylinders
 from skillframe.reproduce.crane_runs import MOVING, Follow
 from skillframe.robot.chain import ClosedChain
@@ -17,6 +17,7 @@ from skillframe.run.executor import simulate
 from skillframe.run.machine import MachineLoop
 from skillframe.run.prepare import load_robot_model
 from tests.fmu_cache import own_cache  # noqa: F401
+from tests.oracle.hydraulic_law import terms
 from tests.unit.run.test_machine import rngs, setup, standing
 
 START = np.array([0.785, -1.571, 0.5])

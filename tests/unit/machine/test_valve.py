@@ -6,8 +6,9 @@ import pytest
 from skillframe.errors import SkillframeError
 from skillframe.machine.force.valve import ValveIdentification, ValveSettings
 from skillframe.machine.law.hydraulic import Measured, Terms
-from skillframe.machine.law.vdc_actuator import cylinders, opening
+from skillframe.machine.law.vdc_actuator import cylinders
 from skillframe.robot.spec import load_robot
+from tests.oracle.valve_law import opening
 
 CYLINDERS = cylinders(load_robot("hiab_xs031").actuation)
 DT, SECONDS = 1e-3, 6.0

@@ -15,8 +15,8 @@ import numpy as np
 import pinocchio as pin
 
 from skillframe.frames import Float, cross
-from skillframe.machine.law.vdc import Bodies
 from skillframe.robot.chain import ChainState
+from tests.oracle.vdc import Bodies
 
 
 class PowerFlows(NamedTuple):
