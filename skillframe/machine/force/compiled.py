@@ -1,6 +1,6 @@
-r"""`ForceEstimator` in generated C: the same inputs, outputs and numbers, in two calls a sample for all trials.
+"""The force estimate with its memory, for N trials, in generated C: two calls a sample for all trials.
 
-Read `conditioning.momentum` to understand the estimate, use this to run it; `force_symbolic` writes it as expressions.
+`momentum` says what is estimated, and `symbolic` writes a sample of it as expressions.
 """
 
 from __future__ import annotations
@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from skillframe.machine.force.momentum import Estimate, ForceEstimator, ForceSettings, force_gain, pull
+from skillframe.frames import Float
+from skillframe.machine.force.identification import Identification
+from skillframe.machine.force.momentum import Estimate, ForceSettings, force_gain, pull
 from skillframe.machine.force.symbolic import look_function, weigh_function
 from skillframe.machine.law.generated import Batch
 
@@ -19,8 +21,10 @@ if TYPE_CHECKING:
     from skillframe.robot.chain import ClosedChain
 
 
-class CompiledEstimator(ForceEstimator):
-    """As `ForceEstimator`, for moment arms (N, k, n); arrays that it returns are used again by the next call.
+class CompiledEstimator:
+    """Estimates online, identifies in air when told to, and holds what it found.
+
+    Arrays that it returns are used again by the next call.
 
     Args:
         chain: the controller's model of the machine; gives the payload's gravity.
@@ -29,15 +33,30 @@ class CompiledEstimator(ForceEstimator):
         dt: sample time [s].
         settings: see `ForceSettings`.
         use_compiler: False runs the same expressions in casadi's interpreter.
+
+    Attributes:
+        identification: theta, its standard deviation, and how many rows it has seen.
+        raw: (N, 2) the force before its Kalman filter [N].
+        residual: (N, n) what is left for J^T f [Nm or N].
+        regressors: (N, n, 2k + 1) phi, to be read and not kept.
+        calibrating: whether the tool is said to be in air.
+        notes: a sentence where there is no compiler.
+
+    Raises:
+        SkillframeError: a filter's corner is too high for the sample time.
     """
 
     def __init__(
         self, chain: ClosedChain, cylinders: Cylinders, count: int, dt: float, settings: ForceSettings | None = None,
         *, use_compiler: bool = True,
     ) -> None:  # fmt: skip
-        super().__init__(chain, cylinders, count, dt, settings)
-        n, k = len(self.settings.row_noise), len(cylinders.area_a)
-        zeros, s = np.zeros, self.settings
+        self.settings = s = settings or ForceSettings()
+        self._chain, self._cylinders, zeros = chain, cylinders, np.zeros
+        n, k = len(s.row_noise), len(cylinders.area_a)
+        self.identification = Identification(count, k, s.identify)
+        self._noise: Float = np.square(np.array(s.row_noise))
+        self._every, self._tick, self.calibrating = max(1, round(s.identify.period / dt)), 0, False
+        self.raw, self.residual = zeros((count, 2)), zeros((count, n))
         shapes = ((n,), (k,), (k,), (n, n), (n,), (n,), (2, n), (k, n), (k,))
         self._given = [zeros((count, *shape)) for shape in shapes]
         self._load, self._fresh = zeros((count, n)), np.ones(1)
@@ -58,6 +77,15 @@ class CompiledEstimator(ForceEstimator):
             weigh, inputs, [*self._told, self._next[1]], (len(inputs) - 1,), use_compiler=use_compiler
         )  # fmt: skip
         self.regressors, self._everyone, self.notes = phi, np.arange(count), self._look.notes
+
+    def calibrate(self, on: bool) -> None:
+        """Say that the tool is in air (True), or that it may touch from now on (False): an explicit step of a task.
+
+        Turning it on begins the identification anew.
+        """
+        if on and not self.calibrating:
+            self.identification.start()
+        self.calibrating = on
 
     def start(self, measured: Measured) -> None:
         """Begin at a measurement, the machine at rest."""
@@ -90,3 +118,10 @@ class CompiledEstimator(ForceEstimator):
         self._tick += 1
         _, _, force, sigma, feedback, answered = self._told
         return Estimate(force, sigma, (sliding > 1.0).sum(axis=-1) >= 2, feedback, answered)
+
+    def friction(self, terms: Terms) -> Float:
+        """(N, k) of every cylinder as it is known now, nominal and what was identified [N]."""
+        c, found = self._cylinders, self.identification
+        shape = np.tanh(self._rate / self.settings.sliding_speed)
+        coulomb: Float = (c.coulomb_friction + found.coulomb) * shape
+        return coulomb + (c.viscous_friction + found.viscous) * terms.piston_rate

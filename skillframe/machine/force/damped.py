@@ -67,21 +67,3 @@ class CriticallyDamped:
             self._middle, self._value = value.copy(), value.copy()
         self._middle, self._value = damped(self._middle, self._value, value, self._share)
         return self._value
-
-
-class Undamped:
-    """Equation (1): the inverse of `CriticallyDamped`; arguments as there."""
-
-    def __init__(self, corner: float, dt: float) -> None:
-        self._inverse = 1.0 / share_of(corner, dt)
-
-    def start(self, value: Float) -> None:
-        """Begin where L was taken over at a value."""
-        self._middle: Float = value.copy()
-        self._value: Float = value.copy()
-
-    def step(self, value: Float) -> Float:
-        """What L was given when it answered with a value."""
-        self._middle, result = undamped(self._middle, self._value, value, self._inverse)
-        self._value = value.copy()
-        return np.asarray(result)

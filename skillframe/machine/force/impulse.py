@@ -30,6 +30,17 @@ def gains(corner: float) -> Float:
     return np.array([first * w, second * w**2, first * w**3, w**4])
 
 
+def sampled_gains(corner: float, dt: float) -> tuple[float, ...]:
+    """The gains of a sample of dt [s] for w / 2 pi [Hz].
+
+    Raises:
+        SkillframeError: the corner is above a twentieth of the sampling rate: (2) is the gain in continuous time.
+    """
+    if corner * dt > 0.05:
+        raise SkillframeError(f"force filter: a corner of {corner:g} Hz needs {20.0 * corner:g} samples a second")
+    return tuple(float(k) for k in dt * gains(corner))
+
+
 class Impulse(NamedTuple):
     """The filter's state, arrays or casadi expressions: f [N], s [N/s], and the errors of P and Y."""
 
@@ -39,7 +50,7 @@ class Impulse(NamedTuple):
     twice: Any
 
     def after(self, shown: Any, dt: float, gain: Sequence[float]) -> Impulse:
-        """The state after a sample of a force, with `gains` times dt [s]."""
+        """The state after a sample of a force, dt [s] after the last, with `sampled_gains`."""
         to_twice, to_once, to_force, to_slope = gain
         left = shown - self.force
         error = self.twice + dt * self.once + (0.5 * dt * dt) * left
@@ -47,33 +58,3 @@ class Impulse(NamedTuple):
             force=self.force + dt * self.slope + to_force * error, slope=self.slope + to_slope * error,
             once=self.once + dt * left - to_once * error, twice=error - to_twice * error,
         )  # fmt: skip
-
-
-class ImpulseFilter:
-    """The converged filter for N forces in lock-step, each component for itself.
-
-    Args:
-        corner: w / 2 pi [Hz], at most a twentieth of the sampling rate: (2) is the gain in continuous time.
-        dt: sample time [s].
-
-    Raises:
-        SkillframeError: the corner is too high.
-    """
-
-    def __init__(self, corner: float, dt: float) -> None:
-        if corner * dt > 0.05:
-            raise SkillframeError(f"force filter: a corner of {corner:g} Hz needs {20.0 * corner:g} samples a second")
-        self._gains, self._dt = tuple(float(k) for k in dt * gains(corner)), dt
-
-    def start(self, force: Float) -> None:
-        """Begin at a force (N, m) with no slope."""
-        self._state = Impulse(force.copy(), *(np.zeros_like(force) for _ in range(3)))
-
-    def step(self, force: Float) -> Float:
-        """The filtered force (N, m) after a sample of it."""
-        self._state = self._state.after(force, self._dt, self._gains)
-        return np.asarray(self._state.force)
-
-    def ahead(self, time: float) -> Float:
-        """The force (N, m) that the slope promises for `time` [s] after the last sample, f + s time."""
-        return np.asarray(self._state.force + time * self._state.slope)

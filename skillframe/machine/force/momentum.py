@@ -16,7 +16,7 @@ of the crane's cylinders are some 400 N at the tool, whatever is done).
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,18 +24,9 @@ from numpy.typing import NDArray
 from skillframe.either import absolute, both, dot, exp, square_sum, where
 from skillframe.errors import SkillframeError
 from skillframe.frames import Float
-from skillframe.machine.force.damped import CriticallyDamped, Undamped
-from skillframe.machine.force.identification import Identification, IdentificationSettings
-from skillframe.machine.force.impulse import ImpulseFilter
+from skillframe.machine.force.identification import IdentificationSettings
 from skillframe.machine.law.vdc_actuator import pressure_force
-from skillframe.signals.kalman import Gain, SteadyWrenchFilter, steady_gain
-
-if TYPE_CHECKING:
-    from skillframe.machine.law.hydraulic import Measured, Terms
-    from skillframe.machine.law.vdc_actuator import Cylinders
-    from skillframe.robot.chain import ClosedChain
-
-__all__ = ["Estimate", "ForceEstimator", "ForceSettings", "force_from_residual", "standing_out", "unaccounted"]
+from skillframe.signals.kalman import Gain, steady_gain
 
 
 class Estimate(NamedTuple):
@@ -163,154 +154,13 @@ def standing_out(force: Any, sigma: Any, doubted: float) -> Any:
     return force * (power / (1.0 + power))
 
 
-class ForceEstimator:
-    """Estimates online, identifies in air when told to, and holds what it found.
-
-    Args:
-        chain: the controller's model of the machine; gives the payload's gravity.
-        cylinders: what the controller knows of them.
-        count: number of trials N.
-        dt: sample time [s].
-        settings: see `ForceSettings`.
-
-    Attributes:
-        identification: theta, its standard deviation, and how many rows it has seen.
-        raw: (N, 2) the force before its Kalman filter [N].
-        residual: (N, n) what is left for J^T f [Nm or N].
-        regressors: (N, n, 2k + 1) phi, to be read and not kept.
-    """
-
-    def __init__(
-        self, chain: ClosedChain, cylinders: Cylinders, count: int, dt: float, settings: ForceSettings | None = None
-    ) -> None:
-        self.settings, self._chain, self._cylinders, self._dt = settings or ForceSettings(), chain, cylinders, dt
-        s = self.settings
-        self.identification = Identification(count, len(cylinders.area_a), s.identify)
-        self._filter = CriticallyDamped(s.corner, dt)
-        self._rate_share = float(-np.expm1(-2.0 * np.pi * s.rate_corner * dt))
-        self._wrench = None if s.force_corner is None else ImpulseFilter(s.force_corner, dt)
-        self._undamped, self._feedback = Undamped(s.corner, dt), force_filter(s.feedback_corner, dt)
-        self._noise: Float = np.square(np.array(s.row_noise))
-        self._every, self._tick, self.calibrating = max(1, round(s.identify.period / dt)), 0, False
-        self._columns: Float = np.zeros((count, len(s.row_noise), 2 * len(cylinders.area_a) + 4))
-        self.raw: Float = np.zeros((count, 2))
-        self.residual: Float = np.zeros((count, len(s.row_noise)))
-
-    def calibrate(self, on: bool) -> None:
-        """Say that the tool is in air (True), or that it may touch from now on (False): an explicit step of a task.
-
-        Turning it on starts the identification again.
-        """
-        if on and not self.calibrating:
-            self.identification.start()
-        self.calibrating = on
-
-    def start(self, measured: Measured) -> None:
-        """Begin at a measurement, the machine at rest."""
-        count = len(measured.z)
-        self._momentum: Float | None = None
-        self._filter.start()
-        self._rate: Float = np.zeros((count, len(self._cylinders.area_a)))
-        self._since: Float = np.zeros_like(self._rate)
-        self._load = self._chain.load_gravity(measured.z)
-        self._tick = 0
-
-    def step(self, measured: Measured, terms: Terms) -> Estimate:
-        """One estimate from one measurement and the model's terms there."""
-        c = self._cylinders
-        if self._tick % self._every == 0:
-            self._load = self._chain.load_gravity(measured.z)
-        before = self._rate
-        self._rate = before + self._rate_share * (terms.piston_rate - self._rate)
-        shape = np.tanh(self._rate / self.settings.sliding_speed)
-        push = sliding_push(c, (measured.pressure_a, measured.pressure_b), shape, terms.piston_rate)
-        known = pull(terms.arms, push) + terms.drift - terms.gravity
-        momentum = (terms.mass @ measured.rate[..., None])[..., 0]
-        left = unaccounted(momentum, momentum if self._momentum is None else self._momentum, known, self._dt)
-        self._momentum = momentum
-        columns = self._filter.step(self._fill(left, terms, shape))
-        residual, jacobian, phi = columns[..., 0], np.swapaxes(columns[..., 1:3], -1, -2), columns[..., 3:]
-        sliding = self._sliding(before)
-        if self.calibrating and self._tick % self._every == 0:
-            rows = pull(np.abs(terms.arms), np.where(sliding, 0.0, 1.0)) == 0.0
-            self.identification.update(phi, residual, self._noise, rows)
-        self.regressors = phi
-        self.residual = residual - (phi @ self.identification.theta[..., None])[..., 0]
-        variance = self._variance(terms.arms, sliding)
-        explained = force_from_residual(jacobian[..., 0, :], jacobian[..., 1, :], self.residual, variance)
-        self.raw, sigma = np.stack(explained[:2], axis=-1), np.sqrt(np.stack(explained[2:], axis=-1))
-        if self._tick == 0:
-            self._begin()
-        self._tick += 1
-        valid = np.sum(self._since >= self.settings.settle + self.settings.memory, axis=-1) >= 2
-        feedback = self._feedback.step(self.raw)
-        answered = standing_out(feedback, sigma, self.settings.doubted)
-        return Estimate(self._smooth(), sigma, valid, feedback, answered)
-
-    def friction(self, terms: Terms) -> Float:
-        """(N, k) of every cylinder as it is known now, nominal and what was identified [N]."""
-        c, found = self._cylinders, self.identification
-        shape = np.tanh(self._rate / self.settings.sliding_speed)
-        coulomb: Float = (c.coulomb_friction + found.coulomb) * shape
-        return coulomb + (c.viscous_friction + found.viscous) * terms.piston_rate
-
-    def _fill(self, left: Float, terms: Terms, shape: Float) -> Float:
-        """(N, n, 3 + 2k + 1) all that passes L: what is left of p', J^T, and the columns of phi."""
-        columns, k = self._columns, shape.shape[-1]
-        spread = spread_of(terms.arms)
-        columns[..., 0], columns[..., 1:3] = left, np.swapaxes(terms.jacobian, -1, -2)
-        np.multiply(spread, -shape[:, None, :], out=columns[..., 3 : 3 + k])
-        np.multiply(spread, -terms.piston_rate[:, None, :], out=columns[..., 3 + k : 3 + 2 * k])
-        np.negative(self._load, out=columns[..., -1])
-        return columns
-
-    def _sliding(self, before: Float) -> NDArray[np.bool_]:
-        """(N, k) has the piston been going one way for long enough?"""
-        self._since = slid_since(self._since, self._rate, before, self.settings, self._dt)
-        return np.asarray(self._since >= self.settings.settle)
-
-    def _variance(self, arms: Float, sliding: NDArray[np.bool_]) -> Float:
-        """(N, n) of each joint's residual: noise, and what its pistons' stiction may hide."""
-        if not self.settings.weighted:
-            return np.broadcast_to(self._noise.mean(), sliding.shape)
-        hidden = hidden_friction(self._cylinders, self._rate, sliding, self.settings)
-        return self._noise + pull(np.square(arms), np.square(hidden))
-
-    def _begin(self) -> None:
-        self._feedback.start(self.raw)
-        self._undamped.start(self.raw)
-        if self._wrench is not None:
-            self._wrench.start(self.raw)
-
-    def _smooth(self) -> Float:
-        """The force now (N, 2): L's place is taken by a better filter, and the sensors' lag made up for."""
-        if self._wrench is None:
-            return self.raw
-        self._wrench.step(self._undamped.step(self.raw))
-        return self._wrench.ahead(1.0 / (np.pi * self.settings.sensor_corner))
-
-
 def force_gain(corner: float, dt: float) -> Gain:
     """Converged gain of a force's two components, `kalman`'s model with a corner [Hz]."""
     one = np.ones(2)
     return steady_gain(one, one * np.sqrt(dt) * (2.0 * np.pi * corner) ** 2, dt)
 
 
-def force_filter(corner: float, dt: float) -> SteadyWrenchFilter:
-    """The converged Kalman filter of a force's two components, `kalman`'s model with a corner [Hz]."""
-    return SteadyWrenchFilter(force_gain(corner, dt), dt)
-
-
-def spread_of(arms: Float) -> Float:
-    """R^T (N, n, k) of moment arms (N, k, n), or of a diagonal (N, k)."""
-    if arms.ndim == 2:
-        return arms[:, :, None] * np.eye(arms.shape[-1])
-    return np.swapaxes(arms, -1, -2)
-
-
 def pull(arms: Float, force: Float) -> Float:
-    """R^T F (N, n) of piston forces (N, k), with moment arms as in `spread_of`."""
-    if arms.ndim == 2:
-        return arms * force
+    """R^T F (N, n) of piston forces (N, k) with moment arms R (N, k, n)."""
     result: Float = (np.swapaxes(arms, -1, -2) @ force[..., None])[..., 0]
     return result

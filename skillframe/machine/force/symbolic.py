@@ -1,4 +1,4 @@
-r"""`ForceEstimator` of one trial, as two casadi functions; equations and names in `conditioning.momentum`.
+r"""The force estimate of one trial, as two casadi functions; equations and names in `momentum`.
 
     look:  sensors and terms -> what passed L: residual, J, phi; which pistons slide; the residuals' variances
     weigh: these and theta   -> force, sigma, and the filters behind
@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from skillframe.machine.force.damped import damped, share_of, undamped
-from skillframe.machine.force.impulse import Impulse, gains
+from skillframe.machine.force.impulse import Impulse, sampled_gains
 from skillframe.machine.force.momentum import (
     ForceSettings,
     force_from_residual,
@@ -120,7 +120,7 @@ _KALMAN, _FEEDBACK = ("force", "slope", "once", "twice"), ("late", "late_slope")
 
 
 def _damped(m: Memory, x: Expression, fresh: Expression, share: float) -> Expression:
-    """`CriticallyDamped`."""
+    """L, a column for each of what passes it."""
     middle, value = (ca.if_else(fresh > 0, x, m[part]) for part in ("middle", "value"))
     m["middle"], m["value"] = middle, value = damped(middle, value, x, share)
     return value
@@ -134,7 +134,7 @@ def _variance(c: Cylinders, s: ForceSettings, arms: Expression, rate: Expression
 
 
 def _smooth(m: Memory, raw: Expression, fresh: Expression, s: ForceSettings, dt: float) -> Expression:
-    """`Undamped`, then `ImpulseFilter.step` and `ahead`."""
+    """The force now: L's place is taken by the impulse's filter, and the sensors' lag made up for."""
     if s.force_corner is None:
         for part in ("middle", "seen", *_KALMAN):
             m[part] = m[part]
@@ -144,14 +144,14 @@ def _smooth(m: Memory, raw: Expression, fresh: Expression, s: ForceSettings, dt:
     m["middle"], m["seen"] = now, raw
     begun = Impulse(raw, *(ca.SX(0.0),) * 3)
     before = Impulse(*(ca.if_else(fresh > 0, new, m[part]) for new, part in zip(begun, _KALMAN, strict=True)))
-    after = before.after(taken, dt, tuple(float(g) for g in dt * gains(s.force_corner)))
+    after = before.after(taken, dt, sampled_gains(s.force_corner, dt))
     for part, value in zip(_KALMAN, after, strict=True):
         m[part] = value
     return after.force + after.slope / (np.pi * s.sensor_corner)
 
 
 def _steady(m: Memory, raw: Expression, fresh: Expression, gain: Gain, dt: float) -> Expression:
-    """`SteadyWrenchFilter`."""
+    """The feedback: the converged Kalman filter of `kalman`."""
     value, slope = ca.if_else(fresh > 0, raw, m["late"]), ca.if_else(fresh > 0, 0.0, m["late_slope"])
     m["late"], m["late_slope"] = value, slope = steady_step(value, slope, raw, Gain(*map(ca.DM, gain)), dt)
     return value

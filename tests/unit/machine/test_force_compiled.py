@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from skillframe.machine.force.compiled import CompiledEstimator
-from skillframe.machine.force.momentum import ForceEstimator, ForceSettings
+from skillframe.machine.force.momentum import ForceSettings
 from skillframe.machine.law.hydraulic import HydraulicGains, Measured
 from skillframe.machine.law.hydraulic_compiled import CompiledLaw
 from skillframe.machine.law.vdc_actuator import cylinders
 from tests.laws.vdc_loop import START, crane
+from tests.oracle.force_estimator import ForceEstimator
 
 DT = 1e-3
 SAME = 1e-8  # relative to the largest; differences over a millisecond leave 1e-16 x 1e3 of the momentum, twice

