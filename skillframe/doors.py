@@ -28,6 +28,8 @@ MOVED = {
     "skillframe.prepare": "skillframe.run.prepare",
     "skillframe.records": "skillframe.extend.records",
     "skillframe.registry": "skillframe.extend.registry",
+    "skillframe.reproduce.bars": "skillframe_papers.bars",
+    "skillframe.reproduce.drawing": "skillframe.report.drawing",
     "skillframe.robot.feasibility": "skillframe.machine.checks.feasibility",
     "skillframe.robot.loops": "skillframe.robot.chain",
     "skillframe.skillfile": "skillframe.document.file",
@@ -35,7 +37,7 @@ MOVED = {
     "skillframe.teacher": "skillframe.teaching.teacher",
     "skillframe.trace": "skillframe.run.trace",
 }
-FOLDERS = frozenset({"skillframe.actuation"})
+FOLDERS = frozenset({"skillframe.actuation", "skillframe.reproduce"})
 """Packages that are no more and still hold doors."""
 
 

@@ -1,7 +1,7 @@
 """`skillframe`: lazily loaded commands, one module each, and the exit codes of the contract.
 
 0 fine; 1 the work ran and the answer is no; 2 usage or input error; 3 internal error. A command module is imported when
-its command is used, so that `skillframe --help` loads no scientific library.
+its command is used, so that `skillframe --help` loads no scientific library. Plug-ins add commands (`extend.commands`).
 """
 
 from __future__ import annotations
@@ -14,12 +14,15 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from skillframe import __version__
 from skillframe.errors import SkillframeError
+
+if TYPE_CHECKING:
+    from skillframe.extend.commands import PluginCommand
 
 COMMANDS = {
     "quickstart": "The whole way in minutes: demonstrate, learn, run, prove, report.",
@@ -32,7 +35,6 @@ COMMANDS = {
     "campaign": "Run a skill many times over declared uncertainty.",
     "export": "Write a skill as settings of another controller.",
     "report": "Make a self-contained HTML report from results.",
-    "reproduce": "The papers' results, row by row.",
     "robots": "List, check and show robots.",
     "worlds": "List and show worlds.",
     "skills": "List kinds of skills.",
@@ -45,29 +47,36 @@ COMMANDS = {
 
 NO_ARGUMENTS: Any = getattr(click.exceptions, "NoArgsIsHelpError", ())
 """Help in place of an answer; older releases of click have no error of its own for it."""
+SUMMARY_WIDTH = 80
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 class LazyGroup(click.Group):
-    """A group whose commands live in `skillframe.cli.<name>`, imported on use; absent modules are not listed."""
+    """Commands in `skillframe.cli.<name>` and in plug-ins, imported on use; absent modules are not listed.
+
+    A plug-in cannot take the place of a command of the core.
+    """
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Names of the commands whose module is there."""
-        return [name for name in COMMANDS if find_spec(f"skillframe.cli.{name}") is not None]
+        """Names of the core's commands whose module is there, then of the plug-ins'."""
+        return [*_own(), *_added()]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """The command of that name, its module imported now."""
-        if cmd_name not in self.list_commands(ctx):
-            return None
-        command: click.Command = import_module(f"skillframe.cli.{cmd_name}").command
-        return command
+        if cmd_name in _own():
+            command: click.Command = import_module(f"skillframe.cli.{cmd_name}").command
+            return command
+        found = _added().get(cmd_name)
+        return None if found is None else found.load()
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """The list in `--help`, made without importing a command."""
-        rows = [(name, COMMANDS[name]) for name in self.list_commands(ctx)]
-        if rows:
-            with formatter.section("Commands"):
-                formatter.write_dl(rows)
+        """The list in `--help`, made without importing a command of the core."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, COMMANDS[name]) for name in _own()])
+        added = [(name, _summary(command)) for name, command in _added().items()]
+        if added:
+            with formatter.section("Commands of plug-ins"):
+                formatter.write_dl(added)
 
     def make_context(self, *arguments: Any, **settings: Any) -> click.Context:
         """As click does, which prints `--help` and `--version` here; see `invoke`."""
@@ -82,12 +91,43 @@ class LazyGroup(click.Group):
             return result
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
-        """As click does, but an unknown name is answered with the nearest one."""
-        if args and not args[0].startswith("-") and args[0] not in self.list_commands(ctx):
-            from skillframe.errors import UnknownName
-
-            raise UnknownName("command", args[0], self.list_commands(ctx))
+        """As click does, but an unknown name is answered with its plug-in's, or with the nearest one."""
+        if args and not args[0].startswith("-") and args[0] not in _own() and args[0] not in _added():
+            raise _unknown(args[0])
         return super().resolve_command(ctx, args)
+
+
+def _own() -> list[str]:
+    return [name for name in COMMANDS if find_spec(f"skillframe.cli.{name}") is not None]
+
+
+def _added(*, selected: bool = True) -> dict[str, PluginCommand]:
+    """Commands of plug-ins, those that `SKILLFRAME_PLUGINS` selects or the others."""
+    from skillframe.extend.commands import plugin_commands
+
+    found = plugin_commands().items()
+    return {name: each for name, each in found if name not in COMMANDS and each.selected == selected}
+
+
+def _summary(command: PluginCommand) -> str:
+    try:
+        return command.load().get_short_help_str(limit=SUMMARY_WIDTH)
+    except SkillframeError as error:
+        return str(error)
+
+
+def _unknown(name: str) -> SkillframeError:
+    """What to say of a name that is no command here: the plug-in that has it if one is known to."""
+    from skillframe.errors import UnknownName
+    from skillframe.extend.homes import where_to_get
+
+    left_out = _added(selected=False).get(name)
+    if left_out is not None:
+        where = " and ".join(left_out.distributions)
+        return SkillframeError(f"{name} is a command of {where}, which SKILLFRAME_PLUGINS leaves out")
+    known = [*_own(), *_added()]
+    missing = where_to_get("command", name, known, ())
+    return SkillframeError(missing) if missing else UnknownName("command", name, known)
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})

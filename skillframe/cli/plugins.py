@@ -98,7 +98,10 @@ def _default(value: Any) -> str:
 
 
 def distribution_rows(registry: Registry) -> list[dict[str, Any]]:
-    """A row per distribution; a distribution with several plug-ins lists them together."""
+    """A row per distribution; a distribution with several plug-ins lists them together, and its commands last."""
+    from skillframe.cli.main import COMMANDS
+    from skillframe.extend.commands import plugin_commands
+
     rows: dict[str, dict[str, Any]] = {}
     for plugin in registry.plugins:
         row = rows.setdefault(
@@ -108,6 +111,13 @@ def distribution_rows(registry: Registry) -> list[dict[str, Any]]:
         row["name"] = f"{row['name']},{plugin.name}" if row["name"] else plugin.name
         row["provides"] += plugin.provides
         row["error"] = "; ".join(error for error in (row["error"], plugin.error) if error) or None
+    for command in plugin_commands().values():
+        for row in (rows[name] for name in command.distributions if name in rows):
+            row["provides"].append(f"command:{command.name}")
+            if command.name in COMMANDS or command.point is None:
+                rivals = ("skillframe",) if command.name in COMMANDS else command.distributions
+                error = f"the command {command.name} is in {' and '.join(rivals)}, too"
+                row["error"] = f"{row['error']}; {error}" if row["error"] else error
     return list(rows.values())
 
 

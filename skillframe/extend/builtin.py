@@ -1,11 +1,11 @@
-"""What the core itself registers, as an ordinary plug-in: worlds, demonstration readers, rows of the crane."""
+"""What the core itself registers, as an ordinary plug-in: worlds and demonstration readers."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 from skillframe.extend.hookspecs import hookimpl
-from skillframe.extend.records import Lazy, ReaderType, RowType, WorldType
+from skillframe.extend.records import Lazy, ReaderType, WorldType
 
 
 @hookimpl
@@ -24,9 +24,3 @@ def skillframe_readers() -> Iterable[ReaderType]:
     return reader_types(Lazy("skillframe.robot.recorded:tool_poses"))  # its library is loaded for joint states only
 
 
-@hookimpl
-def skillframe_rows() -> Iterable[RowType]:
-    """Published results that need no plug-in."""
-    from skillframe.reproduce.crane import row_types
-
-    return row_types()

@@ -13,6 +13,8 @@ HOMES = {
     "coordinator:dual_arm": "dualarm",
     "skill:dual_arm": "dualarm",  # asked for as any other behaviour
     "world:dual_peg": "dualarm",
+    **{f"row:{number}": "papers" for number in range(1, 24)},
+    "command:reproduce": "papers",
 }
 """The entry point, and folder under plugins/, of every name that is not the core's."""
 

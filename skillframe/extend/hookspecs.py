@@ -50,4 +50,4 @@ def skillframe_readers() -> Iterable[ReaderType]:  # type: ignore[empty-body]
 
 @hookspec
 def skillframe_rows() -> Iterable[RowType]:  # type: ignore[empty-body]
-    """Published results and how ours are computed: rows of `skillframe reproduce`."""
+    """Published results and how ours are computed: rows of `skillframe reproduce`, a command of skillframe-papers."""

@@ -20,7 +20,8 @@ COUNT, SECONDS, WINDOW_MS = 32, 4.0, 250
 
 
 def setting():
-    from skillframe.reproduce import crane_runs
+    from skillframe_papers.rows import crane_runs
+
     from skillframe.run.executor import Setup
     from skillframe.run.prepare import load_robot_model
 

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from skillframe_papers.rows import crane_runs
 
-from skillframe.reproduce import crane_runs
 from skillframe.robot.driven import Gains, MachineNoise
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot

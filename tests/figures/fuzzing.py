@@ -67,14 +67,15 @@ NUMERIC = [
 
 def stop_long_work() -> None:
     """In this process and its children only."""
+    import skillframe_papers.runner
+
     import skillframe.campaign.runner
-    import skillframe.reproduce.runner
 
     def cut(*_: Any, **__: Any) -> Any:
         raise KeyboardInterrupt
 
     skillframe.campaign.runner.run_campaign = cut
-    skillframe.reproduce.runner._Pool.work_off = cut  # type: ignore[method-assign]
+    skillframe_papers.runner._Pool.work_off = cut  # type: ignore[method-assign]
 
 
 def command(arguments: list[str]) -> int:
@@ -204,10 +205,11 @@ def campaigns(folder: Path, skill: bytes) -> list[Case]:
 
 def rows_of_papers(folder: Path) -> list[Case]:
     """A row as the store keeps it; damaged, it is shown or computed again, which is cut."""
+    from skillframe_papers import store
+    from skillframe_papers.jobs import jobs_of
+
     from skillframe.extend.records import RowResult
     from skillframe.extend.registry import registry
-    from skillframe.reproduce import store
-    from skillframe.reproduce.jobs import jobs_of
 
     row = registry().names("row")[0]
     job = jobs_of(registry(), [row], {}, seed=0, quick=True)[0]

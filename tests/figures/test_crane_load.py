@@ -6,8 +6,8 @@ Told of 475 kg throughout. An empty crane has less to press with: at 8.5 kN its 
 
 import numpy as np
 import pytest
+from skillframe_papers.rows import crane_runs
 
-from skillframe.reproduce import crane_runs
 from tests.figures import crane_contact as contact
 from tests.figures.teaching import row
 

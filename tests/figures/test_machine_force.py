@@ -7,8 +7,8 @@ the mean true normal force there.
 
 import numpy as np
 import pytest
+from skillframe_papers.rows.crane_runs import ABOVE, FIXTURE, PRESSING, press_and_slide, run, scene
 
-from skillframe.reproduce.crane_runs import ABOVE, FIXTURE, PRESSING, press_and_slide, run, scene
 from tests.crane_scores import root_mean_square
 from tests.figures.teaching import row
 

@@ -5,10 +5,10 @@ import json
 
 import numpy as np
 import pytest
+from skillframe_papers.rows.crane_runs import MOVING, Follow, diamond
 
 from skillframe.cli.main import run
 from skillframe.fmu.toolchain import find_compiler
-from skillframe.reproduce.crane_runs import MOVING, Follow, diamond
 from skillframe.run.executor import Setup
 from skillframe.run.machine import MachineLoop
 from skillframe.run.prepare import load_robot_model, load_world

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from skillframe_papers.rows.crane_runs import MOVING, Follow
 
-from skillframe.reproduce.crane_runs import MOVING, Follow
 from skillframe.run.executor import Setup
 from skillframe.run.machine import MachineLoop
 from skillframe.run.prepare import load_robot_model, load_world

@@ -4,8 +4,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from pairs import SCENE, robot
 from skillframe_dualarm.document import read_phase
+from skillframe_dualarm.dual_peg import DualPegParams, build
 from skillframe_dualarm.learner import learn
 
 from skillframe.document.file import load, new_document, save
@@ -13,11 +13,17 @@ from skillframe.errors import InputError, UnknownName
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.run.executor import simulate
-from skillframe.run.prepare import prepare
+from skillframe.run.prepare import load_robot_model, prepare
 from skillframe.teaching.sessions import record
 from skillframe.teaching.teacher import TeacherSettings
 
 pytestmark = pytest.mark.needs_plugins
+SCENE = build(DualPegParams())
+
+
+@cache
+def robot():
+    return load_robot_model("dual_panda")
 
 
 @cache

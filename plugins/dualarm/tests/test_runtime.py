@@ -5,12 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from skillframe_dualarm.document import CONFIGURATIONS, Arm, Phase, configured, relative
-from skillframe_dualarm.outcome import classify
 from skillframe_dualarm.runtime import DualArm, stiffnesses
 
 from skillframe.frames import Pose, rotation_matrix
-from skillframe.run.arms import ArmsResult
-from skillframe.skill import Observation, Status, no_reasons
+from skillframe.skill import Observation, Status
 
 TIP = (0.0, 0.0, 0.15)
 FRAMES = {"wrist": (0.0, 0.0, 0.0), "tip": TIP}
@@ -117,23 +115,3 @@ def test_rows_are_independent_of_each_other():
         a, b = many.step(observe(k * DT, moved, rotation)), alone.step(observe(k * DT, moved[1:2], rotation[1:2]))
         assert np.array_equal(a.pose.position[1:2], b.pose.position)
         assert np.array_equal(a.feedforward[1:2], b.feedforward)
-
-
-def result(turned_deg, final_deg, success):
-    n = len(success)
-    turned = np.zeros((n, 2, 3))
-    turned[..., 1] = np.radians(turned_deg)
-    zero = np.zeros(n)
-    return ArmsResult(
-        success=np.array(success), failure=no_reasons(n), status=np.zeros(n, np.int64), reason=no_reasons(n),
-        duration_s=zero, peak_force_n=zero, final_error_m=zero, final_error_rad=np.radians(final_deg), energy_j=zero,
-        arms=("left", "right"), joint_path_rad=np.zeros((n, 2, 7)), turned_rad=turned,
-    )  # fmt: skip
-
-
-def test_failures_are_told_apart_by_how_far_each_tool_turned():
-    runs = result(
-        [[-8, 0], [0.5, -0.5], [20, 18], [15, -15], [-20, -18]], [0.5, 7.0, 8.7, 38.0, 8.0], [True] + 4 * [False]
-    )
-    found = classify(runs, np.radians([8.0, 8.0, 10.0, 8.0, -10.0]), np.array([0.0, 1.0, 0.0]))
-    assert found == ["success", "jam", "common rotation", "turned away", "common rotation"]

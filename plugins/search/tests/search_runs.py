@@ -4,12 +4,12 @@ from functools import cache
 
 import numpy as np
 from skillframe_search import trials
-from skillframe_search.published import FILLET_M
 from skillframe_search.trials import FOUND_M, Task, starts
 
 from skillframe.run.prepare import load_robot_model
 
 __all__ = ["FOUND_M", "PARAMS", "PEG", "demonstrations", "document", "goals", "robot", "scene", "search", "starts"]
+FILLET_M = 0.0008  # of the peg; its size sets how hard the search is
 PEG = {"fillet": FILLET_M, "done_depth": FOUND_M}
 PARAMS = {"peg_in_hole": PEG, "socket": {"done_depth": FOUND_M}}
 SPEED = 0.015

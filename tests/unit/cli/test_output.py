@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from skillframe.campaign.runner import Progress
 from skillframe.cli.campaign_words import progress as campaign_progress
 from skillframe.cli.main import run
-from skillframe.cli.output import PAGE_WIDTH, laid_out, note, progress, quiet_option, table
-from skillframe.cli.reproduce import _show
+from skillframe.cli.output import laid_out, note, progress, quiet_option, table
 
 
 def test_long_work_in_a_pipe_says_a_line_per_tenth_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
@@ -62,14 +61,6 @@ def test_a_table_of_a_width_keeps_every_cell_in_its_column_where_its_words_fit(r
 def test_a_table_that_fits_its_width_has_a_line_per_row(capsys: pytest.CaptureFixture[str]) -> None:
     table(("name", "what"), [["a", "x y"], ["b", "z"]], 12)
     assert capsys.readouterr().out.splitlines() == ["name  what", "a     x y", "b     z"]
-
-
-def test_what_reproduce_says_in_a_pipe_fits_a_page(capsys: pytest.CaptureFixture[str]) -> None:
-    keys = ("row", "summary", "published", "ours", "verdict", "values_are", "wall_s")
-    entries = [dict.fromkeys(keys, "published figures of which there is much to say " * 4)]
-    _show(entries, as_json=False)
-    assert run(["reproduce", "--list"]) == 0
-    assert max(map(len, capsys.readouterr().out.splitlines())) <= PAGE_WIDTH
 
 
 @pytest.mark.parametrize("nothing_in_colour", [True, False])

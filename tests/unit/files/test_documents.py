@@ -117,7 +117,6 @@ TYPED = [
     ["quickstart", "--trials", HUGE],
     ["segment", "x.npz", "--out", "y.json", "--phases", HUGE],
     ["demonstration", "record", "--world", "free", "--out", "y.npz", "--count", HUGE],
-    ["reproduce", "1", "--out", "y", "--seed", HUGE],
 ]
 
 

@@ -4,11 +4,11 @@ from functools import cache
 
 import numpy as np
 import pytest
+from skillframe_papers.rows.crane_runs import MOVING, Follow
 
 from skillframe.errors import InputError
 from skillframe.machine.law.hydraulic import Measured
 from skillframe.machine.law.vdc_actuator import cylinders
-from skillframe.reproduce.crane_runs import MOVING, Follow
 from skillframe.robot.chain import ClosedChain
 from skillframe.robot.model import load_model
 from skillframe.robot.payload import with_payload

@@ -6,11 +6,11 @@ import shutil
 
 import numpy as np
 import pytest
+from skillframe_papers.rows.crane_runs import ABOVE, FIXTURE, MOVING, PRESSING, Follow, diamond, press_and_slide, scene
 
 from skillframe.errors import InputError, SkillframeError
 from skillframe.machine.checks.audit import audit
 from skillframe.machine.law.hydraulic import HydraulicGains
-from skillframe.reproduce.crane_runs import ABOVE, FIXTURE, MOVING, PRESSING, Follow, diamond, press_and_slide, scene
 from skillframe.robot.chain import ClosedChain
 from skillframe.robot.driven import Gains
 from skillframe.robot.model import load_model

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from skillframe import hookimpl
-from skillframe.extend.records import CoordinatorType, Lazy, RowType, WorldType
+from skillframe.extend.records import CoordinatorType, Lazy, WorldType
 
 
 @hookimpl
@@ -32,11 +32,3 @@ def skillframe_worlds() -> Iterable[WorldType]:
         name="dual_peg", summary="a peg with a hemispherical tip, and its hole in a second arm's hand",
         params=dual_peg.DualPegParams, build=dual_peg.build,
     )  # fmt: skip
-
-
-@hookimpl
-def skillframe_rows() -> Iterable[RowType]:
-    """Published results that this plug-in computes."""
-    from skillframe_dualarm.published import row_types
-
-    return row_types()

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from skillframe.extend.hookspecs import hookimpl
-from skillframe.extend.records import Lazy, RowType, SkillType
+from skillframe.extend.records import Lazy, SkillType
 
 
 @hookimpl
@@ -26,11 +26,3 @@ def skillframe_skills() -> Iterable[SkillType]:
         describe=Lazy("skillframe_lmc.describe:describe"),
         explain=Lazy("skillframe_lmc.explain:explain"),
     )
-
-
-@hookimpl
-def skillframe_rows() -> Iterable[RowType]:
-    """Published results that this plug-in computes."""
-    from skillframe_lmc.published import row_types
-
-    return row_types()

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from functools import partial
 
 from skillframe.extend.hookspecs import hookimpl
-from skillframe.extend.records import Lazy, RowType, SkillType
+from skillframe.extend.records import Lazy, SkillType
 
 SUMMARIES = {
     "search": "looks where a blindfolded person looked, with the forces that were felt, until it falls in",
@@ -37,11 +37,3 @@ def skillframe_skills() -> Iterable[SkillType]:
             example=partial(Lazy("skillframe_search.example:example"), kind),
             area=Lazy("skillframe_search.plan:area"),
         )
-
-
-@hookimpl
-def skillframe_rows() -> Iterable[RowType]:
-    """Published results that this plug-in computes."""
-    from skillframe_search.published import row_types
-
-    return row_types()

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from functools import partial
 
 from skillframe.extend.hookspecs import hookimpl
-from skillframe.extend.records import Lazy, RowType, SegmenterType, SkillType
+from skillframe.extend.records import Lazy, SegmenterType, SkillType
 
 
 @hookimpl
@@ -45,11 +45,3 @@ def skillframe_skills() -> Iterable[SkillType]:
         describe=Lazy("skillframe_segmenter.describe:describe"),
         explain=Lazy("skillframe_segmenter.describe:explain"),
     )
-
-
-@hookimpl
-def skillframe_rows() -> Iterable[RowType]:
-    """Published results that this plug-in computes."""
-    from skillframe_segmenter.published import row_types
-
-    return row_types()

@@ -13,6 +13,8 @@ from itertools import product
 
 import numpy as np
 import pinocchio as pin
+from skillframe_dualarm.document import Phase
+from skillframe_dualarm.runtime import DualArm
 
 from skillframe.errors import UnknownName
 from skillframe.frames import rotate
@@ -21,9 +23,7 @@ from skillframe.run.arms import ArmsResult, simulate_arms
 from skillframe.run.executor import Setup
 from skillframe.world.placement import nominal_fixture
 from skillframe.world.scene import Scene
-from skillframe_dualarm.document import Phase
-from skillframe_dualarm.outcome import classify
-from skillframe_dualarm.runtime import DualArm
+from skillframe_papers.rows.outcome import classify
 
 POSTURES = ("upright", "mirrored")
 PUBLISHED = {

@@ -1,23 +1,24 @@
-"""Has a verdict changed? The verdicts that the docs show are committed beside them, for full and for quick runs."""
+"""Has a verdict changed? The verdicts that the docs show ship with this package, for full and quick runs."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from skillframe.files.documents import read_json
-from skillframe.paths import data_dirs
 
-FOLDER = "docs/reproduced"
+FOLDER = Path(__file__).parent / "reproduced"
 
 
 def verdicts(*, quick: bool) -> dict[str, str]:
-    """Verdict by row as committed; empty where the docs do not ship."""
-    for folder in data_dirs(FOLDER):
-        path = folder / ("quick.json" if quick else "reproduce.json")
-        if path.is_file():
-            return {each["row"]: each["verdict"] for each in read_json(path, "install again")}
-    return {}
+    """Verdict by row as committed, of a full or of a quick run.
+
+    Raises:
+        InputError: the file that ships with the package is missing or damaged.
+    """
+    path = FOLDER / ("quick.json" if quick else "reproduce.json")
+    return {each["row"]: each["verdict"] for each in read_json(path, "install skillframe-papers again")}
 
 
 def changes(entries: Sequence[Mapping[str, Any]], committed: Mapping[str, str]) -> list[str]:

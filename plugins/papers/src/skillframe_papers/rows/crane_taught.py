@@ -68,7 +68,7 @@ class Reached(NamedTuple):
 
 
 def taught(job: RowRun) -> RowResult:
-    """The row."""
+    """Row 19: what two demonstrations on each surface teach, and what the skills do on both."""
     pairs, surfaces = range(job.count(3, 1)), SURFACES
     skills = [_teach(job, pair, surface) for pair in pairs for surface in surfaces]
     reached = {(i, surface): _run(job, each, surface) for i, each in enumerate(skills) for surface in surfaces}
@@ -149,7 +149,7 @@ def _picture(job: RowRun, skill: Taught, results: list[Result]) -> Illustration:
     """Ways of the tool, taught and run, in the crane's plane; where stack and stop would touch it."""
     from matplotlib.figure import Figure
 
-    from skillframe.reproduce.drawing import BLUE, GREY, INK, RED, svg
+    from skillframe.report.drawing import BLUE, GREY, INK, RED, svg
 
     figure = Figure(figsize=(8.6, 4.2))
     taught_on, run_on = figure.subplots(1, 2, sharex=True, sharey=True)

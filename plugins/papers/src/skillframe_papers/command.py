@@ -14,10 +14,10 @@ from skillframe.cli.numbers import COUNT, SEED
 from skillframe.cli.output import note, quiet_option
 
 if TYPE_CHECKING:
-    from skillframe.reproduce.runner import Outcome
+    from skillframe_papers.runner import Outcome
 
 
-@click.command(name="reproduce")
+@click.command(name="reproduce", short_help="The papers' results, row by row.")
 @click.argument("rows", nargs=-1, metavar="[ROW]...")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("reproduce"), show_default=True,
               help="Folder for rows, reproduce.json, reproduce.html and reproduce.md.")  # fmt: skip
@@ -45,8 +45,8 @@ def command(
     """
     from skillframe.config import parse_setting
     from skillframe.extend.registry import registry
-    from skillframe.reproduce.jobs import jobs_of
-    from skillframe.reproduce.runner import run
+    from skillframe_papers.jobs import jobs_of
+    from skillframe_papers.runner import run
 
     changed = dict(parse_setting(text) for text in settings)
     jobs = jobs_of(registry(), rows, changed, seed=seed, quick=quick)
@@ -76,7 +76,7 @@ def _settings(values: Mapping[str, Any]) -> str:
 
 def _write(entries: Sequence[Mapping[str, Any]], out: Path) -> None:
     from skillframe.files import write_whole
-    from skillframe.reproduce import document, page, store
+    from skillframe_papers import document, page, store
 
     store.write_table(out, entries)
     write_whole(out / "reproduce.html", page.render(entries).encode())
@@ -84,7 +84,7 @@ def _write(entries: Sequence[Mapping[str, Any]], out: Path) -> None:
 
 
 def _end(outcome: Outcome, out: Path, quick: bool, as_json: bool) -> int:
-    from skillframe.reproduce import committed
+    from skillframe_papers import committed
 
     changed = committed.changes(outcome.entries, committed.verdicts(quick=quick))
     _show(outcome.entries, as_json)
@@ -100,7 +100,7 @@ def _end(outcome: Outcome, out: Path, quick: bool, as_json: bool) -> int:
     if outcome.broken:
         raise RuntimeError("; ".join(outcome.broken))
     if outcome.refused:
-        from skillframe.reproduce.runner import RowFailed
+        from skillframe_papers.runner import RowFailed
 
         raise RowFailed("; ".join(outcome.refused))
     return 1 if changed else 0
@@ -108,7 +108,7 @@ def _end(outcome: Outcome, out: Path, quick: bool, as_json: bool) -> int:
 
 def _show(entries: Sequence[Mapping[str, Any]], as_json: bool) -> None:
     from skillframe.cli.output import PAGE_WIDTH, emit_json, table
-    from skillframe.reproduce import store
+    from skillframe_papers import store
 
     if as_json:
         emit_json(store.table(entries))

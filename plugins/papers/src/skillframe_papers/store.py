@@ -15,7 +15,7 @@ from skillframe.errors import InputError
 from skillframe.extend.records import RowResult, RowType
 from skillframe.files import write_whole
 from skillframe.files.documents import read_json
-from skillframe.reproduce.jobs import Job
+from skillframe_papers.jobs import Job
 
 ROWS, TABLE = "rows", "reproduce.json"
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from skillframe.report.markup import Markup, data_uri, figure, join, note, table, tag
 from skillframe.report.page import POLICY
-from skillframe.reproduce.document import origin, threshold
+from skillframe_papers.document import origin, threshold
 
 BADGES = {"pass": "badge won", "fail": "badge lost", "reported": "badge"}
 HEAD = ("row", "what is claimed", "published", "ours", "verdict", "values")

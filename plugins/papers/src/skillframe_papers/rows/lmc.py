@@ -19,11 +19,11 @@ from skillframe.document.source import learned
 from skillframe.extend.records import Document, Illustration, LearnOptions, RowResult, RowRun
 from skillframe.extend.registry import registry
 from skillframe.frames import Float
-from skillframe.reproduce.bars import reached
 from skillframe.run.executor import simulate
 from skillframe.run.prepare import load_robot_model, load_world, prepare
 from skillframe.teaching.sessions import record
 from skillframe.teaching.teacher import TeacherSettings
+from skillframe_papers.bars import reached
 
 DOWN, X, Y = np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 SHARE = 0.95

@@ -19,9 +19,9 @@ from typing import Any, NamedTuple
 from skillframe.errors import SkillframeError
 from skillframe.extend.records import RowRun
 from skillframe.extend.registry import registry
-from skillframe.reproduce import store
-from skillframe.reproduce.ending import Ending, end_all, end_with_parent
-from skillframe.reproduce.jobs import Job
+from skillframe_papers import store
+from skillframe_papers.ending import Ending, end_all, end_with_parent
+from skillframe_papers.jobs import Job
 
 Tell = Callable[[str], None]
 

@@ -10,11 +10,12 @@ from functools import cache
 from math import radians
 from typing import Any, NamedTuple
 
+from skillframe_search.trials import NOBODY_KNEW, Task, demonstrations, document, goals, search, share
+
 from skillframe.campaign.statistics import clopper_pearson
 from skillframe.extend.records import Document, Illustration, RowResult, RowRun
 from skillframe.frames import Float
-from skillframe.reproduce.bars import reached
-from skillframe_search.trials import NOBODY_KNEW, Task, demonstrations, document, goals, search, share
+from skillframe_papers.bars import reached
 
 GOALS, QUICK_GOALS = 60, 10
 GIVEN = 5  # demonstrations
@@ -155,7 +156,7 @@ def _curves(tried: dict[tuple[str, str], Tried]) -> Illustration:
     import numpy as np
     from matplotlib.figure import Figure
 
-    from skillframe.reproduce.drawing import BLUE, GREEN, GREY, RED, svg
+    from skillframe.report.drawing import BLUE, GREEN, GREY, RED, svg
 
     figure = Figure(figsize=(7.4, 3.4))
     colours = {"random walk": GREY, "samples, tour": BLUE, "ergodic": RED, "spiral": GREEN}

@@ -6,16 +6,16 @@ friction, arms standing and one of them hanging. It is computed once for the row
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from skillframe_dualarm.document import Arm, Phase, configured, relative
 
 from skillframe.extend.records import Illustration, RowResult, RowRun
 from skillframe.run.prepare import load_robot_model, load_world
-from skillframe_dualarm.document import Arm, Phase, configured, relative
-from skillframe_dualarm.experiment import POSTURES, PUBLISHED, Row, insert, largest
+from skillframe_papers.rows.insertion import POSTURES, PUBLISHED, Row, insert, largest
 
 NAMES = ("A", "B", "C", "D", "E", "E*")
 FULL, QUICK = (4.0, 6.0, 8.0, 10.0, 12.0, 14.0), (4.0, 8.0, 12.0)
@@ -72,7 +72,7 @@ def _computed(settings: tuple[tuple[str, float], ...], seed: int, quick: bool) -
     rows = {}
     for posture in POSTURES[:1] if quick else POSTURES:
         for name in NAMES[:5] if quick else NAMES:
-            phase = _phase(name, scene.tool.frames, values)
+            phase = phase_of(name, scene.tool.frames, values)
             stiff = [0.0, values["robot.joint_friction"]]
             rows[name, posture] = insert(
                 robot, scene, phase, tilts, stiff, posture=posture, seed=seed, duration_s=9.0 if quick else 20.0
@@ -80,7 +80,8 @@ def _computed(settings: tuple[tuple[str, float], ...], seed: int, quick: bool) -
     return Sweep(rows, values["robot.joint_friction"])
 
 
-def _phase(name: str, frames: dict[str, Any], values: dict[str, float]) -> Phase:
+def phase_of(name: str, frames: dict[str, Any], values: Mapping[str, float]) -> Phase:
+    """A configuration of `NAMES`, "E*" for the relative task of E, pushed as the row's settings say."""
     arm = Arm(center_of_compliance=frames["tip"], share=1.0), Arm(center_of_compliance=frames["tip"])
     phase = Phase(arms=arm, lead_force_n=values["lead_force_n"], speed=values["speed"])
     made = configured(phase, name[0], frames)
@@ -229,7 +230,7 @@ def _picture(sweep: Sweep) -> Illustration:
     """Table I as bars: published, and ours with and without joint friction."""
     from matplotlib.figure import Figure
 
-    from skillframe.reproduce.drawing import BLUE, GREY, INK, RED, svg
+    from skillframe.report.drawing import BLUE, GREY, INK, RED, svg
 
     figure = Figure(figsize=(7.0, 3.8))
     canvas = figure.add_subplot()

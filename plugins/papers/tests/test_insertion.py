@@ -1,18 +1,31 @@
 """The published insertions: what joint friction decides, and what the relative task changes."""
 
+from functools import cache
+
 import numpy as np
 import pytest
-from pairs import SCENE, phase, robot
-from skillframe_dualarm.experiment import PUBLISHED, insert, largest, posed
+from skillframe_dualarm.dual_peg import DualPegParams, build
+from skillframe_papers.published import INSERTION
+from skillframe_papers.rows.insertion import PUBLISHED, insert, largest, posed
+from skillframe_papers.rows.two_arms import phase_of
 
 from skillframe.errors import UnknownName
+from skillframe.run.prepare import load_robot_model
+
+SCENE = build(DualPegParams())
 
 TILTS = [4.0, 6.0, 8.0, 10.0, 12.0, 14.0]
 BOTH = [sign * tilt for sign in (1.0, -1.0) for tilt in TILTS]
 
 
+@cache
+def robot():
+    return load_robot_model("dual_panda")
+
+
 def outcomes(name, tilts, frictions, **options):
-    return insert(robot(), SCENE, phase(name), tilts, frictions, **options)
+    """Insertions of a configuration; "E*" is the relative task of E."""
+    return insert(robot(), SCENE, phase_of(name, SCENE.tool.frames, INSERTION), tilts, frictions, **options)
 
 
 def test_an_unknown_posture_is_refused():

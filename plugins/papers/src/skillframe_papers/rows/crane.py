@@ -1,4 +1,4 @@
-"""Rows of the hydraulic crane: what its model alone can answer, and what its loop answers.
+"""Rows 20 to 22 of the papers' results: what the crane's model alone can answer, and what its loop answers.
 
 Holding forces follow from gravity at rest, F = J_p^-T g(z), and pressures from F = p_a A_a - p_b A_b. Runs are those of
 `crane_runs`: cylinders as FMUs, force from pressures, friction and payload identified in the air before.
@@ -7,61 +7,28 @@ Holding forces follow from gravity at rest, F = J_p^-T g(z), and pressures from 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from skillframe.extend.records import RowResult, RowRun, RowType
+import numpy as np
 
-if TYPE_CHECKING:
-    from skillframe.frames import Float
-    from skillframe.run.executor import Result
+from skillframe.extend.records import RowResult, RowRun
+from skillframe.frames import Float
+from skillframe.robot.chain import ClosedChain
+from skillframe.robot.model import load_model
+from skillframe.robot.payload import with_payload
+from skillframe.robot.spec import load_robot
+from skillframe.run.executor import Result
+from skillframe_papers.rows import crane_runs
 
 START = (math.pi / 4, -math.pi / 2, 0.5)
 PRESSURES = {"lift": (130.0e5, 30.9148e5), "tilt": (90.0e5, 35.7169e5)}  # [Pa], published start values
-DATA = "HydraulicManipulatorVDC"
 ERRORS = ((1.0, 1.0), (0.9, 0.8), (1.1, 1.2), (0.9, 1.2), (1.1, 0.8))
 """Mass and friction of the plant over what the law believes; the first is exact."""
 LOADS = ((1.0, 1.0), (0.98, 0.8), (1.02, 1.2), (0.98, 1.2))
 LANDED_S, FAST = 7.0, 0.6  # contact has settled; share of the largest speed that counts as sliding
 
 
-def row_types() -> Iterable[RowType]:
-    """The rows 19 to 22."""
-    yield RowType(
-        name="19", topic="crane", summary="the crane learns and reproduces in contact, stiff and soft",
-        published="demonstrated, no figures", source="IROS 2018 (abstract)",
-        bar="from two teleoperated demonstrations on wood as on styrofoam: a push that slides on stack and "
-        "stop, both pushes within 10 degrees, and every run on either ends in the corner with less than 12 kN",
-        settings={"operator.angle_deg": -45.0, "operator.delay_s": 0.05, "world.friction": 0.3},
-        run=_taught,
-    )  # fmt: skip
-    yield RowType(
-        name="20", summary="contact force from chamber pressures while moving", published="4.1 % at 8000 N",
-        source="Koivumäki and Mattila, T-RO 2015 (abstract)", bar="largest error while sliding at most 5 % of the load",
-        settings={"press.depth": 0.12, "duration": 14.0}, group="crane", run=_force,
-    )  # fmt: skip
-    yield RowType(
-        name="21", topic="crane", summary="pressures that hold the crane at its start",
-        published="130/30.9 and 90/35.7 bar",
-        source=f"{DATA}, start values of the simulation", bar="net piston forces within 2 %", frozen=True,
-        settings={"robot.payload": 475.0, "cylinder.bore": 0.080, "cylinder.rod": 0.045}, run=_holding,
-    )  # fmt: skip
-    yield RowType(
-        name="22", summary="diamond path of 30 s with model errors of 10 % and friction errors of 20 %",
-        published="no figure found", source=DATA, bar="bounded: no trial stops, no error above 0.1 m",
-        settings={"duration": 30.0}, group="crane", run=_diamond,
-    )  # fmt: skip
-
-
-def _taught(job: RowRun) -> RowResult:
-    from skillframe.reproduce.crane_taught import taught
-
-    return taught(job)
-
-
 def _draws(errors: Any) -> dict[str, Float]:
-    import numpy as np
-
     mass, friction = np.array(errors).T
     return {"robot.mass_scale": mass, "actuator.friction_scale": friction}
 
@@ -72,12 +39,8 @@ def _stopped(result: Result, seconds: float) -> str:
     return str(result.failure[short[0]] or result.reason[short[0]]) if short else ""
 
 
-def _diamond(job: RowRun) -> RowResult:
-    """Error of the tool on the published path."""
-    import numpy as np
-
-    from skillframe.reproduce import crane_runs
-
+def diamond(job: RowRun) -> RowResult:
+    """Row 22: error of the tool on the published path."""
     seconds = min(float(job.settings["duration"]), job.count(30, 5))
     errors = ERRORS[: job.count(len(ERRORS), 2)]
     where = crane_runs.scene(crane_runs.CORNERS[0], plate=False)
@@ -101,12 +64,8 @@ def _diamond(job: RowRun) -> RowResult:
     )  # fmt: skip
 
 
-def _force(job: RowRun) -> RowResult:
-    """Estimated against true contact force while the tool slides along a plate."""
-    import numpy as np
-
-    from skillframe.reproduce import crane_runs
-
+def force(job: RowRun) -> RowResult:
+    """Row 20: estimated against true contact force while the tool slides along a plate."""
     seconds = min(float(job.settings["duration"]), job.count(60, 10))
     errors = LOADS[: job.count(len(LOADS), 2)]
     where = crane_runs.scene(np.array([crane_runs.FIXTURE[0], 0.0, crane_runs.ABOVE]), plate=True)
@@ -134,25 +93,18 @@ def _force(job: RowRun) -> RowResult:
     )  # fmt: skip
 
 
-def _holding(job: RowRun) -> RowResult:
-    """Net piston forces at rest against those of the published pressures."""
-    import numpy as np
-
-    from skillframe.robot.chain import ClosedChain
-    from skillframe.robot.model import load_model
-    from skillframe.robot.payload import with_payload
-    from skillframe.robot.spec import load_robot
-
+def holding(job: RowRun) -> RowResult:
+    """Row 21: net piston forces at rest against those of the published pressures."""
     bore, rod, payload = (float(job.settings[k]) for k in ("cylinder.bore", "cylinder.rod", "robot.payload"))
     area_a = math.pi / 4.0 * bore**2
     area_b = area_a - math.pi / 4.0 * rod**2
     robot = load_model(with_payload(load_robot("hiab_xs031"), payload))
-    force = ClosedChain(robot).at(np.array(START), np.zeros(3)).holding_force()
+    mine = ClosedChain(robot).at(np.array(START), np.zeros(3)).holding_force()
     rows, off = [], []
-    for mine, (name, (a, b)) in zip(force, PRESSURES.items(), strict=False):
+    for ours, (name, (a, b)) in zip(mine, PRESSURES.items(), strict=False):
         theirs = a * area_a - b * area_b
-        off.append(float(mine) / theirs - 1.0)
-        rows.append((name, f"{theirs / 1e3:.2f} kN", f"{mine / 1e3:.2f} kN", f"{100.0 * off[-1]:+.1f} %"))
+        off.append(float(ours) / theirs - 1.0)
+        rows.append((name, f"{theirs / 1e3:.2f} kN", f"{ours / 1e3:.2f} kN", f"{100.0 * off[-1]:+.1f} %"))
     worst = max(abs(x) for x in off)
     return RowResult(
         ours=", ".join(f"{row[0]} {row[2]} ({row[3]})" for row in rows), verdict="pass" if worst <= 0.02 else "fail",

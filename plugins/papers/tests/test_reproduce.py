@@ -12,12 +12,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from skillframe_papers import committed, document, page, store
+from skillframe_papers.command import _show
+from skillframe_papers.jobs import jobs_of
 
 from skillframe.cli.main import run
+from skillframe.cli.output import PAGE_WIDTH
 from skillframe.extend.records import Illustration, RowResult, RowType
 from skillframe.extend.registry import Plugin, Registry
-from skillframe.reproduce import committed, document, page, store
-from skillframe.reproduce.jobs import jobs_of
 
 PLUGIN = """
     import os, pathlib, time
@@ -61,7 +63,7 @@ def rows(tmp_path, monkeypatch):
     (info / "entry_points.txt").write_text("[skillframe]\ntoy = toy_rows\n")
     counted = tmp_path / "counted"
     counted.write_text("")
-    monkeypatch.setenv("SKILLFRAME_PLUGINS", "toy")
+    monkeypatch.setenv("SKILLFRAME_PLUGINS", "toy,papers")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(place), os.environ.get("PYTHONPATH", "")]))
     monkeypatch.setenv("COUNTED", str(counted))
     return counted
@@ -157,6 +159,9 @@ def test_what_is_unknown_is_refused_in_a_sentence(rows, tmp_path, capsys):
     assert run(["reproduce", "21", "--set", "cylinder.bor=1", "--out", str(tmp_path)]) == 2
     assert "did you mean 'cylinder.bore'" in capsys.readouterr().err
     assert run(["reproduce", "21", "--set", "cylinder.bore=wide", "--out", str(tmp_path)]) == 2
+    capsys.readouterr()
+    assert run(["reproduce", "1", "--out", str(tmp_path / "out"), "--seed", "1" * 41]) == 2
+    assert "too large a whole number" in capsys.readouterr().err and not (tmp_path / "out").exists()
 
 
 def test_the_listing_says_what_can_be_set(capsys):
@@ -225,6 +230,13 @@ def test_the_docs_page_keeps_its_tables_whole():
     assert "- chosen together: method and worlds were developed side by side" in text and "- difference: why" in text
 
 
+def test_what_the_command_says_in_a_pipe_fits_a_page(capsys):
+    keys = ("row", "summary", "published", "ours", "verdict", "values_are", "wall_s")
+    _show([dict.fromkeys(keys, "published figures of which there is much to say " * 4)], as_json=False)
+    assert run(["reproduce", "--list"]) == 0
+    assert max(map(len, capsys.readouterr().out.splitlines())) <= PAGE_WIDTH
+
+
 def test_only_a_verdict_that_differs_from_the_docs_is_a_change():
     found = [{"row": "1", "verdict": "pass"}, {"row": "2", "verdict": "fail"}, {"row": "3", "verdict": "fail"}]
     assert len(committed.changes(found, {"1": "pass", "2": "pass"})) == 1
@@ -248,7 +260,7 @@ def test_a_threshold_that_anything_reaches_can_be_missed_and_reaching_it_is_no_p
 
 
 def test_a_share_that_is_missed_and_not_excluded_is_undecided_with_its_interval():
-    from skillframe.reproduce.bars import judged, undecided
+    from skillframe_papers.bars import judged, undecided
 
     assert judged(11, 12, 0.9, quick=False) == "pass" and not undecided(11, 12, 0.9, quick=False)
     assert judged(10, 12, 0.9, quick=False) == "reported"
@@ -258,7 +270,7 @@ def test_a_share_that_is_missed_and_not_excluded_is_undecided_with_its_interval(
     assert judged(6, 12, 0.9, quick=False) == "fail" and not undecided(6, 12, 0.9, quick=False)
 
 
-COMMITTED = Path(__file__).parents[3] / "docs" / "reproduced" / "reproduce.json"
+COMMITTED = committed.FOLDER / "reproduce.json"
 
 
 def test_the_committed_table_counts_as_passes_only_rows_that_can_fail():
@@ -279,7 +291,7 @@ def test_each_committed_row_says_of_its_values_and_threshold_what_the_code_says(
 
 
 def test_a_quick_run_misses_a_share_only_where_its_counts_exclude_it():
-    from skillframe.reproduce.bars import reached
+    from skillframe_papers.bars import reached
 
     assert reached(54, 60, 0.9, quick=False) and not reached(53, 60, 0.9, quick=False)
     assert reached(9, 15, 0.75, quick=True) and not reached(6, 15, 0.75, quick=True)
@@ -287,8 +299,9 @@ def test_a_quick_run_misses_a_share_only_where_its_counts_exclude_it():
 
 
 def test_the_crane_is_taught_with_the_settings_that_the_how_to_gives():
+    from skillframe_papers.rows.crane_taught import LEARN
+
     from skillframe.config import parse_setting
-    from skillframe.reproduce.crane_taught import LEARN
 
     text = (Path(__file__).parents[3] / "docs" / "how-to" / "teleoperation.md").read_text(encoding="utf-8")
     command = text.partition("skillframe learn ")[2].partition("```")[0]
