@@ -1,11 +1,14 @@
-"""What is installed is typed: the wheels carry `py.typed`, and a user's own checker sees the types of the package."""
+"""What is installed is typed and whole: a user's own checker sees the types, and data that ships is found."""
 
+import json
+import os
 import re
 import subprocess
 import sys
 import sysconfig
 import venv
 import zipfile
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -81,3 +84,17 @@ def test_the_type_check_of_a_user_sees_the_types_of_the_package(installed, tmp_p
     assert re.findall(r"error: (.*)", said) == [
         'Incompatible types in assignment (expression has type "float", variable has type "str")  [assignment]'
     ]
+
+
+def test_a_row_is_computed_from_the_wheels_and_held_against_the_verdict_that_ships(installed, tmp_path):
+    said = "from skillframe_papers import committed as c; print(c.__file__, len(c.verdicts(quick=False)))"
+    where, count = subprocess.run(
+        [installed, "-c", said], cwd=tmp_path, capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert Path(where).is_relative_to(installed.parents[1]) and count == "23"
+    command = [installed, "-m", "skillframe.cli.main", "reproduce", "21", "--quick", "--json", "--out", tmp_path]
+    pinocchio = find_spec("pinocchio")  # found through a .pth of its own
+    environment = {**os.environ, "PYTHONPATH": str(Path(pinocchio.origin).parents[1])}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert [row["verdict"] for row in json.loads(done.stdout)] == ["pass"]
