@@ -23,13 +23,14 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic
 
 from skillframe.campaign.crew import Crew, SchedulerError
-from skillframe.campaign.driver import Answer, Died, Evaluate, Raised
+from skillframe.campaign.driver import Answer, Died, Raised
 from skillframe.campaign.identity import Identity
-from skillframe.campaign.rows import ChunkJob, Row
+from skillframe.campaign.rows import Row
 from skillframe.campaign.trouble import is_trouble, said
+from skillframe.campaign.work import WorkT
 from skillframe.campaign.worker import guarded, share_file
 from skillframe.errors import InputError
 
@@ -58,29 +59,29 @@ class _MemoryDeaths(logging.Handler):
 
 
 @dataclass(slots=True, kw_only=True)
-class _Task:
+class _Task(Generic[WorkT]):
     """A job on its way: the workers it met trouble on, and where it runs now."""
 
-    job: ChunkJob
+    job: WorkT
     tried: set[str] = field(default_factory=set)
     worker: str = ""
     watch: Path = Path()
     gone_since: float | None = None
 
 
-class ClusterPool:
+class ClusterPool(Generic[WorkT]):
     """A pool of Dask workers, one job each.
 
     Args:
         evaluate: importable in the workers.
-        seconds: wall time that a job may take without progress.
+        seconds: wall time that a job may take without progress; infinite: for ever.
         workers: number of local processes, where no scheduler is given.
-        scheduler: address of a running scheduler, whose workers see the campaign's folder under the same path.
+        scheduler: address of a running scheduler, whose workers see `watch` under the same path.
         memory_bytes: limit per local worker; None shares the machine's memory between them and this process.
         watch: folder for the workers' files, seen by all of them: made here, and removed at the end.
         ours: what this process is; workers must be the same.
         needed: distributions of plug-ins that the workers must have.
-        tell: told now and then how many trials' worth of the jobs in flight is done.
+        tell: told now and then how many rows' worth of the jobs in flight is done.
         note: told, in a sentence, of workers that get no work.
 
     Raises:
@@ -89,7 +90,7 @@ class ClusterPool:
     """
 
     def __init__(
-        self, evaluate: Evaluate, seconds: float, *, watch: Path, ours: Identity, needed: set[str],
+        self, evaluate: Callable[[WorkT], list[Row]], seconds: float, *, watch: Path, ours: Identity, needed: set[str],
         tell: Callable[[float], None], note: Callable[[str], None], workers: int = 1, scheduler: str | None = None,
         memory_bytes: int | None = None,
     ) -> None:  # fmt: skip
@@ -109,8 +110,8 @@ class ClusterPool:
             raise
         self._crew = Crew(self._client, ours, needed, note, own=scheduler is None)
         self._planned = len(self._client.nthreads())
-        self._waiting: deque[_Task] = deque()
-        self._flying: dict[Any, _Task] = {}
+        self._waiting: deque[_Task[WorkT]] = deque()
+        self._flying: dict[Any, _Task[WorkT]] = {}
         self._ended = threading.Event()
         self._number = count()
 
@@ -126,7 +127,7 @@ class ClusterPool:
         try:
             self._watch.mkdir(mode=0o700)
         except FileExistsError:
-            raise InputError(self._watch, "is not the folder of this campaign's workers", "delete it") from None
+            raise InputError(self._watch, "is not a folder of workers", "delete it") from None
         self._stack.callback(shutil.rmtree, self._watch, ignore_errors=True)
 
     def _listen(self) -> _MemoryDeaths:
@@ -177,7 +178,7 @@ class ClusterPool:
             ) from None
         return client
 
-    def submit(self, job: ChunkJob) -> None:
+    def submit(self, job: WorkT) -> None:
         """Send a job to a worker that is free, as soon as there is one."""
         self._waiting.append(_Task(job=job))
         self._assign()
@@ -192,7 +193,7 @@ class ClusterPool:
                 self._waiting.remove(task)
                 self._send(task, address)
 
-    def _send(self, task: _Task, address: str) -> None:
+    def _send(self, task: _Task[WorkT], address: str) -> None:
         task.worker, task.gone_since = address, None
         task.watch = self._watch / f"job-{next(self._number)}.txt"
         future = self._client.submit(
@@ -202,7 +203,7 @@ class ClusterPool:
         self._flying[future] = task
         future.add_done_callback(lambda _: self._ended.set())
 
-    def next(self) -> tuple[ChunkJob, Answer]:
+    def next(self) -> tuple[WorkT, Answer]:
         """Wait for the next job to end."""
         while True:
             future = self._wait()
@@ -231,10 +232,10 @@ class ClusterPool:
             self._assign()
             self._ended.wait(LOOK_S)
             if time.monotonic() >= due:
-                self._tell(sum(_share(task.watch) * len(task.job.trials) for task in self._flying.values()))
+                self._tell(sum(_share(task.watch) * task.job.size for task in self._flying.values()))
                 due = time.monotonic() + TELL_S
 
-    def _is_gone(self, task: _Task) -> bool:
+    def _is_gone(self, task: _Task[WorkT]) -> bool:
         """Whether a job's worker left some time ago and Dask, told to use no other, waits for it to come back."""
         if task.worker in self._crew.present:
             task.gone_since = None
@@ -242,7 +243,7 @@ class ClusterPool:
         task.gone_since = task.gone_since or time.monotonic()
         return time.monotonic() - task.gone_since > GONE_S
 
-    def _answer(self, future: Any, task: _Task) -> Answer | None:
+    def _answer(self, future: Any, task: _Task[WorkT]) -> Answer | None:
         """What became of a job; None if its worker left before it began, or with the rows before they were fetched."""
         from distributed import KilledWorker
         from distributed.client import FutureCancelledError
@@ -273,7 +274,7 @@ class ClusterPool:
             return answer._replace(text=f"{answer.text} (worker {task.worker})")
         return answer
 
-    def _fetched(self, gathered: Any, task: _Task) -> bool:
+    def _fetched(self, gathered: Any, task: _Task[WorkT]) -> bool:
         """Wait for rows on their way; False if their worker died with them, for no other worker may make them again."""
         while not wait([gathered], timeout=LOOK_S).done:
             self._crew.look()
@@ -281,9 +282,9 @@ class ClusterPool:
                 return False
         return True
 
-    def _goes_elsewhere(self, task: _Task, answer: Answer) -> bool:
+    def _goes_elsewhere(self, task: _Task[WorkT], answer: Answer) -> bool:
         """Whether trouble of the environment sends a job to another worker; the one that had it gets no more work."""
-        if not isinstance(answer, Raised) or not answer.trouble or (answer.memory and len(task.job.trials) > 1):
+        if not isinstance(answer, Raised) or not answer.trouble or (answer.memory and task.job.size > 1):
             return False
         task.tried.add(task.worker)
         if len(task.tried) >= TRIES or not self._crew.others(task.tried):

@@ -12,12 +12,13 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from typing import Generic, NamedTuple, Protocol
 
 from skillframe.campaign.provenance import environment
 from skillframe.campaign.pulse import heard
 from skillframe.campaign.rows import ChunkJob, Row
 from skillframe.campaign.trouble import CampaignError, Evaluate, Raised, attempt
+from skillframe.campaign.work import WorkT
 
 __all__ = ["Answer", "CampaignError", "Died", "Driver", "Evaluate", "InProcess", "Pool", "Raised", "chunk_size"]
 
@@ -35,7 +36,7 @@ class Died(NamedTuple):
 Answer = list[Row] | Died | Raised
 
 
-class Pool(Protocol):
+class Pool(Protocol[WorkT]):
     """Where jobs run."""
 
     @property
@@ -46,10 +47,10 @@ class Pool(Protocol):
     def ran_on(self) -> Mapping[str, str]:
         """Environment of the process that gave the last answer."""
 
-    def submit(self, job: ChunkJob) -> None:
+    def submit(self, job: WorkT) -> None:
         """Start a job."""
 
-    def next(self) -> tuple[ChunkJob, Answer]:
+    def next(self) -> tuple[WorkT, Answer]:
         """The next job to end, and how; trouble of the environment only where no other worker is left to try."""
 
     def close(self) -> None:
@@ -70,7 +71,7 @@ class Driver:
         fix: what to type once trouble of the environment is over.
     """
 
-    pool: Pool
+    pool: Pool[ChunkJob]
     keep: Callable[[list[Row]], None]
     lost: Callable[[ChunkJob, str], Row]
     enough: Callable[[], bool]
@@ -161,29 +162,29 @@ def chunk_size(trials: int, workers: int, largest: int) -> int:
     return max(1, math.ceil(trials / (rounds * workers)))
 
 
-class InProcess:
+class InProcess(Generic[WorkT]):
     """A pool of one: this process; a trial that kills it ends the campaign, which can be resumed.
 
     Args:
         evaluate: the work.
-        tell: told now and then how many trials' worth of the job is done.
+        tell: told now and then how many rows' worth of the job is done.
     """
 
     size = 1
 
-    def __init__(self, evaluate: Evaluate, tell: Callable[[float], None]) -> None:
+    def __init__(self, evaluate: Callable[[WorkT], list[Row]], tell: Callable[[float], None]) -> None:
         self._evaluate, self._tell = evaluate, tell
-        self._jobs: deque[ChunkJob] = deque()
+        self._jobs: deque[WorkT] = deque()
         self.ran_on: Mapping[str, str] = environment()
 
-    def submit(self, job: ChunkJob) -> None:
+    def submit(self, job: WorkT) -> None:
         """Queue a job."""
         self._jobs.append(job)
 
-    def next(self) -> tuple[ChunkJob, Answer]:
+    def next(self) -> tuple[WorkT, Answer]:
         """Run the next job now."""
         job = self._jobs.popleft()
-        with heard(lambda share: self._tell(share * len(job.trials))):
+        with heard(lambda share: self._tell(share * job.size)):
             return job, attempt(self._evaluate, job)
 
     def close(self) -> None:

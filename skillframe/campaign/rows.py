@@ -47,6 +47,11 @@ class ChunkJob:
     trials: tuple[int, ...]
     traces: bool = False
 
+    @property
+    def size(self) -> int:
+        """How many rows it gives."""
+        return len(self.trials)
+
 
 def trials_of(job: ChunkJob, spec: CampaignSpec) -> str:
     """The job in words: "trials 0 to 15 of peg.skill.json"."""

@@ -161,14 +161,14 @@ class _Session:
                 f"is now, go on there with skillframe campaign resume"
             )
 
-    def _again(self, pool: Pool) -> None:
+    def _again(self, pool: Pool[ChunkJob]) -> None:
         """Run once more what is to leave a trace."""
         jobs = self._untraced()
         if jobs:
             self._tell(f"{sum(len(job.trials) for job in jobs)} of them run again, to leave traces", usual=True)
         self._driver(pool, self._keep_traces, traces=True).run(jobs)
 
-    def _pool(self, evaluate: Evaluate) -> Pool:
+    def _pool(self, evaluate: Evaluate) -> Pool[ChunkJob]:
         if self.options.workers is None and self.options.scheduler is None:
             return InProcess(evaluate, self._tell_share)
         from skillframe.campaign.cluster import ClusterPool
@@ -180,7 +180,7 @@ class _Session:
             ours=ours, needed=needed_plugins(self.spec, ours), note=self._tell,
         )  # fmt: skip
 
-    def _driver(self, pool: Pool, keep: Callable[[list[Row]], None], traces: bool = False) -> Driver:
+    def _driver(self, pool: Pool[ChunkJob], keep: Callable[[list[Row]], None], traces: bool = False) -> Driver:
         return Driver(
             pool=pool, keep=keep, lost=self._lost, enough=lambda: not traces and self.rule.after is not None,
             words=lambda job: trials_of(job, self.spec), tell=self._tell, fix=_resume(self.spec.folder),

@@ -27,6 +27,7 @@ from types import TracebackType
 from typing import NamedTuple
 
 from skillframe.campaign.rows import ChunkJob, Row
+from skillframe.campaign.work import WorkT
 from skillframe.errors import InputError, MissingDependency, SkillframeError, UnknownName
 from skillframe.extend.registry import BadPlugin, PluginConflict
 
@@ -77,7 +78,7 @@ def needed(what: str) -> Iterator[None]:
         raise Unusable(f"{what} cannot be loaded: {said(error)}") from error
 
 
-def attempt(evaluate: Evaluate, job: ChunkJob) -> list[Row] | Raised:
+def attempt(evaluate: Callable[[WorkT], list[Row]], job: WorkT) -> list[Row] | Raised:
     """Run a job; what it raises is judged, `sys.exit` included, and only Ctrl-C goes through."""
     try:
         return evaluate(job)

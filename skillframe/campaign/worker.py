@@ -11,15 +11,18 @@ this module in every worker it starts (`preload`) and calls `dask_setup`.
 from __future__ import annotations
 
 import faulthandler
+import math
 import signal
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import TextIO
 
 from skillframe.campaign.pulse import Listener, heard
-from skillframe.campaign.rows import ChunkJob, Row
-from skillframe.campaign.trouble import Evaluate, Raised, attempt
+from skillframe.campaign.rows import Row
+from skillframe.campaign.trouble import Raised, attempt
+from skillframe.campaign.work import WorkT
 
 PULSE_S = 0.5
 
@@ -29,22 +32,22 @@ def dask_setup(worker: object) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def guarded(evaluate: Evaluate, job: ChunkJob, seconds: float, watch: str) -> list[Row] | Raised:
+def guarded(evaluate: Callable[[WorkT], list[Row]], job: WorkT, seconds: float, watch: str) -> list[Row] | Raised:
     """Run a job; once it makes no progress any more, the process is ended and what it was doing is written to a file.
 
     Args:
         evaluate: the work.
         job: its argument.
-        seconds: wall time without progress after which the worker ends itself.
+        seconds: wall time without progress after which the worker ends itself; infinite: never.
         watch: path of the file, removed if the job ends in time.
     """
     path, share = Path(watch), share_file(Path(watch))
     try:
         file = path.open("x", encoding="utf-8")
     except OSError as error:
-        return Raised(f"the worker cannot write into the campaign's folder ({error})", trouble=True)
+        return Raised(f"the worker cannot write into {path.parent} ({error})", trouble=True)
     with file:
-        faulthandler.dump_traceback_later(seconds, exit=True, file=file)
+        _wind(seconds, file)
         try:
             with heard(_pulse(share, seconds, file)):
                 return attempt(evaluate, job)
@@ -53,6 +56,12 @@ def guarded(evaluate: Evaluate, job: ChunkJob, seconds: float, watch: str) -> li
             with suppress(OSError):
                 path.unlink(missing_ok=True)
                 share.unlink(missing_ok=True)
+
+
+def _wind(seconds: float, file: TextIO) -> None:
+    """Begin the watchdog's time again."""
+    if math.isfinite(seconds):
+        faulthandler.dump_traceback_later(seconds, exit=True, file=file)
 
 
 def share_file(watch: Path) -> Path:
@@ -70,7 +79,7 @@ def _pulse(path: Path, seconds: float, file: TextIO) -> Listener:
         now = time.monotonic()
         if now >= due and share > furthest:
             due, furthest = now + every, share
-            faulthandler.dump_traceback_later(seconds, exit=True, file=file)
+            _wind(seconds, file)
             with suppress(OSError):
                 path.write_text(f"{share:.4f}", encoding="utf-8")
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from skillframe.cli.endings import TRACE
+from skillframe.cli.interrupts import terminable
 from skillframe.cli.numbers import COUNT, NATURAL, POSITIVE
 from skillframe.cli.output import note, quiet_option
 
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from skillframe.campaign.runner import Options
 
 _FOLDER = click.Path(path_type=Path)
-INTERRUPTED, TERMINATED = 130, 143
-"""128 and the signal's number, as shells have it."""
 
 
 @click.group(name="campaign")
@@ -73,7 +71,7 @@ def run(file: Path, out: Path, as_json: bool, **settings: Any) -> int:
     from skillframe.extend.registry import registry
 
     spec = CampaignSpec.from_toml(file)
-    with _terminable() as code:
+    with terminable() as code:
         try:
             prepare(spec, out, evaluate.describe, registry().world(spec.world).params)
         except KeyboardInterrupt:
@@ -183,7 +181,7 @@ def _go_on(folder: Path, options: Options, as_json: bool) -> int:
         from skillframe.campaign.validity import validity_of
 
         note(f"there will be {validity_of(spec.plan, complete=True).interval_method}")
-    with _terminable() as code:
+    with terminable() as code:
         try:
             with progress() as notify:
                 summary = run_campaign(folder, evaluate.evaluate, options, notify)
@@ -191,26 +189,3 @@ def _go_on(folder: Path, options: Options, as_json: bool) -> int:
             click.echo(f"interrupted; finished rows are kept, to go on: skillframe campaign resume {folder}", err=True)
             return code()
     return conclude(folder, spec, summary, as_json)
-
-
-@contextmanager
-def _terminable() -> Iterator[Callable[[], int]]:
-    """Within this, SIGTERM (of Slurm, systemd, a shutdown) interrupts as Ctrl-C does; gives the exit code due."""
-    import signal
-    import threading
-
-    codes = [INTERRUPTED]
-
-    def answer(number: int, frame: object) -> None:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # the tables are being written
-        codes.append(TERMINATED)
-        raise KeyboardInterrupt
-
-    if threading.current_thread() is not threading.main_thread():  # Python answers signals in the main thread only
-        yield lambda: codes[-1]
-        return
-    before = signal.signal(signal.SIGTERM, answer)
-    try:
-        yield lambda: codes[-1]
-    finally:
-        signal.signal(signal.SIGTERM, before)

@@ -75,7 +75,7 @@ def stop_long_work() -> None:
         raise KeyboardInterrupt
 
     skillframe.campaign.runner.run_campaign = cut
-    skillframe_papers.runner._Pool.work_off = cut  # type: ignore[method-assign]
+    skillframe_papers.runner._Session.work_off = cut  # type: ignore[method-assign]
 
 
 def command(arguments: list[str]) -> int:

@@ -234,7 +234,8 @@ def test_a_plugin_imports_public_names_of_the_core_and_no_other_plugin_but_those
     assert not wrong, "a plug-in asks the registry, and never the command line: " + "; ".join(wrong)
 
 
-FOR_COMMANDS = ("skillframe.cli.output.", "skillframe.cli.numbers.")  # what the commands of plug-ins are made of
+FOR_COMMANDS = tuple(f"skillframe.cli.{name}." for name in ("output", "numbers", "interrupts"))
+"""What the commands of plug-ins are made of."""
 
 
 def declared(plugin):

@@ -44,11 +44,19 @@ PLUGIN = """
         pathlib.Path(os.environ["COUNTED"] + ".process").write_text(str(os.getpid()))
         time.sleep(60.0)
 
+    def die(job):
+        os.kill(os.getpid(), 9)
+
+    def leave(job):
+        raise SystemExit(4)
+
     @hookimpl
     def skillframe_rows():
-        for name, function in {"901": double, "902": crash, "903": refuse, "904": slow}.items():
+        functions = {"901": double, "902": crash, "903": refuse, "904": slow, "905": leave, "906": double, "907": die,
+                     "908": double}
+        for name, function in functions.items():
             yield RowType(name=name, summary=function.__name__, published="20", source="nobody", bar="20",
-                          settings={"gain": 1.0}, run=function)
+                          settings={"gain": 1.0}, run=function, group="fatal" if name > "905" else "")
 """
 
 
@@ -89,6 +97,7 @@ def test_a_row_is_computed_shown_and_kept_and_computed_once(rows, tmp_path):
     assert reproduce("901", "--out", out, "--fresh").returncode == 0 and rows.read_text() == "xx"
 
 
+@pytest.mark.slow
 def test_a_setting_changes_its_row_and_is_part_of_the_command(rows, tmp_path):
     done = reproduce("901", "--out", tmp_path, "--set", "gain=3", "--json")
     (row,) = json.loads(done.stdout)
@@ -97,12 +106,24 @@ def test_a_setting_changes_its_row_and_is_part_of_the_command(rows, tmp_path):
     assert json.loads(reproduce("901", "--out", tmp_path, "--quick", "--json").stdout)[0]["ours"] == "2"
 
 
+@pytest.mark.slow
 def test_rows_that_fail_cost_themselves_only(rows, tmp_path):
     broken = reproduce("901", "902", "--out", tmp_path)
     assert broken.returncode == 3 and "ZeroDivisionError" in broken.stderr and "Traceback" not in broken.stderr
     assert [row["row"] for row in json.loads((tmp_path / "reproduce.json").read_text())] == ["901"]
     refused = reproduce("903", "--out", tmp_path)
     assert refused.returncode == 2 and "make it even" in refused.stderr
+
+
+@pytest.mark.slow
+def test_a_process_that_dies_costs_the_rows_of_its_group_that_were_not_done(rows, tmp_path):
+    died = reproduce("901", "906", "907", "908", "--out", tmp_path, "--json")
+    assert died.returncode == 3 and "Traceback" not in died.stderr
+    assert [row["row"] for row in json.loads(died.stdout)] == ["901", "906"]
+    assert "row 907: its process was killed" in died.stderr and "row 908: its process was killed" in died.stderr
+    assert died.stderr.count("row 906: pass after") == 1
+    left = reproduce("905", "--out", tmp_path)
+    assert left.returncode == 3 and "row 905: SystemExit" in left.stderr
 
 
 def runs(process):
@@ -132,6 +153,7 @@ def started(rows, out):
     return process, int(told.read_text())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "all_of_the_group", "code"), [("SIGINT", True, 130), ("SIGTERM", False, 143)])
 def test_a_signal_keeps_what_is_done_and_leaves_no_process_behind(rows, tmp_path, number, all_of_the_group, code):
     process, worker = started(rows, tmp_path)
@@ -146,6 +168,7 @@ def test_a_signal_keeps_what_is_done_and_leaves_no_process_behind(rows, tmp_path
     assert "there already" in reproduce("901", "--out", tmp_path).stderr and rows.read_text() == "x"
 
 
+@pytest.mark.slow
 def test_a_run_that_is_killed_leaves_no_process_behind(rows, tmp_path):
     process, worker = started(rows, tmp_path)
     process.kill()

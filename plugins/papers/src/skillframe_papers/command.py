@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from skillframe.cli.interrupts import terminable
 from skillframe.cli.numbers import COUNT, SEED
 from skillframe.cli.output import note, quiet_option
 
@@ -52,9 +53,10 @@ def command(
     jobs = jobs_of(registry(), rows, changed, seed=seed, quick=quick)
     if only_list:
         return _list([registry().row(job.row) for job in jobs], as_json)
-    outcome = run(jobs, out, workers=workers or os.cpu_count() or 1, fresh=fresh, tell=note)
+    with terminable() as code:
+        outcome = run(jobs, out, workers=workers or os.cpu_count() or 1, fresh=fresh, tell=note)
     _write(outcome.entries, out)
-    return _end(outcome, out, quick, as_json)
+    return _end(outcome, out, quick, as_json, code())
 
 
 def _list(rows: Sequence[Any], as_json: bool) -> int:
@@ -83,7 +85,7 @@ def _write(entries: Sequence[Mapping[str, Any]], out: Path) -> None:
     write_whole(out / "reproduce.md", document.render(entries).encode())
 
 
-def _end(outcome: Outcome, out: Path, quick: bool, as_json: bool) -> int:
+def _end(outcome: Outcome, out: Path, quick: bool, as_json: bool, interrupted: int) -> int:
     from skillframe_papers import committed
 
     changed = committed.changes(outcome.entries, committed.verdicts(quick=quick))
@@ -91,12 +93,12 @@ def _end(outcome: Outcome, out: Path, quick: bool, as_json: bool) -> int:
     note(f"table: {out / 'reproduce.json'}, page: {out / 'reproduce.html'}")
     for sentence in changed:
         click.echo(f"changed: {sentence}", err=True)
-    if outcome.ended_by:
+    if outcome.interrupted:
         done = ", ".join(each["row"] for each in outcome.entries) or "none yet"
-        name = Signals(outcome.ended_by).name
+        name = Signals(interrupted - 128).name
         kept = f"ended by {name}; finished rows are kept in {out} ({done}), the same command goes on from there"
         click.echo(kept, err=True)
-        return 128 + outcome.ended_by
+        return interrupted
     if outcome.broken:
         raise RuntimeError("; ".join(outcome.broken))
     if outcome.refused:

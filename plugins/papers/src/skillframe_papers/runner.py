@@ -1,33 +1,56 @@
-"""Computes rows in processes of their own, a group each: what fails or is interrupted costs itself and no other.
+"""Computes rows in the workers of a campaign's pool, a group each: what fails or is interrupted costs itself only.
 
-A process writes its row's file when it is done, so that whatever ends the run, finished rows are kept, and the next run
-computes what is missing.
+A worker writes a row's file when the row is done, so that whatever ends the run, finished rows are kept, and the next
+run computes what is missing. A row says nothing of how far it is, so no time limit holds.
 """
 
 from __future__ import annotations
 
-import multiprocessing
+import math
 import os
 import sys
+from collections import deque
 from collections.abc import Callable, Sequence
-from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
+from contextlib import closing, redirect_stdout
+from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
+from skillframe.campaign.cluster import ClusterPool
+from skillframe.campaign.driver import WHY, Answer, Died, Pool, Raised
+from skillframe.campaign.identity import identity
 from skillframe.errors import SkillframeError
 from skillframe.extend.records import RowRun
 from skillframe.extend.registry import registry
 from skillframe_papers import store
-from skillframe_papers.ending import Ending, end_all, end_with_parent
 from skillframe_papers.jobs import Job
 
 Tell = Callable[[str], None]
+WATCH = "watch"
+"""Folder for the files of the workers that run now, beside the rows."""
 
 
 class RowFailed(SkillframeError):
     """Rows that could not be computed, because of what they were given; says which and why."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Group:
+    """Rows that one worker computes, one after another.
+
+    Attributes:
+        jobs: the rows.
+        folder: where they are kept.
+    """
+
+    jobs: tuple[Job, ...]
+    folder: Path
+
+    @property
+    def size(self) -> int:
+        """How many rows it gives."""
+        return len(self.jobs)
 
 
 class Outcome(NamedTuple):
@@ -35,15 +58,15 @@ class Outcome(NamedTuple):
 
     Attributes:
         entries: finished rows, in the order of the jobs.
-        refused: sentences about rows that refused their settings.
+        refused: sentences about rows that refused their settings, and about workers that could not be had.
         broken: sentences about rows that ended in an internal error.
-        ended_by: number of the signal that came before the end (Ctrl-C, SIGTERM), 0 if none.
+        interrupted: Ctrl-C came, or SIGTERM in its place, before the end.
     """
 
     entries: list[dict[str, Any]]
     refused: list[str]
     broken: list[str]
-    ended_by: int
+    interrupted: bool
 
 
 def run(jobs: Sequence[Job], folder: Path, *, workers: int, fresh: bool, tell: Tell) -> Outcome:
@@ -51,98 +74,114 @@ def run(jobs: Sequence[Job], folder: Path, *, workers: int, fresh: bool, tell: T
 
     Args:
         jobs: the rows.
-        folder: where rows are kept.
+        folder: where rows are kept; made if absent.
         workers: how many at a time.
         fresh: compute those that are there, too.
         tell: is told what happens.
     """
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-        os.environ.setdefault(name, "1")  # several processes share the machine
     missing = [job for job in jobs if fresh or store.kept(folder, job) is None]
     if len(missing) < len(jobs):
         tell(f"{len(jobs) - len(missing)} of {len(jobs)} rows are there already in {folder}")
-    pool = _Pool(folder, max(1, workers), tell)
-    ended_by = pool.work_off(_groups(missing))
+    session = _Session(tell=tell)
+    interrupted = False
+    try:
+        session.work_off(_groups(missing, folder), workers)
+    except KeyboardInterrupt:
+        interrupted = True
+    except SkillframeError as error:  # of the pool: a row's own is caught where it is computed
+        session.refused.append(str(error))
     found = [entry for job in jobs if (entry := store.kept(folder, job)) is not None]
-    return Outcome(found, pool.refused, pool.broken, ended_by)
+    return Outcome(found, session.refused, session.broken, interrupted)
 
 
-def _groups(jobs: Sequence[Job]) -> list[list[Job]]:
+def _groups(jobs: Sequence[Job], folder: Path) -> list[Group]:
     found: dict[str, list[Job]] = {}
     for job in jobs:
         found.setdefault(job.group, []).append(job)
-    return list(found.values())
+    return [Group(jobs=tuple(each), folder=folder.resolve()) for each in found.values()]
 
 
-class _Running(NamedTuple):
-    """A process that works off the jobs of a group."""
+@dataclass(slots=True, kw_only=True)
+class _Session:
+    """One call's work, and the rows whose end it has not told yet."""
 
-    process: BaseProcess
-    receiver: Connection
-    open: list[str]  # rows that it has not told the end of
+    tell: Tell
+    refused: list[str] = field(default_factory=list)
+    broken: list[str] = field(default_factory=list)
+    flying: list[Group] = field(default_factory=list)
+    told: set[str] = field(default_factory=set)
+
+    def work_off(self, groups: Sequence[Group], workers: int) -> None:
+        """Compute all groups, as many at a time as there are workers.
+
+        Raises:
+            SchedulerError: no workers.
+            KeyboardInterrupt: the workers are ended, and what they had finished is kept.
+        """
+        if not groups:
+            return
+        groups[0].folder.mkdir(parents=True, exist_ok=True)
+        pool = ClusterPool(
+            compute, math.inf, workers=min(max(1, workers), len(groups)), watch=groups[0].folder / WATCH,
+            ours=identity(plugins=False), needed=set(), tell=lambda share: self._tell_ends(), note=self.tell,
+        )  # fmt: skip
+        with closing(pool):
+            self._run(pool, deque(groups))
+
+    def _run(self, pool: Pool[Group], waiting: deque[Group]) -> None:
+        while waiting or self.flying:
+            while waiting and len(self.flying) < pool.size:
+                self._begin(pool, waiting.popleft())
+            group, answer = pool.next()
+            self._tell_ends()
+            self.flying.remove(group)
+            self._note(group, answer)
+
+    def _begin(self, pool: Pool[Group], group: Group) -> None:
+        for job in group.jobs:
+            store.path_of(group.folder, job.row).unlink(missing_ok=True)
+        rows = [job.row for job in group.jobs]
+        self.tell(f"row{'s' if len(rows) > 1 else ''} {', '.join(rows)}: started")
+        self.flying.append(group)
+        pool.submit(group)
+
+    def _tell_ends(self) -> None:
+        """Say of rows in flight that they are there, once each."""
+        for group in self.flying:
+            for job in group.jobs:
+                entry = None if job.row in self.told else store.kept(group.folder, job)
+                if entry is not None:
+                    self.told.add(job.row)
+                    self.tell(f"row {job.row}: {entry['verdict']} after {entry['wall_s']:.0f} s: {entry['ours']}")
+
+    def _note(self, group: Group, answer: Answer) -> None:
+        """Say of a group's other rows what became of them."""
+        failed = answer if isinstance(answer, list) else [
+            {"row": job.row, "kind": "broken", "text": _end(answer)} for job in group.jobs if job.row not in self.told
+        ]  # fmt: skip
+        for each in failed:
+            text = f"row {each['row']}: {each['text']}"
+            self.tell(text)
+            (self.refused if each["kind"] == "refused" else self.broken).append(text)
 
 
-class _Pool:
-    """At most so many processes at a time, a group of rows each."""
-
-    def __init__(self, folder: Path, workers: int, tell: Tell) -> None:
-        self._folder, self._workers, self._tell = folder, workers, tell
-        self._running: list[_Running] = []
-        self.refused: list[str] = []
-        self.broken: list[str] = []
-
-    def work_off(self, groups: Sequence[Sequence[Job]]) -> int:
-        """Do the jobs of all groups; the number of the signal that ended it, or 0."""
-        waiting = list(groups)
-        with Ending() as ending:
-            try:
-                while (waiting or self._running) and not ending.signal:
-                    while waiting and len(self._running) < self._workers:
-                        self._begin(waiting.pop(0))
-                    wait([*(each.receiver for each in self._running), ending.wake])
-                    self._collect()
-            finally:
-                end_all([each.process for each in self._running])
-        return ending.signal
-
-    def _begin(self, jobs: Sequence[Job]) -> None:
-        for job in jobs:
-            store.path_of(self._folder, job.row).unlink(missing_ok=True)
-        context = multiprocessing.get_context("spawn")
-        receiver, sender = context.Pipe(duplex=False)
-        described = [store.described(job) for job in jobs]
-        process = context.Process(target=_compute_all, args=(described, str(self._folder), sender), daemon=True)
-        process.start()
-        sender.close()
-        rows = [job.row for job in jobs]
-        self._tell(f"row{'s' if len(rows) > 1 else ''} {', '.join(rows)}: started")
-        self._running.append(_Running(process, receiver, rows))
-
-    def _collect(self) -> None:
-        for each in list(self._running):
-            try:
-                while each.receiver.poll():
-                    self._note(each, *each.receiver.recv())
-            except EOFError:  # the process has ended
-                each.process.join()
-                self._running.remove(each)
-                for row in list(each.open):
-                    self._note(each, row, "broken", f"its process ended with code {each.process.exitcode}")
-
-    def _note(self, running: _Running, row: str, kind: str, text: str) -> None:
-        running.open.remove(row)
-        self._tell(f"row {row}: {text}")
-        if kind != "done":
-            (self.refused if kind == "refused" else self.broken).append(f"row {row}: {text}")
+def _end(answer: Died | Raised) -> str:
+    return f"its process {WHY[answer.cause]}" if isinstance(answer, Died) else answer.text
 
 
-def _compute_all(described: Sequence[dict[str, Any]], folder: str, sender: Connection) -> None:
-    """Compute rows one after another and keep each; runs in a process of its own."""
-    end_with_parent()
-    sys.stdout = sys.stderr  # whatever a row prints, stdout is the command's
-    for each in described:
-        job = Job(**each)
-        sender.send((job.row, *_compute(job, Path(folder))))
+def compute(group: Group) -> list[dict[str, Any]]:
+    """Compute rows one after another and keep each; runs in a worker.
+
+    Returns:
+        of each row that could not be computed: `row`, `kind` ("refused" its settings, or "broken") and `text`.
+    """
+    failed = []
+    with redirect_stdout(sys.stderr):  # whatever a row prints, stdout is the command's
+        for job in group.jobs:
+            problem = _compute(job, group.folder)
+            if problem is not None:
+                failed.append({"row": job.row, "kind": problem[0], "text": problem[1]})
+    return failed
 
 
 def _processor_time() -> float:
@@ -151,7 +190,7 @@ def _processor_time() -> float:
     return times.user + times.system + times.children_user + times.children_system
 
 
-def _compute(job: Job, folder: Path) -> tuple[str, str]:
+def _compute(job: Job, folder: Path) -> tuple[Literal["refused", "broken"], str] | None:
     def tell(text: str) -> None:
         print(f"row {job.row}: {text}", file=sys.stderr, flush=True)
 
@@ -164,4 +203,4 @@ def _compute(job: Job, folder: Path) -> tuple[str, str]:
         return "refused", str(error)
     except Exception as error:  # the other rows go on; the command ends with an internal error
         return "broken", f"{type(error).__name__}: {error}"
-    return "done", f"{store.verdict(row, result)} after {seconds:.0f} s: {result.ours}"
+    return None

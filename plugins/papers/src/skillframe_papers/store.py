@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -76,11 +75,6 @@ def write_table(folder: Path, entries: Sequence[Mapping[str, Any]]) -> None:
 def table(entries: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """The rows without their pictures and what only the store needs."""
     return [{key: value for key, value in each.items() if key not in ("pictures", "key")} for each in entries]
-
-
-def described(job: Job) -> dict[str, Any]:
-    """A job as plain values, for another process."""
-    return asdict(job)
 
 
 def _text(value: Any) -> bytes:
