@@ -22,5 +22,3 @@ def skillframe_readers() -> Iterable[ReaderType]:
     from skillframe.extend.readers import reader_types
 
     return reader_types(Lazy("skillframe.robot.recorded:tool_poses"))  # its library is loaded for joint states only
-
-

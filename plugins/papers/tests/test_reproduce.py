@@ -13,8 +13,10 @@ from pathlib import Path
 
 import pytest
 from skillframe_papers import committed, document, page, store
-from skillframe_papers.command import _show
+from skillframe_papers.command import _end, _show
 from skillframe_papers.jobs import jobs_of
+from skillframe_papers.published import row_types
+from skillframe_papers.runner import Outcome
 
 from skillframe.cli.main import run
 from skillframe.cli.output import PAGE_WIDTH
@@ -263,6 +265,20 @@ def test_what_the_command_says_in_a_pipe_fits_a_page(capsys):
 def test_only_a_verdict_that_differs_from_the_docs_is_a_change():
     found = [{"row": "1", "verdict": "pass"}, {"row": "2", "verdict": "fail"}, {"row": "3", "verdict": "fail"}]
     assert len(committed.changes(found, {"1": "pass", "2": "pass"})) == 1
+
+
+@pytest.mark.needs_plugins
+def test_a_verdict_is_committed_for_every_row_and_a_changed_one_is_exit_code_1(capsys, tmp_path):
+    for quick in (False, True):
+        assert set(committed.verdicts(quick=quick)) == {row.name for row in row_types()}
+    (entry,) = entries()
+    said = committed.verdicts(quick=True)
+    same, changed = (
+        _end(Outcome([{**entry, "row": "21", "verdict": verdict}], [], [], False), tmp_path, True, True, 130)
+        for verdict in (said["21"], "fail")
+    )
+    assert set(said.values()) == {"pass", "fail", "reported"} and (same, changed) == (0, 1)
+    assert "changed: row 21 is 'fail', the docs say 'pass'" in capsys.readouterr().err
 
 
 def test_a_row_without_a_figure_is_neither_predicted_nor_calibrated():

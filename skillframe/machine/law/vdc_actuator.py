@@ -17,9 +17,9 @@ of u_e would throw a spool to and fro (an exact inverse has a step of 2 b).
 
 Where no force is fed back (c = 0) friction has a bristle's state z, as published (Zhu and Piedboeuf, 2005): a piston
 that stops keeps the friction it had, and turns it round over z_ss. Where one is, it is a flat function of the required
-velocity (our choice): there xd_r depends on the estimated force f, which a bristle answers a quarter of a period late and
-a steep tanh too strongly, so that the machine swung by 1 kN where it should have stood. f_0 is small, so that the two
-do not change places while a tool lands: with 1 kN it hopped.
+velocity (our choice): there xd_r depends on the estimated force f, which a bristle answers a quarter of a period late
+and a steep tanh too strongly, so that the machine swung by 1 kN where it should have stood. f_0 is small, so that the
+two do not change places while a tool lands: with 1 kN it hopped.
 
 The formulas of the law take arrays (..., n) or casadi expressions (n, 1), and cylinders and gains that hold either.
 """

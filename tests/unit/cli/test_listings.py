@@ -9,8 +9,10 @@ import pytest
 
 from skillframe.cli.main import cli, run
 from skillframe.cli.names import ROBOT
+from skillframe.cli.plugins import distribution_rows
+from skillframe.errors import UnknownName
 from skillframe.extend.homes import HOMES, where_to_get
-from skillframe.extend.registry import registry
+from skillframe.extend.registry import Registry, registry
 from skillframe.world.placement import check_quantities
 from skillframe.world.quantities import QUANTITIES, VARIED
 
@@ -113,10 +115,15 @@ def test_a_plugin_that_is_installed_is_not_to_be_installed_again():
 @pytest.mark.needs_plugins
 def test_every_name_that_a_plugin_of_ours_provides_has_its_home():
     ours = {
-        each: plugin.name for plugin in registry().plugins for each in plugin.provides
-        if plugin.distribution.startswith("skillframe-") and not each.startswith("row:")
+        each: row["name"] for row in distribution_rows(registry()) for each in row["provides"]
+        if row["distribution"].startswith("skillframe-")
     }  # fmt: skip
     assert ours == {each: home for each, home in HOMES.items() if each != "skill:dual_arm"}
+
+
+def test_a_published_row_that_is_missing_is_named_with_the_plugin_that_has_it():
+    with pytest.raises(UnknownName, match=r"unknown row '13'.*13 is in skillframe-papers, which is not installed"):
+        Registry().row("13")
 
 
 def test_every_command_that_takes_a_robot_to_run_has_the_same_default():

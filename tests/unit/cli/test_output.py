@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from skillframe.campaign.runner import Progress
 from skillframe.cli.campaign_words import progress as campaign_progress
-from skillframe.cli.main import run
 from skillframe.cli.output import laid_out, note, progress, quiet_option, table
 
 

@@ -93,6 +93,7 @@ def test_no_plugin_takes_the_place_of_a_command_of_the_core(install, capsys):
     install("toy-doctor", GOOD, "doctor")
     assert run(["doctor", "you"]) == 2  # the core's takes no argument
     assert "hello" not in capsys.readouterr().out
+    assert run(["--help"]) == 0 and capsys.readouterr().out.count("\n  doctor ") == 1
 
 
 def test_plugins_that_are_left_out_take_their_commands_along(install, capsys, monkeypatch):
