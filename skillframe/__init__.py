@@ -7,7 +7,7 @@ none of the scientific libraries.
 
 from typing import TYPE_CHECKING, Any
 
-from skillframe import doors
+from skillframe import doors, paths
 
 __version__ = "0.1.0"
 
@@ -26,6 +26,9 @@ _PUBLIC = {
 __all__ = ["__version__", *sorted(_PUBLIC)]
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
     from skillframe.demonstration.record import Demonstration as Demonstration
     from skillframe.errors import SkillframeError as SkillframeError
     from skillframe.extend.hookspecs import hookimpl as hookimpl
@@ -47,4 +50,12 @@ def __getattr__(name: str) -> Any:
     return getattr(import_module(_PUBLIC[name]), name)
 
 
+def _robots_of_plugins(name: str | None = None) -> "Mapping[str, Path]":
+    """Folders of registered robots; the registry is loaded when a robot is asked for that is not shipped."""
+    from skillframe.extend.robots import folders
+
+    return folders(name)
+
+
 doors.install()
+paths.OFFERS["robots"] = _robots_of_plugins

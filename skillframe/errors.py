@@ -40,10 +40,11 @@ class UnknownName(SkillframeError):
         kind: what was looked for ("world", "skill", "key" ...).
         name: the name that was asked for.
         known: the names that exist.
+        note: why a name that a person has in mind may not be there.
     """
 
     def __init__(self, kind: str, name: str, known: Iterable[str], note: str = "", where: str = "") -> None:
-        self.kind, self.name, self.known = kind, name, sorted(known)
+        self.kind, self.name, self.known, self.note = kind, name, sorted(known), note
         near = suggest(name, self.known)
         text = f"{where}: " if where else ""
         text += f"unknown {kind} {name!r}"

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parent
+OFFERS: dict[str, Callable[[str | None], Mapping[str, Path]]] = {}
+"""By kind of data, what gives the folders that plug-ins ship, by name: all of them, or the named one.
+
+`skillframe/__init__.py` fills it, because what lies on the ground cannot ask the registry above.
+"""
 
 
 def data_dirs(kind: str) -> list[Path]:
@@ -15,8 +21,12 @@ def data_dirs(kind: str) -> list[Path]:
     a sub-folder of that kind.
     """
     own = [Path(p) for p in os.environ.get("SKILLFRAME_PATH", "").split(os.pathsep) if p]
-    shipped = [_PACKAGE / "_data", _PACKAGE.parent]
-    return [folder / kind for folder in [*own, *shipped] if (folder / kind).is_dir()]
+    return [*(folder / kind for folder in own if (folder / kind).is_dir()), *shipped_dirs(kind)]
+
+
+def shipped_dirs(kind: str) -> list[Path]:
+    """Folders that hold data of a kind that ships with skillframe."""
+    return [folder / kind for folder in (_PACKAGE / "_data", _PACKAGE.parent) if (folder / kind).is_dir()]
 
 
 def cache_dir(kind: str) -> Path:

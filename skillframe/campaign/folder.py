@@ -27,9 +27,9 @@ from skillframe.campaign.provenance import combined_hash, file_hashes
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.config import build, read_toml
 from skillframe.document.source import parse_source
-from skillframe.errors import InputError, UnknownName
+from skillframe.errors import InputError
 from skillframe.files import remove_temporary, sync_folder, write_whole
-from skillframe.paths import data_dirs
+from skillframe.robot.spec import robot_folder
 
 CAMPAIGN, SCENE = "campaign.toml", "scene.json"
 COPIES = ("skills", "robots")
@@ -133,11 +133,8 @@ def _copy_robot(spec: CampaignSpec, target: Path) -> str:
         given = given / "robot.toml"
     if given.is_file():
         return _copy_robot_file(given, target)
-    for folder in data_dirs("robots"):
-        if (folder / spec.robot / "robot.toml").is_file():
-            return _copy_robot_file(folder / spec.robot / "robot.toml", target)
-    known = [p.parent.name for folder in data_dirs("robots") for p in folder.glob("*/robot.toml")]
-    raise UnknownName("robot", spec.robot, known, "or give the path of a robot.toml, relative to the campaign file")
+    found = robot_folder(spec.robot, "or give the path of a robot.toml, relative to the campaign file")
+    return _copy_robot_file(found / "robot.toml", target)
 
 
 def _copy_robot_file(source: Path, target: Path) -> str:

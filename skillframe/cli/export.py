@@ -11,7 +11,7 @@ from skillframe.cli import names
 from skillframe.cli.numbers import WHOLE
 
 if TYPE_CHECKING:
-    from skillframe.document.export import Format
+    from skillframe.extend.records import ExporterType
     from skillframe.frames import Float
 
 
@@ -63,41 +63,43 @@ def command(
 
 def _list(as_json: bool) -> None:
     from skillframe.cli.output import LIST_WIDTH, emit_json, table
-    from skillframe.document.export import FORMATS
+    from skillframe.extend.registry import registry
 
+    exporters = [(each, registry().provider("exporter", each.name)) for each in registry().records("exporter")]
     if as_json:
         emit_json(
             [
-                {"name": f.name, "summary": f.summary, "axes": f.axes, "checked_against": f.checked}
-                for f in FORMATS.values()
+                {
+                    "name": f.name, "summary": f.summary, "axes": f.axes, "checked_against": f.checked,
+                    "distribution": plugin.distribution,
+                }
+                for f, plugin in exporters
             ]
-        )
+        )  # fmt: skip
         return
-    rows = [(f.name, f.axes, f.summary, f.checked) for f in FORMATS.values()]
+    rows = [(f.name, f.axes, f.summary, f.checked) for f, _ in exporters]
     table(("format", "axes", "what it is", "checked against"), rows, LIST_WIDTH)
 
 
-def _write(skill: Path, form: str, out: Path, phase: int | None, coc: str | None, attitude: str | None) -> Format:
+def _write(skill: Path, form: str, out: Path, phase: int | None, coc: str | None, attitude: str | None) -> ExporterType:
     from skillframe.demonstration.record import resolve_point
-    from skillframe.document.export import FORMATS, settings_text
+    from skillframe.document.export import exported
     from skillframe.document.file import load
     from skillframe.document.frame import read_frame, with_center
     from skillframe.document.impedance import moving_impedance
-    from skillframe.errors import UnknownName
     from skillframe.extend.registry import registry
     from skillframe.files import write_whole
 
-    if form not in FORMATS:
-        raise UnknownName("format", form, list(FORMATS))
+    exporter = registry().exporter(form)
     document = load(skill)
     kind = registry().behaviour(document["type"])
     words = kind.describe(document)[:1] if kind.describe is not None else []
     if coc is not None:
         document = with_center(document, resolve_point(coc, read_frame(document).points).tolist())
     turned = None if attitude is None else _attitude(attitude)
-    moving = moving_impedance(document, phase, FORMATS[form].axes, turned, str(skill))
-    write_whole(out, settings_text(FORMATS[form], moving, [f"{skill.name}: {line}" for line in words]).encode())
-    return FORMATS[form]
+    moving = moving_impedance(document, phase, exporter.axes, turned, str(skill))
+    write_whole(out, exported(exporter, moving, [f"{skill.name}: {line}" for line in words]).encode())
+    return exporter
 
 
 def _attitude(text: str) -> Float:

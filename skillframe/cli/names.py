@@ -46,17 +46,12 @@ def _registered(*kinds: str) -> Callable[[], Iterable[str]]:
     return names
 
 
-def _formats() -> Iterable[str]:
-    from skillframe.document.export import FORMATS
-
-    return FORMATS
-
-
 robots = _completed(_robot_names)
 worlds = _completed(_registered("world"))
 skills = _completed(_registered("skill", "coordinator"))
 segmenters = _completed(_registered("segmenter"))
-formats = _completed(_formats)
+formats = _completed(_registered("exporter"))
+scores = _completed(_registered("score"))
 
 
 def robot_option(function: F) -> F:

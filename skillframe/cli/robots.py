@@ -26,7 +26,7 @@ def command() -> None:
 @command.command("list")
 @click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
 def list_robots(as_json: bool) -> int:
-    """Robots that can be named: the shipped ones, and those in $SKILLFRAME_PATH/robots.
+    """Robots that can be named: the shipped ones, those of plug-ins, and those in $SKILLFRAME_PATH/robots.
 
     \b
     Example:

@@ -12,43 +12,16 @@ of the angle between the learned axes and the controller's (for eigenvalues that
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Literal
-
 import numpy as np
 
 from skillframe.document.frame import read_frame
 from skillframe.errors import InputError
-from skillframe.extend.records import Document
+from skillframe.extend.outputs import Axes
+from skillframe.extend.records import Document, MovingImpedance
 from skillframe.frames import Float
 
-Axes = Literal["base", "tool"]
 PARTS = ("translation", "rotation")
 MOST_OFF = np.deg2rad(15.0)  # a compliant axis farther from a controller's axis is another skill
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MovingImpedance:
-    """A phase.
-
-    Attributes:
-        axes: what the arrays below are expressed in.
-        center: (3,) centre of compliance in the tool frame [m].
-        twist: (6,) velocity of the desired pose, linear first [m/s, rad/s].
-        stiffness, damping: (6, 6), linear first.
-        lead_force, lead_torque: how much the desired pose may lead: largest push [N, Nm].
-        stop: when the phase ends, as in the skill file.
-    """
-
-    axes: Axes
-    center: Float
-    twist: Float
-    stiffness: Float
-    damping: Float
-    lead_force: float
-    lead_torque: float
-    stop: Mapping[str, Any]
 
 
 def moving_impedance(

@@ -1,11 +1,11 @@
-"""What the core itself registers, as an ordinary plug-in: worlds and demonstration readers."""
+"""What the core itself registers, as an ordinary plug-in: worlds, readers, exporters and robots."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 from skillframe.extend.hookspecs import hookimpl
-from skillframe.extend.records import Lazy, ReaderType, WorldType
+from skillframe.extend.records import ExporterType, Lazy, ReaderType, RobotType, WorldType
 
 
 @hookimpl
@@ -22,3 +22,19 @@ def skillframe_readers() -> Iterable[ReaderType]:
     from skillframe.extend.readers import reader_types
 
     return reader_types(Lazy("skillframe.robot.recorded:tool_poses"))  # its library is loaded for joint states only
+
+
+@hookimpl
+def skillframe_exporters() -> Iterable[ExporterType]:
+    """The formats of other controllers that ship with the core."""
+    from skillframe.extend.exporters import exporter_types
+
+    return exporter_types()
+
+
+@hookimpl
+def skillframe_robots() -> Iterable[RobotType]:
+    """The robots that ship with the core."""
+    from skillframe.extend.robots import robot_types
+
+    return robot_types()

@@ -1,9 +1,11 @@
-"""The six hooks a plug-in can implement; each yields records and runs once per process, never in the loop.
+"""The hooks a plug-in can implement; each yields records and runs once per process, never in the loop.
 
 A plug-in is a distribution with an entry point in the group `skillframe` that names a module::
 
     from skillframe import hookimpl
     from skillframe.extend.records import SkillType
+
+    skillframe_contract = "0.2"
 
     @hookimpl
     def skillframe_skills():
@@ -16,7 +18,19 @@ from collections.abc import Iterable
 
 import pluggy
 
-from skillframe.extend.records import CoordinatorType, ReaderType, RowType, SegmenterType, SkillType, WorldType
+from skillframe.extend.records import (
+    CoordinatorType,
+    DriveType,
+    ExporterType,
+    ReaderType,
+    RobotType,
+    RowType,
+    ScoreType,
+    SectionType,
+    SegmenterType,
+    SkillType,
+    WorldType,
+)  # fmt: skip
 
 GROUP = "skillframe"
 hookspec = pluggy.HookspecMarker(GROUP)
@@ -51,3 +65,28 @@ def skillframe_readers() -> Iterable[ReaderType]:  # type: ignore[empty-body]
 @hookspec
 def skillframe_rows() -> Iterable[RowType]:  # type: ignore[empty-body]
     """Published results and how ours are computed: rows of `skillframe reproduce`, a command of skillframe-papers."""
+
+
+@hookspec
+def skillframe_exporters() -> Iterable[ExporterType]:  # type: ignore[empty-body]
+    """Formats of other controllers' settings: what `skillframe export --to` writes."""
+
+
+@hookspec
+def skillframe_scores() -> Iterable[ScoreType]:  # type: ignore[empty-body]
+    """Figures of a run, computed from its trace: for `skillframe run --score` and `scores` of campaign.toml."""
+
+
+@hookspec
+def skillframe_robots() -> Iterable[RobotType]:  # type: ignore[empty-body]
+    """Robots: folders with a robot.toml."""
+
+
+@hookspec
+def skillframe_drives() -> Iterable[DriveType]:  # type: ignore[empty-body]
+    """What stands between a skill's command and the plant."""
+
+
+@hookspec
+def skillframe_sections() -> Iterable[SectionType]:  # type: ignore[empty-body]
+    """Sections of reports, made from a campaign's or a run's files alone."""

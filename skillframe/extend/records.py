@@ -7,6 +7,15 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+from skillframe.extend.hardware import DriveType as DriveType
+from skillframe.extend.hardware import RobotType as RobotType
+from skillframe.extend.outputs import ExporterType as ExporterType
+from skillframe.extend.outputs import Grid as Grid
+from skillframe.extend.outputs import MovingImpedance as MovingImpedance
+from skillframe.extend.outputs import ReportFiles as ReportFiles
+from skillframe.extend.outputs import ScoreType as ScoreType
+from skillframe.extend.outputs import SectionType as SectionType
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -71,6 +80,8 @@ class SkillType:
     Attributes:
         name: as written in skill files and on the command line.
         summary: one line for listings.
+        contract: the version of the plug-in contract that the record was written for, "0.2"; "" for what the entry
+            module's `skillframe_contract` says (`skillframe.extend.contract`). Every record has this field.
         version: of the type's part of the skill file; a newer file is refused.
         build: a runnable skill from a checked skill document.
         check: raises `InputError` naming the key if the kind's part of a document is not as it should be; None: no more
@@ -87,6 +98,7 @@ class SkillType:
 
     name: str
     summary: str
+    contract: str = ""
     version: int = 1
     build: Callable[[Document], Skill]
     check: Callable[[Document], None] | None = None
@@ -108,6 +120,7 @@ class SegmenterType:
 
     name: str
     summary: str
+    contract: str = ""
     version: int = 1
     fit: Callable[[Sequence[Demonstration], int | None, Mapping[str, Any]], Document]
 
@@ -135,6 +148,7 @@ class WorldType:
 
     name: str
     summary: str
+    contract: str = ""
     version: int = 1
     params: type
     build: Callable[[Any], Scene]
@@ -152,6 +166,7 @@ class ReaderType:
 
     name: str
     summary: str
+    contract: str = ""
     suffixes: tuple[str, ...]
     read: Callable[[Path, Mapping[str, Any]], Demonstration]
     write: Callable[[Demonstration, Path], None] | None = None
@@ -228,6 +243,7 @@ class RowType:
 
     name: str
     summary: str
+    contract: str = ""
     published: str
     source: str
     bar: str = ""

@@ -9,70 +9,39 @@ of entry-point names, empty for none) selects a subset; `SKILLFRAME_STRICT_PLUGI
 from __future__ import annotations
 
 import os
-import re
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
-from dataclasses import dataclass, field
 from functools import lru_cache
-from importlib.metadata import Distribution, EntryPoint, distributions
 from typing import Any
 
 import pluggy
 
-from skillframe.errors import SkillframeError, UnknownName
+from skillframe.errors import UnknownName
 from skillframe.extend import hookspecs
+from skillframe.extend.contract import ATTRIBUTE, contract_problem, requirement_problem
+from skillframe.extend.discovery import installed
 from skillframe.extend.homes import where_to_get
-from skillframe.extend.records import CoordinatorType, ReaderType, RowType, SegmenterType, SkillType, WorldType
-
-KINDS: Mapping[str, str] = {
-    "skill": "skillframe_skills",
-    "segmenter": "skillframe_segmenters",
-    "coordinator": "skillframe_coordinators",
-    "world": "skillframe_worlds",
-    "reader": "skillframe_readers",
-    "row": "skillframe_rows",
-}
-RECORDS: Mapping[str, type[Any]] = {
-    "skill": SkillType,
-    "segmenter": SegmenterType,
-    "coordinator": CoordinatorType,
-    "world": WorldType,
-    "reader": ReaderType,
-    "row": RowType,
-}
-
-
-@dataclass(slots=True, kw_only=True)
-class Plugin:
-    """One plug-in as found: where it comes from, what it provides, and its error if it has one."""
-
-    name: str
-    distribution: str
-    version: str
-    provides: list[str] = field(default_factory=list)
-    error: str | None = None
-
-    def fail(self, error: BaseException) -> None:
-        """Keep an error beside those it already has; with `SKILLFRAME_STRICT_PLUGINS=1` raise it instead."""
-        if os.environ.get("SKILLFRAME_STRICT_PLUGINS") == "1":
-            raise error
-        text = f"{type(error).__name__}: {error}"
-        self.error = f"{self.error}; {text}" if self.error else text
-
-
-class BadPlugin(SkillframeError):
-    """A plug-in's entry module breaks the rules of the hooks; says which and how."""
-
-
-class PluginConflict(SkillframeError):
-    """Two plug-ins provide one name; both are named."""
-
-    def __init__(self, kind: str, name: str, first: Plugin, second: Plugin) -> None:
-        super().__init__(
-            f"{kind} {name!r} is provided by both {first.distribution} {first.version} and {second.distribution} "
-            f"{second.version}; uninstall one, or select plug-ins with SKILLFRAME_PLUGINS"
-        )
+from skillframe.extend.plugin import KINDS as KINDS
+from skillframe.extend.plugin import RECORDS as RECORDS
+from skillframe.extend.plugin import BadPlugin as BadPlugin
+from skillframe.extend.plugin import OtherContract as OtherContract
+from skillframe.extend.plugin import Plugin as Plugin
+from skillframe.extend.plugin import PluginConflict as PluginConflict
+from skillframe.extend.plugin import checked, hook_problems
+from skillframe.extend.records import (
+    CoordinatorType,
+    DriveType,
+    ExporterType,
+    ReaderType,
+    RobotType,
+    RowType,
+    ScoreType,
+    SectionType,
+    SegmenterType,
+    SkillType,
+    WorldType,
+)  # fmt: skip
 
 
 class Registry:
@@ -97,14 +66,19 @@ class Registry:
         """Load one plug-in and collect its records; what fails is kept in `Plugin.error`.
 
         A hook that fails loses its own records. A name that another plug-in already has is an error of this one, and
-        asking for it raises `PluginConflict`. What a plug-in prints while it loads goes to stderr.
+        asking for it raises `PluginConflict`. A plug-in that was written for another contract, or asks for another
+        skillframe, is not loaded. What a plug-in prints while it loads goes to stderr.
         """
+        from skillframe import __version__
+
         self.plugins.append(plugin)
         try:
+            _refuse(requirement_problem(plugin.requires, __version__))
             with redirect_stdout(sys.stderr):
                 module = load()
+            _refuse(contract_problem("the plug-in", getattr(module, ATTRIBUTE, "")))
             self._manager.register(module, name=f"{plugin.name} [{plugin.distribution}]")
-            problems = list(_hook_problems(module))
+            problems = list(hook_problems(module))
         except (Exception, SystemExit) as error:  # one plug-in must not take the rest down
             plugin.fail(error)
             return plugin
@@ -121,12 +95,15 @@ class Registry:
                 continue
             try:
                 with redirect_stdout(sys.stderr):
-                    records = _checked(kind, implementation.function())
+                    records = checked(kind, implementation.function())
             except (Exception, SystemExit) as error:  # see `add`
                 plugin.fail(error)
                 continue
             for record in records:
-                self._keep(kind, record, plugin)
+                if problem := contract_problem(f"{kind} {record.name!r}", record.contract):
+                    plugin.fail(OtherContract(problem))
+                else:
+                    self._keep(kind, record, plugin)
 
     def _keep(self, kind: str, record: Any, plugin: Plugin) -> None:
         _, first = self._records[kind].setdefault(record.name, (record, plugin))
@@ -137,7 +114,7 @@ class Registry:
             plugin.fail(conflict)
 
     def names(self, kind: str) -> list[str]:
-        """Sorted names of a kind ("skill", "segmenter", "coordinator", "world", "reader", "row")."""
+        """Sorted names of a kind, a key of `KINDS`: "skill", "world", "exporter" ..."""
         return sorted(name for name in self._records[kind] if (kind, name) not in self._conflicts)
 
     def records(self, kind: str) -> Iterator[Any]:
@@ -202,89 +179,35 @@ class Registry:
         record: RowType = self._get("row", name)
         return record
 
+    def exporter(self, name: str) -> ExporterType:
+        """The exporter of that name; raises as `skill` does."""
+        record: ExporterType = self._get("exporter", name)
+        return record
 
-def _hook_problems(module: object) -> Iterator[BadPlugin]:
-    """Hooks that would silently never be called: misspelt names, and hooks without the marker."""
-    for name in dir(module):
-        function = getattr(module, name, None)
-        marker = getattr(function, f"{hookspecs.GROUP}_impl", None)
-        marked = isinstance(marker, dict)
-        optional = isinstance(marker, dict) and marker["optionalhook"]  # a hook of a newer core, declared as such
-        if name not in KINDS.values() and callable(function) and (marked or name.startswith("skillframe_")):
-            if not optional:
-                yield BadPlugin(str(UnknownName("hook", name, KINDS.values())))
-        elif name in KINDS.values() and not marked:
-            yield BadPlugin(
-                f"{name} lacks @hookimpl and would never be called; add it (from skillframe import hookimpl)"
-            )
+    def score(self, name: str) -> ScoreType:
+        """The score of that name; raises as `skill` does."""
+        record: ScoreType = self._get("score", name)
+        return record
 
+    def robot(self, name: str) -> RobotType:
+        """The robot of that name that ships with skillframe or a plug-in; raises as `skill` does."""
+        record: RobotType = self._get("robot", name)
+        return record
 
-def _checked(kind: str, answer: object) -> list[Any]:
-    """The records that a hook gave, or `BadPlugin` that says what is wrong with them."""
-    hook, expected = KINDS[kind], RECORDS[kind]
-    if not hasattr(answer, "__iter__"):
-        raise BadPlugin(f"{hook} gave {answer!r} instead of yielding {expected.__name__} records")
-    records: list[Any] = list(answer)
-    for record in records:
-        if not isinstance(record, expected):
-            raise BadPlugin(f"{hook} yielded {record!r}, not a {expected.__name__}")
-        if not (isinstance(record.name, str) and record.name):
-            raise BadPlugin(f"{hook} yielded a {expected.__name__} with the name {record.name!r}; give it a word")
-    names = [record.name for record in records]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise BadPlugin(f"{hook} yielded the name {', '.join(twice)} more than once")
-    return records
+    def drive(self, name: str) -> DriveType:
+        """The drive of that name; raises as `skill` does."""
+        record: DriveType = self._get("drive", name)
+        return record
+
+    def section(self, name: str) -> SectionType:
+        """The section of reports of that name; raises as `skill` does."""
+        record: SectionType = self._get("section", name)
+        return record
 
 
-def _installed() -> list[tuple[Plugin, Callable[[], object]]]:
-    """Installed plug-ins with what loads them, by name; a damaged distribution is kept with what it raises.
-
-    Only distributions whose entry points mention the group are parsed, so that an unrelated damaged one does no harm.
-    """
-    found: dict[tuple[str, str], tuple[Plugin, Callable[[], object]]] = {}
-    seen: set[str] = set()
-    for distribution in distributions():
-        text = distribution.read_text("entry_points.txt") or ""
-        if not re.search(rf"^\[{hookspecs.GROUP}\]", text, re.MULTILINE):
-            continue
-        name, version = _identity(distribution)
-        if name.lower() in seen:  # the first on the path is the one that imports
-            continue
-        seen.add(name.lower())
-        for entry, load in _entries(distribution, name):
-            found[entry, name] = (Plugin(name=entry, distribution=name, version=version), load)
-    return [found[key] for key in sorted(found)]
-
-
-def _identity(distribution: Distribution) -> tuple[str, str]:
-    """Name and version; from the folder's name where the metadata is damaged."""
-    try:
-        name, version = distribution.metadata["Name"], distribution.metadata["Version"]
-    except Exception:  # metadata is foreign text; whatever it raises, the folder's name remains
-        name, version = None, None
-    folder = getattr(getattr(distribution, "_path", None), "stem", "unknown")
-    stem, _, rest = folder.partition("-")
-    return str(name or stem), str(version or rest or "?")
-
-
-def _entries(distribution: Distribution, name: str) -> list[tuple[str, Callable[[], object]]]:
-    try:
-        points = [point for point in distribution.entry_points if point.group == hookspecs.GROUP]
-    except Exception as error:  # a damaged entry_points.txt
-        return [(name, _raiser(BadPlugin(f"entry_points.txt of {name} cannot be read ({error}); install it again")))]
-    return [(point.name, _loader(point)) for point in points]
-
-
-def _loader(point: EntryPoint) -> Callable[[], object]:
-    return lambda: point.load()
-
-
-def _raiser(error: Exception) -> Callable[[], object]:
-    def load() -> object:
-        raise error
-
-    return load
+def _refuse(problem: str) -> None:
+    if problem:
+        raise OtherContract(problem)
 
 
 def load_registry() -> Registry:
@@ -296,13 +219,13 @@ def load_registry() -> Registry:
     registry.add(Plugin(name="core", distribution="skillframe", version=__version__), lambda: builtin)
     setting = os.environ.get("SKILLFRAME_PLUGINS")
     wanted = None if setting is None else {name.strip() for name in setting.split(",") if name.strip()}
-    installed = _installed()
-    for plugin, load in installed:
+    found = installed()
+    for plugin, load in found:
         if wanted is None or plugin.name in wanted:
             registry.add(plugin, load)
         else:
             registry.unselected.append(plugin.name)
-    registry.not_installed = sorted((wanted or set()) - {plugin.name for plugin, _ in installed})
+    registry.not_installed = sorted((wanted or set()) - {plugin.name for plugin, _ in found})
     return registry
 
 

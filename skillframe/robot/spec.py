@@ -13,7 +13,7 @@ from typing import Literal
 
 from skillframe.config import build, read_toml
 from skillframe.errors import InputError, UnknownName
-from skillframe.paths import data_dirs
+from skillframe.paths import OFFERS, data_dirs
 from skillframe.robot.driven import Actuation, DeclaredPayload, Gains, LoopClosure, MachineNoise, impossible
 from skillframe.robot.numbers import LARGEST
 
@@ -162,29 +162,50 @@ def load_robot(name_or_path: str | Path) -> RobotSpec:
 
     Raises:
         InputError: a file is missing, or says something that is not allowed.
-        UnknownName: a name that no `robots/` folder holds.
+        UnknownName: a name that neither a `robots/` folder nor a plug-in has.
     """
     path = Path(name_or_path)
     bare_name = isinstance(name_or_path, str) and path.parts == (name_or_path,) and not path.suffix
-    if bare_name and (found := robot_names().get(str(name_or_path))):
+    name = str(name_or_path)
+    if bare_name and (found := _named_folders().get(name) or OFFERS["robots"](None).get(name)):
         return _from_toml(found / "robot.toml")
     if path.is_dir():
         return _from_toml(path / "robot.toml")
+    if bare_name and not path.exists():
+        return _from_toml(robot_folder(name) / "robot.toml")
     if not path.exists():
-        raise (
-            UnknownName("robot", str(name_or_path), robot_names())
-            if bare_name
-            else InputError(
-                path,
-                "no such file",
-                "give a URDF, a robot.toml, a folder with one, or a name from `skillframe robots list`",
-            )
-        )
+        fix = "give a URDF, a robot.toml, a folder with one, or a name from `skillframe robots list`"
+        raise InputError(path, "no such file", fix)
     return _from_toml(path) if path.suffix == ".toml" else _from_urdf(path)
 
 
 def robot_names() -> dict[str, Path]:
-    """Folder of every robot that can be named, the user's own before the shipped ones."""
+    """Folder of every robot that can be named: the user's own, then the shipped ones, then those of plug-ins."""
+    return {**OFFERS["robots"](None), **_named_folders()}
+
+
+def robot_folder(name: str, note: str = "") -> Path:
+    """The folder of a robot.
+
+    Args:
+        name: of the robot.
+        note: what to say besides if there is none.
+
+    Raises:
+        UnknownName: there is none.
+        SkillframeError: two plug-ins have it.
+    """
+    if found := _named_folders().get(name):
+        return found
+    try:
+        return OFFERS["robots"](name)[name]
+    except UnknownName as error:
+        notes = "; ".join(text for text in (note, error.note) if text)
+        raise UnknownName("robot", name, robot_names(), notes) from None
+
+
+def _named_folders() -> dict[str, Path]:
+    """Folder by name of what lies in a `robots/` folder."""
     names: dict[str, Path] = {}
     for folder in data_dirs("robots"):
         for robot in sorted(p.parent for p in folder.glob("*/robot.toml")):

@@ -32,7 +32,7 @@ def test_a_learned_skill_is_written_as_yaml_of_every_format(skill: str, form: st
 def test_the_formats_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["export", "--list", "--json"]) == 0
     assert [f["name"] for f in json.loads(capsys.readouterr().out)] == [
-        "crisp", "cartesian_controllers", "aic_motion_update",
+        "aic_motion_update", "cartesian_controllers", "crisp",
     ]  # fmt: skip
 
 

@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 import yaml
 
-from skillframe.document.export import FORMATS, settings_text
+from skillframe.document.export import exported
 from skillframe.document.frame import frame_at
 from skillframe.document.impedance import moving_impedance
 from skillframe.errors import InputError
+from skillframe.extend.exporters import exporter_types
 
 PINNED = tomllib.loads((Path(__file__).parent / "declarations.toml").read_text(encoding="utf-8"))
+FORMATS = {each.name: each for each in exporter_types()}
 STOP = {"lead_force_n": 20.0, "lead_torque_nm": 2.0, "time_limit_s": 20.0}
 WHAT = {"bool": bool, "double": float, "float64": float, "string": str, "uint8": int, "int32": int, "uint32": int}
 
@@ -33,7 +35,7 @@ def phase(stiffness=1000.0, damped=0.1):
 
 def written(form, **changes):
     """What a receiver reads: (full name, value) of every leaf, below the node's name if there is one."""
-    body = yaml.safe_load(settings_text(FORMATS[form], phase(**changes), []))
+    body = yaml.safe_load(exported(FORMATS[form], phase(**changes), []))
     if node := PINNED[form].get("node"):
         assert set(body) == {node}
         body = body[node]["ros__parameters"]
@@ -78,7 +80,7 @@ def test_every_parameter_that_holds_the_skill_is_written():
 
 @pytest.mark.parametrize("form", FORMATS)
 def test_the_file_says_which_repository_and_commit_it_was_checked_against(form):
-    text = settings_text(FORMATS[form], phase(), [])
+    text = exported(FORMATS[form], phase(), [])
     said = [line for line in text.splitlines() if line.startswith("# checked against ")]
     assert len(said) == 1
     assert PINNED[form]["repository"] in said[0]
@@ -86,12 +88,10 @@ def test_the_file_says_which_repository_and_commit_it_was_checked_against(form):
 
 
 def test_the_file_says_what_a_controller_s_older_or_own_settings_do_to_the_skill():
-    assert f"needs crisp_controllers {PINNED['crisp']['needs']} or newer" in settings_text(
-        FORMATS["crisp"], phase(), []
-    )
-    aic = settings_text(FORMATS["aic_motion_update"], phase(), [])
+    assert f"needs crisp_controllers {PINNED['crisp']['needs']} or newer" in exported(FORMATS["crisp"], phase(), [])
+    aic = exported(FORMATS["aic_motion_update"], phase(), [])
     assert "limits the wrench to 10 N and 10 Nm per axis (impedance.maximum_wrench)" in aic
-    assert "the spring acts at end_effector_link" in settings_text(FORMATS["cartesian_controllers"], phase(), [])
+    assert "the spring acts at end_effector_link" in exported(FORMATS["cartesian_controllers"], phase(), [])
 
 
 def test_a_stiffness_that_crisp_would_refuse_to_load_is_refused_with_its_bound():

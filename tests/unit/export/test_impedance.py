@@ -4,11 +4,13 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from skillframe.document.export import FORMATS, settings_text
+from skillframe.document.export import exported
 from skillframe.document.impedance import moving_impedance, per_axis
 from skillframe.errors import InputError
+from skillframe.extend.exporters import exporter_types
 from skillframe.frames import rotation_matrix, unit
 
+FORMATS = {each.name: each for each in exporter_types()}
 STOP = {"lead_force_n": 20.0, "lead_torque_nm": 2.0, "time_limit_s": 20.0}
 POINT = [0.0, 0.0, 0.2]
 
@@ -68,8 +70,8 @@ def test_what_is_free_in_every_direction_and_what_is_stiff_in_every_one_have_no_
 def test_axes_that_a_controller_of_one_number_per_axis_cannot_hold_are_refused_and_a_matrix_holds_them():
     phase = moving_impedance(peg(0.5), None, "base", None, "peg")
     with pytest.raises(InputError, match="29 degrees from the controller's"):
-        settings_text(FORMATS["crisp"], phase, [])
-    whole = yaml.safe_load(settings_text(FORMATS["aic_motion_update"], phase, []))
+        exported(FORMATS["crisp"], phase, [])
+    whole = yaml.safe_load(exported(FORMATS["aic_motion_update"], phase, []))
     assert np.reshape(whole["target_stiffness"], (6, 6)) == pytest.approx(phase.stiffness, abs=1e-8)  # nine decimals
     assert np.reshape(whole["target_damping"], (6, 6)) == pytest.approx(phase.damping, abs=1e-8)
     assert whole["velocity"]["linear"] == {"x": 0.0, "y": 0.0, "z": -0.02}
@@ -77,7 +79,7 @@ def test_axes_that_a_controller_of_one_number_per_axis_cannot_hold_are_refused_a
 
 def test_crisp_is_told_the_gains_and_clips_the_error_to_the_lead():
     phase = moving_impedance(peg(), None, "base", None, "peg")
-    text = settings_text(FORMATS["crisp"], phase, ["push along -z"])
+    text = exported(FORMATS["crisp"], phase, ["push along -z"])
     task = yaml.safe_load(text)["cartesian_controller"]["ros__parameters"]["task"]
     assert [task[f"k_pos_{a}"] for a in "xyz"] == [0.0, 1000.0, 1000.0]
     assert [task[f"k_rot_{a}"] for a in "xyz"] == [20.0, 0.0, 20.0]
@@ -93,7 +95,7 @@ def test_a_controller_in_tool_axes_needs_the_attitude_and_then_gets_them():
         moving_impedance(peg(), None, "tool", None, "peg")
     quarter = rotation_matrix(np.array([0.0, 0.0, np.pi / 2]))  # the tool's y lies along -x of base
     phase = moving_impedance(peg(), None, "tool", quarter, "peg")
-    told = yaml.safe_load(settings_text(FORMATS["cartesian_controllers"], phase, []))
+    told = yaml.safe_load(exported(FORMATS["cartesian_controllers"], phase, []))
     stiffness = told["cartesian_compliance_controller"]["ros__parameters"]["stiffness"]
     assert [stiffness[f"trans_{a}"] for a in "xyz"] == [1000.0, 0.0, 1000.0]
     assert [stiffness[f"rot_{a}"] for a in "xyz"] == [0.0, 20.0, 20.0]
