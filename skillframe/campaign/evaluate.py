@@ -6,7 +6,6 @@ trial) are simulated in groups of equal scenes; a trial's row is the same in wha
 
 from __future__ import annotations
 
-import dataclasses
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import nullcontext
@@ -18,7 +17,7 @@ import numpy as np
 
 from skillframe.campaign.axes import Value
 from skillframe.campaign.pulse import beat
-from skillframe.campaign.rows import EXTRA, JUDGED, OUTCOME, TRACE, ChunkJob, Row, plain_value, rows_of
+from skillframe.campaign.rows import EXTRA, JUDGED, OUTCOME, SCORE, TRACE, ChunkJob, Row, plain_value, rows_of
 from skillframe.campaign.sampling import draws, trial_rngs
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.trouble import needed
@@ -28,6 +27,7 @@ from skillframe.robot.model import RobotModel
 from skillframe.robot.payload import with_payload
 from skillframe.run.executor import QUANTITIES, simulate
 from skillframe.run.prepare import load_robot_model, load_world, prepare
+from skillframe.run.scores import ScoreFailed, score_notes, scores_of
 from skillframe.run.trace import Trace
 from skillframe.world.drawing import geom_json
 from skillframe.world.placement import check_quantities
@@ -143,21 +143,38 @@ def _simulate(
     varied = {name: values for name, values in draws(spec, trials).items() if name not in scene}
     result = simulate(
         skill, setup, {**constant, **varied}, trial_rngs(spec.seed, trials), duration_s=spec.duration_s,
-        trace_hz=TRACE_HZ if job.traces else None, progress=progress,
+        trace_hz=TRACE_HZ if job.traces or spec.scores else None, progress=progress,
     )  # fmt: skip
     if result.interrupted:  # rows that a Ctrl-C cut short are no outcome
         raise KeyboardInterrupt
     rows = rows_of(spec, job.skill, trials, {name: getattr(result, name) for name in (*OUTCOME, *JUDGED, *EXTRA)})
-    for row, trace in zip(rows, result.traces or [], strict=job.traces):
-        row[TRACE] = _trace_bytes(trace, row, list(spec.vary))
+    for row, trace in zip(rows, result.traces or [], strict=job.traces or bool(spec.scores)):
+        drawn = {name: row[name] for name in spec.vary}
+        trace.meta.update({"seed": row["seed"], "trial": row["trial"], "skill": row["skill"], "draws": drawn})
+        row |= {SCORE + name: value for name, value in _scores(spec, trace).items()}
+        row |= {TRACE: _trace_bytes(trace)} if job.traces else {}
     return rows
 
 
-def _trace_bytes(trace: Trace, row: Row, varied: list[str]) -> bytes:
-    """The trace as the content of its file, with the trial it is of."""
-    drawn = {name: row[name] for name in varied}
-    meta = {**trace.meta, "seed": row["seed"], "trial": row["trial"], "skill": row["skill"], "draws": drawn}
+def _scores(spec: CampaignSpec, trace: Trace) -> dict[str, float]:
+    """The scores that the campaign asks for, noted in the trace too.
+
+    Raises:
+        ScoreFailed: names the trial too.
+    """
+    if not spec.scores:
+        return {}
+    try:
+        values = scores_of(trace, spec.scores)
+    except ScoreFailed as error:
+        raise ScoreFailed(f"trial {trace.meta['trial']}: {error}") from error
+    trace.meta["scores"] = score_notes(values)
+    return values
+
+
+def _trace_bytes(trace: Trace) -> bytes:
+    """The trace as the content of its file."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trace.npz"
-        dataclasses.replace(trace, meta=meta).save(path)
+        trace.save(path)
         return path.read_bytes()

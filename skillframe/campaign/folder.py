@@ -178,6 +178,7 @@ def to_toml(spec: CampaignSpec) -> str:
     top = {
         key: getattr(spec, key) for key in ("name", "seed", "trials", "robot", "world", "skills", "coc", "duration_s")
     }
+    top |= {"scores": spec.scores} if spec.scores else {}
     stop, expect = dataclasses.asdict(spec.stop), dataclasses.asdict(spec.expect)
     tables: dict[str, Mapping[str, Any]] = {
         "vary": {n: a.plain() for n, a in spec.vary.items()},

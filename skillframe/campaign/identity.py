@@ -55,11 +55,11 @@ def identity(plugins: bool = True) -> Identity:
 
 
 def needed_plugins(spec: CampaignSpec, ours: Identity) -> set[str]:
-    """Distributions that the campaign may need: any that provides a name that its skills or its world mention.
+    """Distributions that the campaign may need: any that provides a name that its skills, world or scores mention.
 
     Rather one too many: every word in a skill file counts, and where a skill is learned on the spot every reader does.
     """
-    words, readers = {spec.world}, False
+    words, readers = {spec.world, *spec.scores}, False
     for text in spec.skills:
         entry = parse_source(text, spec.folder)
         readers |= bool(entry.kind)

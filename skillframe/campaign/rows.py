@@ -1,8 +1,8 @@
 """One row a trial and skill: its columns, its text form, and what two of them have to have in common.
 
-A row is a flat dict: `trial`, `skill`, `seed`, every varied quantity, then `OUTCOME` and `JUDGED`; a stored row also
-keeps `status` and `reason`. A row of version 0.1 has no `JUDGED`: those cells stay empty. Numbers that JSON does not
-know (NaN, infinities) are stored as text and read back as numbers.
+A row is a flat dict: `trial`, `skill`, `seed`, every varied quantity, then `OUTCOME` and `JUDGED`, then the scores that
+the campaign asks for; a stored row also keeps `status` and `reason`. A row of version 0.1 has no `JUDGED`: those cells
+stay empty. Numbers that JSON does not know (NaN, infinities) are stored as text and read back as numbers.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ JUDGED_MEASURES = ("peak_force_filtered_n", "peak_torque_share", "peak_speed_sha
 JUDGED = (*JUDGED_MEASURES[:3], "ended_by", JUDGED_MEASURES[3])
 """What came with version 0.2: what the estimate read, what motors were asked for, and what ended the trial."""
 EXTRA = ("status", "reason")
+SCORE = "score."
+"""Begins the columns of scores."""
 TRACE = "trace"
 """Key of a row's trace as the bytes of a trace file, taken out before the row is stored."""
 
@@ -62,7 +64,12 @@ def trials_of(job: ChunkJob, spec: CampaignSpec) -> str:
 
 def columns(spec: CampaignSpec) -> list[str]:
     """The columns of results.csv."""
-    return ["trial", "skill", "seed", *spec.vary, *OUTCOME, *JUDGED]
+    return ["trial", "skill", "seed", *spec.vary, *OUTCOME, *JUDGED, *score_columns(spec)]
+
+
+def score_columns(spec: CampaignSpec) -> list[str]:
+    """The columns of the scores that a campaign asks for, which come last."""
+    return [SCORE + name for name in spec.scores]
 
 
 def rows_of(spec: CampaignSpec, skill: int, trials: tuple[int, ...], outcomes: Mapping[str, Any]) -> list[Row]:
@@ -72,10 +79,10 @@ def rows_of(spec: CampaignSpec, skill: int, trials: tuple[int, ...], outcomes: M
         spec: the campaign.
         skill: index of the skill.
         trials: n trial numbers.
-        outcomes: `OUTCOME` and, where there are, `JUDGED` and `EXTRA`, each (n,).
+        outcomes: `OUTCOME` and, where there are, `JUDGED`, `EXTRA` and columns of scores, each (n,).
     """
     drawn = draws(spec, trials)
-    given = {name: outcomes[name] for name in (*OUTCOME, *JUDGED, *EXTRA) if name in outcomes}
+    given = {name: outcomes[name] for name in _outcome_names(spec) if name in outcomes}
     return [
         {"trial": trial, "skill": spec.labels[skill], "seed": spec.seed}
         | {name: plain_value(values[i]) for name, values in {**drawn, **given}.items()}
@@ -83,9 +90,13 @@ def rows_of(spec: CampaignSpec, skill: int, trials: tuple[int, ...], outcomes: M
     ]
 
 
+def _outcome_names(spec: CampaignSpec) -> tuple[str, ...]:
+    return (*OUTCOME, *JUDGED, *EXTRA, *score_columns(spec))
+
+
 def dead_row(spec: CampaignSpec, skill: int, trial: int, failure: str) -> Row:
     """The row of a trial that left no outcome."""
-    measures = {name: [math.nan] for name in (*MEASURES, *JUDGED_MEASURES)}
+    measures = {name: [math.nan] for name in (*MEASURES, *JUDGED_MEASURES, *score_columns(spec))}
     outcome = {"success": [False], "failure": [failure], "ended_by": ["lost"], **measures}
     return rows_of(spec, skill, (trial,), outcome)[0]
 
@@ -104,7 +115,11 @@ def encode(value: Any) -> Any:
 def decode(row: Row) -> Row:
     """A row as it was before `encode`."""
     measures = (*MEASURES, *JUDGED_MEASURES)
-    return {key: float(v) if key in measures and isinstance(v, str) else v for key, v in row.items()}
+
+    def is_number(key: str) -> bool:
+        return key in measures or key.startswith(SCORE)
+
+    return {key: float(v) if is_number(key) and isinstance(v, str) else v for key, v in row.items()}
 
 
 def cell(value: Any) -> str:

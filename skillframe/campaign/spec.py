@@ -66,6 +66,7 @@ class _File:
     set: dict[str, Any] = field(default_factory=dict)
     stop: Stop = field(default_factory=Stop)
     expect: Expect = field(default_factory=Expect)
+    scores: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,6 +84,7 @@ class CampaignSpec:
         fixed: quantities at one other value than the default, `[set]` in the file.
         coc: centre of compliance, "x,y,z" in the tool frame or a frame's name; None for the skill's own.
         duration_s: simulated time after which a trial has failed.
+        scores: names of scores to compute of every trial; each is a column of results.csv.
         folder: where the file lies; relative paths start there.
     """
 
@@ -98,6 +100,7 @@ class CampaignSpec:
     duration_s: float = DURATION_S
     stop: Stop = field(default_factory=Stop)
     expect: Expect = field(default_factory=Expect)
+    scores: tuple[str, ...] = ()
     folder: Path = Path()
 
     @property
@@ -122,9 +125,13 @@ class CampaignSpec:
         return plan_of(self.vary, trials=self.trials, skills=len(self.skills), may_stop=may_stop)
 
     def plain(self) -> dict[str, Any]:
-        """The campaign as plain JSON values, as `from_plain` reads them; without its folder."""
-        values = {key: value for key, value in asdict(self).items() if key not in ("vary", "folder")}
+        """The campaign as plain JSON values, as `from_plain` reads them; without its folder.
+
+        Scores are in it where there are some, so that the hashes of campaigns without them stay as they were.
+        """
+        values = {key: value for key, value in asdict(self).items() if key not in ("vary", "folder", "scores")}
         values["skills"] = list(self.skills)
+        values |= {"scores": list(self.scores)} if self.scores else {}
         return {**values, "vary": {name: axis.plain() for name, axis in self.vary.items()}}
 
     @classmethod
@@ -132,8 +139,9 @@ class CampaignSpec:
         """The inverse of `plain`, for values that were checked before."""
         axes = {name: parse_axis(value, name) for name, value in values["vary"].items()}
         stop, expect = Stop(**values["stop"]), Expect(**values["expect"])
-        rest = {k: v for k, v in values.items() if k not in ("vary", "stop", "expect", "skills")}
-        return cls(**rest, skills=tuple(values["skills"]), vary=axes, stop=stop, expect=expect, folder=folder)
+        rest = {k: v for k, v in values.items() if k not in ("vary", "stop", "expect", "skills", "scores")}
+        skills, scores = tuple(values["skills"]), tuple(values.get("scores", ()))
+        return cls(**rest, skills=skills, scores=scores, vary=axes, stop=stop, expect=expect, folder=folder)
 
     @classmethod
     def from_toml(cls, path: Path, params: type | None = None) -> CampaignSpec:
@@ -145,18 +153,21 @@ class CampaignSpec:
 
         Raises:
             InputError: what is wrong and where, as "file: section.key".
-            UnknownName: there is no such world.
+            UnknownName: there is no such world, or no such score.
         """
         file = build(_File, read_toml(path), f"{path}: campaign")
         params = params or _world_params(file.world)
         _check_numbers(file, path)
         _check_skills(file, path)
+        _check_scores(file, path)
         given = flatten(file.vary, f"{path}: vary")
         vary = {name: _axis(name, value, params, file, path) for name, value in given.items()}
         fixed = {
             name: _fixed(name, value, params, given, path) for name, value in flatten(file.set, f"{path}: set").items()
         }
-        values = {k: getattr(file, k) for k in ("seed", "trials", "robot", "world", "skills", "coc", "duration_s")}
+        values = {
+            k: getattr(file, k) for k in ("seed", "trials", "robot", "world", "skills", "coc", "duration_s", "scores")
+        }
         spec = cls(**values, name=file.name or path.stem, vary=vary, fixed=fixed, stop=file.stop, expect=file.expect,
                    folder=path.parent)  # fmt: skip
         _check_designs(spec, path)
@@ -225,6 +236,17 @@ def _source(text: str, path: Path, index: int) -> SkillSource:
         return parse_source(text, path.parent)
     except InputError as error:
         raise InputError(f"{path}: skills[{index}]", f"{error.where!r} {error.problem}", error.fix) from None
+
+
+def _check_scores(file: _File, path: Path) -> None:
+    if not file.scores:
+        return
+    from skillframe.extend.registry import registry
+
+    for i, name in enumerate(file.scores):
+        registry().score(name)
+        if file.scores.index(name) != i:
+            raise InputError(f"{path}: scores[{i}]", f"{name!r} is named twice", "name it once")
 
 
 def _axis(name: str, value: Any, params: type, file: _File, path: Path) -> Axis:

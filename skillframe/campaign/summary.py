@@ -7,9 +7,10 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
+from statistics import median
 from typing import Any
 
-from skillframe.campaign.rows import Row
+from skillframe.campaign.rows import SCORE, Row
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.statistics import correction, holm
 from skillframe.campaign.store import FORMAT, VERSION
@@ -17,6 +18,7 @@ from skillframe.campaign.validity import Basis, Validity, unbroken, validity_of
 from skillframe.errors import InputError
 from skillframe.files import write_whole
 from skillframe.files.documents import read_json
+from skillframe.run.scores import about
 
 SUMMARY = "summary.json"
 PEAKS = ("peak_force_n", "peak_force_10ms_n", "peak_force_filtered_n", "peak_torque_share", "peak_speed_share")
@@ -62,6 +64,24 @@ def _rate(counted: Sequence[Row], rows: Sequence[Row], label: str, validity: Val
 def _largest(values: Sequence[Any]) -> float | None:
     """The largest finite number, or None."""
     return max((v for v in values if isinstance(v, float) and math.isfinite(v)), default=None)
+
+
+def scores(spec: CampaignSpec, rows: Sequence[Row], complete: bool) -> dict[str, dict[str, Any]]:
+    """Per score its unit, its summary, and by skill how many trials have it, its median, smallest and largest value.
+
+    The trials are those that count for the rates. A skill without any such trial has nulls.
+    """
+    return {
+        name: about(name) | {"skills": {label: _spread(_of(rows, label, complete), name) for label in spec.labels}}
+        for name in spec.scores
+    }
+
+
+def _spread(rows: Sequence[Row], name: str) -> dict[str, float | int | None]:
+    values = [row[SCORE + name] for row in rows if not math.isnan(row[SCORE + name])]
+    if not values:
+        return {"trials": 0, "median": None, "smallest": None, "largest": None}
+    return {"trials": len(values), "median": median(values), "smallest": min(values), "largest": max(values)}
 
 
 def comparisons(spec: CampaignSpec, rows: Sequence[Row], complete: bool) -> list[dict[str, Any]]:
@@ -121,6 +141,7 @@ def summarize(
         "stopped_after_trial": stop_after,
         "skills": rates(spec, rows, complete),
         "comparisons": comparisons(spec, rows, complete),
+        **({"scores": scores(spec, rows, complete)} if spec.scores else {}),
         "wall_s": sum(s.get("wall_s", 0.0) for s in sessions),
         "workers": last.get("workers"),
         "versions": last.get("environment", {}),

@@ -6,6 +6,7 @@ A row is a result of the skill. It is never written for trouble of the environme
     UnknownName, MissingDependency, plug-in load errors,    wherever raised: a name that was there when the campaign
     CompilerFailed                                          was prepared is missing in this process
     InputError of files                                     raised while an FMU is found, unpacked or built
+    ScoreFailed                                             a score is no part of the skill
     anything                                                raised while the robot, the skill or the world is loaded
                                                             (`needed`): none of it depends on a draw, and all of it
                                                             was loaded once before the campaign began
@@ -30,6 +31,7 @@ from skillframe.campaign.rows import ChunkJob, Row
 from skillframe.campaign.work import WorkT
 from skillframe.errors import InputError, MissingDependency, SkillframeError, UnknownName
 from skillframe.extend.registry import BadPlugin, PluginConflict
+from skillframe.run.scores import ScoreFailed
 
 Evaluate = Callable[[ChunkJob], list[Row]]
 FILES = frozenset(f"skillframe.fmu.{name}" for name in ("allow", "build", "extract", "foreign", "library"))
@@ -101,7 +103,7 @@ def is_trouble(error: BaseException) -> bool:
     from skillframe.fmu.toolchain import CompilerFailed
 
     always = (MemoryError, OSError, ImportError, UnknownName, MissingDependency, BadPlugin, PluginConflict, Unusable)
-    if isinstance(error, (*always, CompilerFailed)):
+    if isinstance(error, (*always, ScoreFailed, CompilerFailed)):
         return True
     return isinstance(error, InputError) and not FILES.isdisjoint(_modules(error.__traceback__))
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from skillframe.cli import names
 from skillframe.cli.endings import PAGE, TRACE
 from skillframe.cli.names import robot_option, world_option
 from skillframe.cli.numbers import POSITIVE, SEED
@@ -44,11 +45,20 @@ QUIET_S = 5.0  # a run that is over by then needs no progress
     "--duration", default=LONGEST_S, show_default=True, type=POSITIVE, help="Longest run in simulated seconds."
 )
 @click.option("--rate", default=RATE_HZ, show_default=True, type=POSITIVE, help="Rate of the trace [Hz].")
+@click.option(
+    "--score",
+    "scores",
+    multiple=True,
+    metavar="NAME",
+    shell_complete=names.scores,
+    help="A figure that a plug-in computes from the trace; repeat for several (skillframe plugins list names them).",
+)
 @click.option("--json", "as_json", is_flag=True, help="The outcome as JSON on stdout.")
 @quiet_option
 def command(
     skill: str, world: str, robot: str, coc: str | None, settings: tuple[str, ...], out: Path | None,
-    replay: Path | None, video: Path | None, seed: int, duration: float, rate: float, as_json: bool,
+    replay: Path | None, video: Path | None, seed: int, duration: float, rate: float, scores: tuple[str, ...],
+    as_json: bool,
 ) -> int:  # fmt: skip
     """Run SKILL (a skill file, or TYPE:DEMONSTRATION) once in a simulated world.
 
@@ -69,15 +79,18 @@ def command(
     from skillframe.robot.guesses import guess_note
     from skillframe.run.executor import simulate
     from skillframe.run.prepare import load_robot_model, load_world, prepare, split_settings
+    from skillframe.run.scores import about, score_notes, scores_of
 
     if video is not None:
         from skillframe.report.video import check_film
 
         check_film(video)
+    for name in scores:
+        about(name)  # an unknown one is told before the run
     given = dict(parse_setting(text) for text in settings)
     params, draws = split_settings(world, given)
     warn(world, given)
-    name, document = load_skill(skill)
+    label, document = load_skill(skill)
     model = load_robot_model(robot)
     runnable, setup = prepare(model, load_world(world, params), document, coc)
     with progress("s simulated", QUIET_S) as show:
@@ -87,8 +100,10 @@ def command(
         )  # fmt: skip
     assert result.traces is not None
     trace = result.traces[0]
-    typed = _typed(skill, world, robot, coc, settings, seed, duration, rate)
-    trace.meta.update({"skill": name, "seed": seed, "draws": draws, "command": typed})
+    typed = _typed(skill, world, robot, coc, settings, seed, duration, rate, scores)
+    trace.meta.update({"skill": label, "seed": seed, "draws": draws, "command": typed})
+    if scores:
+        trace.meta["scores"] = score_notes(scores_of(trace, scores))
     if not result.success[0] and (guess := guess_note(model.spec)):
         trace.meta["notes"] = [*trace.meta.get("notes", []), guess]
     if out is not None:
@@ -105,7 +120,7 @@ def command(
 
 def _typed(
     skill: str, world: str, robot: str, coc: str | None, settings: Sequence[str], seed: int, duration: float,
-    rate: float,
+    rate: float, scores: Sequence[str],
 ) -> str:  # fmt: skip
     """What to type to get the same run again, without where it goes."""
     words = ["skillframe", "run", skill, "--world", world, "--robot", robot]
@@ -113,7 +128,8 @@ def _typed(
     words += [word for text in settings for word in ("--set", text)]
     words += ["--seed", f"{seed}"]
     words += [] if duration == LONGEST_S else ["--duration", f"{duration:g}"]
-    return shlex.join([*words, *([] if rate == RATE_HZ else ["--rate", f"{rate:g}"])])
+    words += [] if rate == RATE_HZ else ["--rate", f"{rate:g}"]
+    return shlex.join([*words, *(word for name in scores for word in ("--score", name))])
 
 
 def _write_replay(trace: Trace, path: Path) -> None:
@@ -171,6 +187,7 @@ def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) ->
     if as_json:
         named = {what: str(path) if path else None for what, path in files.items()}
         where = {"robot": meta["robot"], "world": meta["world"], "progress": meta["progress"]}
+        where["scores"] = meta.get("scores") or {}
         click.echo(json.dumps({**outcome, **judged, **where, **named}, sort_keys=True))
         return
     click.echo(f"success: {_scene(meta)}" if meta["success"] else f"failure: {meta['failure']}\n  {_scene(meta)}")
@@ -184,6 +201,9 @@ def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) ->
     click.echo(ended)
     if meta["peak_torque_share"] is not None or meta["peak_speed_share"] is not None:
         click.echo(f"  motors: {_shares(meta)}")
+    for name, score in (meta.get("scores") or {}).items():
+        figure = "none" if score["value"] is None else f"{score['value']:.4g} {score['unit']}"
+        click.echo(f"  score {name}: {figure}")
     for what, path in files.items():
         if path is not None:
             click.echo(f"  {what}: {path}")

@@ -11,7 +11,7 @@ from skillframe.report.markup import Markup, join, number, table, tag
 from skillframe.report.quantities import quantity
 from skillframe.report.sources import Chapter
 
-SHOWN_ELSEWHERE = ("skills", "comparisons", "format", "version", "versions", "hashes")
+SHOWN_ELSEWHERE = ("skills", "comparisons", "scores", "format", "version", "versions", "hashes")
 LABELS = {
     "complete": "all trials have run", "planned_trials": "trials per skill", "sessions": "times started or resumed",
     "stopped_after_trial": "stopped early after trial", "wall_s": "wall time [s]",

@@ -12,6 +12,7 @@ from skillframe.report.plots import demonstration_plots, events_of, run_plots
 from skillframe.report.quantities import quantity
 from skillframe.report.raster import draw, png
 from skillframe.report.replay import run_data, scene_data, scene_key, viewer
+from skillframe.report.scores import said_of
 from skillframe.report.sources import Chapter, Run
 from skillframe.report.stage import Stage, stage_of
 
@@ -77,6 +78,7 @@ def _story(meta: Mapping[str, Any]) -> str:
     ):
         if isinstance(meta.get(key), int | float):
             facts.append(f"{what} {_figure(float(meta[key]) * factor)} {unit}")
+    facts += said_of(meta)
     drawn = [_draw_text(name, value) for name, value in sorted((meta.get("draws") or {}).items())]
     how = "Set for this run" if meta.get("trial") is None else "Drawn for this trial"
     return "; ".join(f for f in facts if f) + "." + (f" {how}: {', '.join(drawn)}." if drawn else "")

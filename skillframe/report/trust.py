@@ -14,6 +14,7 @@ from skillframe.report.convergence import MOST_CURVES, cell_map, influence, rate
 from skillframe.report.markup import Markup, figure, join, note, number, percent, table, tag
 from skillframe.report.quantities import quantity
 from skillframe.report.results import Results
+from skillframe.report.scores import scores_table
 from skillframe.report.sources import Chapter
 from skillframe.report.svg import Axes, padded, picture, text
 from skillframe.report.theory import regions, theory_sentence
@@ -30,7 +31,13 @@ def trust_section(chapter: Chapter) -> Markup:
     if not results.rows:
         return note("results.csv holds no rows yet.")
     return join(
-        [_map(chapter, results), _comparison(results), _failures(results, chapter.folder), _forces(chapter, results)]
+        [
+            _map(chapter, results),
+            _comparison(results),
+            _failures(results, chapter.folder),
+            _forces(chapter, results),
+            scores_table(chapter, results),
+        ]
     )
 
 

@@ -60,6 +60,7 @@ class Trace:
             `duration_s`, `peak_force_n`, `peak_force_filtered_n`, `peak_force_10ms_n`, `peak_torque_share`,
             `peak_speed_share`, `ended_by`, `final_error_m`, `final_error_rad`, `center_of_compliance`, `skill`,
             `progress` (`word`, `of_m`, `reached_m`; null in a world without a depth), `events` ([[t, text]]),
+            `scores` ({name: {`value`, `unit`, `summary`}}, null for a trial without that figure; where asked for),
             `actuators` (names of a machine's), `notes` (sentences about what stood in for what), and `bodies`:
             [{`name`, `geoms`: [{`kind`, `size`, `position`, `quaternion`, `rgba`, `vertices`, `faces`}]}] in the order
             of the body arrays.

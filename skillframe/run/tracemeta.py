@@ -14,7 +14,7 @@ from skillframe.errors import InputError
 
 LARGEST = 1e100  # beyond it squares overflow
 KINDS: dict[str, type | tuple[type, ...]] = {
-    **dict.fromkeys(("analytic", "draws", "frames", "limits", "params", "progress"), dict),
+    **dict.fromkeys(("analytic", "draws", "frames", "limits", "params", "progress", "scores"), dict),
     **dict.fromkeys(("actuators", "bodies", "center_of_compliance", "events", "notes"), list),
     **dict.fromkeys(("duration_s", "peak_force_n", "final_error_m", "final_error_rad"), (int, float)),
     **dict.fromkeys(("peak_force_filtered_n", "peak_force_10ms_n"), (int, float)),

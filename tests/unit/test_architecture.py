@@ -63,7 +63,7 @@ SET_UP = {  # finds, builds and unpacks FMUs before a run, simulates one alone, 
         "toolchain",
         "worker",
     )
-} | {f"skillframe/run/{name}.py" for name in ("prepare", "trace", "tracemeta")}  # before a run, and after it
+} | {f"skillframe/run/{name}.py" for name in ("prepare", "scores", "trace", "tracemeta")}  # before a run, and after it
 SET_UP |= {f"skillframe/teaching/{name}.py" for name in ("sessions", "blind_sessions", "machine_sessions")}
 
 
