@@ -10,7 +10,7 @@ from typing import Any
 from skillframe.errors import SkillframeError
 from skillframe.extend.records import SkillType
 from skillframe.extend.registry import registry
-from skillframe.report.markup import Markup, data_uri, escape, figure, join, note, number, table, tag
+from skillframe.report.markup import Markup, escape, image, join, note, number, table, tag
 from skillframe.report.sources import Chapter
 
 PARTS = ("translation", "rotation")
@@ -73,14 +73,9 @@ def _pictures(document: Mapping[str, Any]) -> tuple[list[Markup], str]:
         return [], ""
     try:
         drawn = kind.explain(dict(document))
-        return [_image(i.title, i.caption, i.svg) for i in drawn], ""
+        return [image(i.title, i.caption, i.svg) for i in drawn], ""
     except Exception as error:  # see `described`
         return [], f"The plug-in could not draw it ({type(error).__name__}: {error})."
-
-
-def _image(title: str, caption: str, svg: str) -> Markup:
-    source = data_uri("image/svg+xml", svg.encode("utf-8"))
-    return figure(title, caption, tag("img", src=source, alt=title, class_="paper"), class_="plot")
 
 
 def _origin(document: Mapping[str, Any]) -> Markup:

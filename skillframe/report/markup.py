@@ -67,6 +67,12 @@ def figure(title: str, caption: object, *content: object, class_: str = "") -> M
     return tag("figure", head, *content, foot, class_=class_ or None)
 
 
+def image(title: str, caption: object, svg: str) -> Markup:
+    """A drawing as an image, so that nothing in it can act on the page."""
+    source = data_uri("image/svg+xml", svg.encode("utf-8"))
+    return figure(title, caption, tag("img", src=source, alt=title, class_="paper"), class_="plot")
+
+
 def table(head: Iterable[object], rows: Iterable[Iterable[object]], *, class_: str = "", numeric: int = 1) -> Markup:
     """A table; columns from index `numeric` on are set as figures."""
 

@@ -83,6 +83,8 @@ SECTIONS = (
     ("works", "Where it works"),
     ("made", "How this was made"),
 )
+PLUGIN = "plugin-"
+"""Begins the addresses of plug-ins' sections; they come before the last one."""
 
 
 def _top(chapters: Sequence[Chapter]) -> Markup:
@@ -96,9 +98,8 @@ def _top(chapters: Sequence[Chapter]) -> Markup:
 
 def _sections(chapter: Chapter) -> list[tuple[str, str]]:
     """The sections that have something to say: a loose trace has neither skill nor campaign."""
-    if chapter.folder:
-        return list(SECTIONS)
-    return [(name, title) for name, title in SECTIONS if name in ("run", "made")]
+    own = [(name, title) for name, title in SECTIONS if chapter.folder or name in ("run", "made")]
+    return [*own[:-1], *((f"{PLUGIN}{section.name}", section.title) for section in chapter.sections), own[-1]]
 
 
 def _chapter(chapter: Chapter, index: int, scenes: dict[str, Markup], alone: bool) -> Markup:
@@ -109,6 +110,7 @@ def _chapter(chapter: Chapter, index: int, scenes: dict[str, Markup], alone: boo
         "works": lambda: trust_section(chapter),
         "made": lambda: provenance_section(chapter),
     }
+    given = {f"{PLUGIN}{section.name}": section.body for section in chapter.sections}
     words = tag(
         "div",
         tag("p", "Report" if alone else f"Chapter {index}", class_="eyebrow"),
@@ -118,7 +120,8 @@ def _chapter(chapter: Chapter, index: int, scenes: dict[str, Markup], alone: boo
     hero = tag("header", tag("div", words, cover(chapter), class_="opening"), tiles(chapter), class_="hero")
     notes = [note(text) for text in chapter.notes]
     sections = [
-        tag("section", tag("h2", title), makers[name](), id=f"c{index}-{name}") for name, title in _sections(chapter)
+        tag("section", tag("h2", title), given[name] if name in given else makers[name](), id=f"c{index}-{name}")
+        for name, title in _sections(chapter)
     ]
     return tag("div", hero, *notes, *sections, class_="chapter", id=f"c{index}")
 

@@ -8,7 +8,7 @@ and cannot be read is refused, except a trace or demonstration inside a folder, 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,8 +20,10 @@ from skillframe.campaign.verify import edited_results
 from skillframe.config import read_toml
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError, SkillframeError
+from skillframe.extend.records import ReportFiles
 from skillframe.files.documents import read_json, read_text
 from skillframe.report.results import Results, read_results
+from skillframe.report.sections import MadeSection, files_of, made_sections
 from skillframe.run.trace import Trace
 
 CAMPAIGN = ("campaign.toml", "results.csv", "summary.json")
@@ -52,6 +54,7 @@ class Chapter:
         runs: the traces that are shown; traces: how many there are.
         demonstrations: by file name.
         force_limit: of the robot as run [N], or None.
+        sections: what plug-ins have to say.
         notes: sentences about what is missing or was left out.
         hashes: (file, sha256) of everything read.
     """
@@ -68,6 +71,7 @@ class Chapter:
     traces: int = 0
     demonstrations: dict[str, Demonstration] = field(default_factory=dict)
     force_limit: float | None = None
+    sections: list[MadeSection] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     hashes: list[tuple[str, str]] = field(default_factory=list)
 
@@ -118,7 +122,18 @@ def read_traces(paths: Sequence[Path]) -> Chapter:
         _remember(chapter, path, path.name)
     if len(paths) == 1:
         chapter.name = f"A run of {chapter.runs[0].trace.meta.get('skill') or paths[0].name}"
+    names = [path.name for path in paths]
+    _add_sections(chapter, {p.name if names.count(p.name) == 1 else str(p): p for p in paths})
     return chapter
+
+
+def _add_sections(chapter: Chapter, files: Mapping[str, Path]) -> None:
+    """What plug-ins make of the files; what they used counts as what the page was made from."""
+    given = ReportFiles(title=chapter.name, files=files)
+    chapter.sections = made_sections(given)
+    known = {name for name, _ in chapter.hashes}
+    for name in sorted(set(given.used) - known):
+        _remember(chapter, files[name], name)
 
 
 def read_folder(folder: Path) -> Chapter:
@@ -141,6 +156,7 @@ def read_folder(folder: Path) -> Chapter:
     chapter.force_limit = _force_limit(folder)
     _read_folder_traces(chapter, folder)
     _read_demonstrations(chapter, folder)
+    _add_sections(chapter, files_of(folder))
     return chapter
 
 
