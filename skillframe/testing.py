@@ -14,14 +14,21 @@ contract. The same checks, as functions, are in `skillframe.conformance`; `skill
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from skillframe.conformance import beginning, running, skills
+from skillframe.conformance.drives import check_drive
 from skillframe.conformance.examples import example_demonstrations, random_observations
+from skillframe.conformance.exporters import check_exporter
+from skillframe.conformance.material import example_campaign, example_phase, example_trace
 from skillframe.conformance.play import play
+from skillframe.conformance.plugins import CHECKS
 from skillframe.conformance.readers import check_reader, differences
+from skillframe.conformance.robots import check_robot
+from skillframe.conformance.scores import check_score
+from skillframe.conformance.sections import check_section
 from skillframe.conformance.segmenters import check_segmenter
 from skillframe.conformance.skills import check_skill, example_document
 from skillframe.conformance.worlds import check_world
@@ -29,25 +36,16 @@ from skillframe.demonstration.record import Demonstration
 from skillframe.extend.records import Document, SkillType
 from skillframe.extend.registry import registry
 from skillframe.frames import Float, Pose
+from skillframe.run.trace import Trace
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 
 __all__ = [
-    "CoordinatorConformance",
-    "HoldSkill",
-    "ReaderConformance",
-    "ScriptedSkill",
-    "SegmenterConformance",
-    "SkillConformance",
-    "WorldConformance",
-    "check_reader",
-    "check_segmenter",
-    "check_skill",
-    "check_world",
-    "differences",
-    "example_demonstrations",
-    "play",
-    "random_observations",
-]
+    "CoordinatorConformance", "DriveConformance", "ExporterConformance", "HoldSkill", "ReaderConformance",
+    "RobotConformance", "ScoreConformance", "ScriptedSkill", "SectionConformance", "SegmenterConformance",
+    "SkillConformance", "WorldConformance", "check_drive", "check_exporter", "check_reader", "check_robot",
+    "check_score", "check_section", "check_segmenter", "check_skill", "check_world", "differences", "example_campaign",
+    "example_demonstrations", "example_phase", "example_trace", "play", "random_observations",
+]  # fmt: skip
 
 
 def _demand(problems: Sequence[str]) -> None:
@@ -65,12 +63,14 @@ class SkillConformance:
             example demonstrations.
     """
 
+    kind: ClassVar[str] = "skill"
     skill_type: ClassVar[str] = ""
     document: ClassVar[Document | None] = None
     demonstrations: ClassVar[Sequence[Demonstration] | None] = None
 
     def _type(self) -> SkillType:
-        return registry().skill(self.skill_type)
+        record: SkillType = getattr(registry(), self.kind)(self.skill_type)
+        return record
 
     def _document(self) -> Document:
         from skillframe.document.source import learned
@@ -86,7 +86,7 @@ class SkillConformance:
 
     def test_is_discovered(self) -> None:
         """The registry knows the skill, from a plug-in that loaded without error."""
-        assert registry().provider("skill", self.skill_type).error is None
+        assert registry().provider(self.kind, self.skill_type).error is None
         assert self._type().summary
 
     def test_builds(self) -> None:
@@ -161,57 +161,93 @@ class SkillConformance:
 class CoordinatorConformance(SkillConformance):
     """Inherit, set `skill_type` to the coordinator's name, and pytest checks it as a skill of several arms."""
 
-    def _type(self) -> SkillType:
-        return registry().coordinator(self.skill_type)
+    kind: ClassVar[str] = "coordinator"
+
+
+class RecordConformance:
+    """What the suites below share: the record's name stands in the attribute that is called as its kind."""
+
+    kind: ClassVar[str] = ""
+
+    def _record(self) -> Any:
+        return getattr(registry(), self.kind)(getattr(self, self.kind))
+
+    def _problems(self) -> list[str]:
+        return CHECKS[self.kind](self._record())
 
     def test_is_discovered(self) -> None:
-        """The registry knows the coordinator, from a plug-in that loaded without error."""
-        assert registry().provider("coordinator", self.skill_type).error is None
-        assert self._type().summary
+        """The registry knows it, from a plug-in that loaded without error."""
+        assert registry().provider(self.kind, getattr(self, self.kind)).error is None
+        assert self._record().summary
+
+    def test_conforms(self) -> None:
+        """It obeys the contract; what it does not obey is named."""
+        _demand(self._problems())
 
 
-class WorldConformance:
-    """Inherit, set `world`, and pytest checks the world."""
+class WorldConformance(RecordConformance):
+    """Inherit, set `world`, and pytest checks its parameters, scene, tool and goal."""
 
+    kind: ClassVar[str] = "world"
     world: ClassVar[str] = ""
 
-    def test_is_discovered(self) -> None:
-        """The registry knows the world, from a plug-in that loaded without error."""
-        assert registry().provider("world", self.world).error is None
 
-    def test_conforms(self) -> None:
-        """Parameters, scene, tool and goal obey the contract."""
-        _demand(check_world(registry().world(self.world)))
+class ReaderConformance(RecordConformance):
+    """Inherit, set `reader`: what is written comes back, and what cannot be read is refused in words."""
 
-
-class ReaderConformance:
-    """Inherit, set `reader`, and pytest checks the file format."""
-
+    kind: ClassVar[str] = "reader"
     reader: ClassVar[str] = ""
 
-    def test_is_discovered(self) -> None:
-        """The registry knows the format, from a plug-in that loaded without error."""
-        assert registry().provider("reader", self.reader).error is None
 
-    def test_conforms(self) -> None:
-        """What is written comes back, and what cannot be read is refused in words."""
-        _demand(check_reader(registry().reader(self.reader)))
+class SegmenterConformance(RecordConformance):
+    """Inherit, set `segmenter` (and `demonstrations`, if the examples do not suit): boundaries and labels fit them."""
 
-
-class SegmenterConformance:
-    """Inherit, set `segmenter` (and `demonstrations`, if the examples do not suit), and pytest checks it."""
-
+    kind: ClassVar[str] = "segmenter"
     segmenter: ClassVar[str] = ""
     demonstrations: ClassVar[Sequence[Demonstration] | None] = None
     phases: ClassVar[int] = 2
 
-    def test_is_discovered(self) -> None:
-        """The registry knows the segmenter, from a plug-in that loaded without error."""
-        assert registry().provider("segmenter", self.segmenter).error is None
+    def _problems(self) -> list[str]:
+        return check_segmenter(self._record(), self.demonstrations, self.phases)
 
-    def test_conforms(self) -> None:
-        """Boundaries and labels describe the demonstrations."""
-        _demand(check_segmenter(registry().segmenter(self.segmenter), self.demonstrations, self.phases))
+
+class ExporterConformance(RecordConformance):
+    """Inherit, set `exporter`: it writes finite numbers that follow from the phase, and refuses in words."""
+
+    kind: ClassVar[str] = "exporter"
+    exporter: ClassVar[str] = ""
+
+
+class ScoreConformance(RecordConformance):
+    """Inherit, set `score` (and `traces` of your own): a number for any trace, the same each time."""
+
+    kind: ClassVar[str] = "score"
+    score: ClassVar[str] = ""
+    traces: ClassVar[Sequence[Trace] | None] = None
+
+    def _problems(self) -> list[str]:
+        return check_score(self._record(), self.traces)
+
+
+class RobotConformance(RecordConformance):
+    """Inherit, set `robot`: it loads, its dynamics are sound, and it stands still when told to."""
+
+    kind: ClassVar[str] = "robot"
+    robot: ClassVar[str] = ""
+
+
+class DriveConformance(RecordConformance):
+    """Inherit, set `drive`: what makes it is there."""
+
+    kind: ClassVar[str] = "drive"
+    drive: ClassVar[str] = ""
+
+
+class SectionConformance(RecordConformance):
+    """Inherit, set `section`: plain parts from the chapter's files alone, the same each time."""
+
+    kind: ClassVar[str] = "section"
+    section: ClassVar[str] = ""
 
 
 class HoldSkill(Skill):

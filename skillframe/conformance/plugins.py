@@ -6,8 +6,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from skillframe.conformance.drives import check_drive
+from skillframe.conformance.exporters import check_exporter
 from skillframe.conformance.problems import attempt
 from skillframe.conformance.readers import check_reader
+from skillframe.conformance.robots import check_robot
+from skillframe.conformance.scores import check_score
+from skillframe.conformance.sections import check_section
 from skillframe.conformance.segmenters import check_segmenter
 from skillframe.conformance.skills import check_skill, skill_warnings
 from skillframe.conformance.watch import printed, watched
@@ -20,6 +25,11 @@ CHECKS: Mapping[str, Callable[[Any], list[str]]] = {
     "segmenter": check_segmenter,
     "world": check_world,
     "reader": check_reader,
+    "exporter": check_exporter,
+    "score": check_score,
+    "robot": check_robot,
+    "drive": check_drive,
+    "section": check_section,
 }
 
 

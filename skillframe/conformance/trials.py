@@ -129,15 +129,24 @@ def _gap(scene: Scene, robot: RobotModel, model: Any, configuration: Float) -> f
     return min(gaps, default=None)
 
 
-class _Push(Skill):
-    """Holds where it starts, and moves 10 mm against the fixture's z over the run."""
+class Push(Skill):
+    """Holds where it starts, and moves against the fixture's z in the second half of the run.
+
+    Args:
+        distance: how far [m]; 0 holds.
+    """
+
+    def __init__(self, distance: float) -> None:
+        self._distance = distance
 
     def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
+        """Remember where the tool is."""
         self._home = Pose(observation.pose.position.copy(), observation.pose.rotation.copy())
 
     def step(self, observation: Observation) -> Command:
+        """Ask for the start, and then for what lies further down."""
         count, zero = len(observation.time), np.zeros((len(observation.time), 6))
-        down = np.maximum(observation.time - 0.5 * SHORT_S, 0.0)[:, None] * [0.0, 0.0, -2.0 * PUSH_M / SHORT_S]
+        down = np.maximum(observation.time - 0.5 * SHORT_S, 0.0)[:, None] * [0.0, 0.0, -2.0 * self._distance / SHORT_S]
         gains = Impedance(np.diag([1000.0] * 3 + [50.0] * 3))
         pose = Pose(self._home.position + down, self._home.rotation)
         return Command(pose, zero, gains, zero, np.zeros(count, dtype=np.int64), no_reasons(count))
@@ -151,7 +160,7 @@ def runs(scene: Scene) -> Iterator[str]:
         what = f"holding the tool at the start and pushing it 10 mm, {1e3 * SHORT_S:g} ms with {name},"
         rngs = [np.random.default_rng([12, i]) for i in range(2)]
         try:
-            result = simulate(_Push(), Setup(robot=robot, scene=scene), {}, rngs, duration_s=SHORT_S)
+            result = simulate(Push(PUSH_M), Setup(robot=robot, scene=scene), {}, rngs, duration_s=SHORT_S)
         except SkillframeError as error:
             yield f"does not run with {name}: {error}"
             continue

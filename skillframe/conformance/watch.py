@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
@@ -31,10 +32,12 @@ class Seen:
     Attributes:
         out: text written to standard output and standard error.
         deeds: what was done to files, programs and connections, each once and in order.
+        read: absolute paths of files that were opened for reading, each once and in order.
     """
 
     out: io.StringIO = field(default_factory=io.StringIO)
     deeds: list[str] = field(default_factory=list)
+    read: list[str] = field(default_factory=list)
 
 
 _WATCHING: list[Seen] = []
@@ -51,6 +54,27 @@ def left_behind(seen: Seen) -> Iterator[str]:
     yield from printed(seen)
     for deed in seen.deeds[:3]:
         yield f"{deed}; a plug-in owns no files and no programs, so leave it out"
+
+
+def read_elsewhere(seen: Seen, folder: Path) -> Iterator[str]:
+    """Files that were read and lie neither in a folder nor where code and its settings lie, in words.
+
+    Code lies on the path that modules are found on, in the interpreter's folders and the system's; libraries also read
+    what they keep in the user's `.cache` and `.config`.
+    """
+    here = os.path.realpath(folder)
+    known = [here, *_code_places()]
+    for path in seen.read:
+        real = os.path.realpath(path)
+        if not any(real == place or real.startswith(place + os.sep) for place in known):
+            yield f"reads {os.path.basename(path)!r}, which is none of the files it was given; use those alone"
+
+
+def _code_places() -> list[str]:
+    home = os.path.expanduser("~")
+    own = [sys.prefix, sys.base_prefix, *(entry for entry in sys.path if entry)]
+    system = ["/usr", "/lib", "/proc", "/sys", "/dev", "/etc/fonts", f"{home}/.cache", f"{home}/.config"]
+    return [os.path.realpath(place) for place in (*own, *system) if os.path.realpath(place) != os.sep]
 
 
 @contextlib.contextmanager
@@ -73,11 +97,24 @@ def _hook() -> None:
 
 
 def _told(event: str, arguments: tuple[Any, ...]) -> None:
-    if not _WATCHING or not (deed := _deed(event, arguments)):
+    if not _WATCHING:
+        return
+    if event == "open":
+        _note_read(*arguments)
+    if not (deed := _deed(event, arguments)):
         return
     for seen in _WATCHING:
         if deed not in seen.deeds:
             seen.deeds.append(deed)
+
+
+def _note_read(path: Any, mode: object, flags: Any) -> None:
+    if not isinstance(path, str | bytes | os.PathLike) or (isinstance(flags, int) and flags & WRITING):
+        return
+    absolute = os.path.abspath(os.fsdecode(path))
+    for seen in _WATCHING:
+        if absolute not in seen.read:
+            seen.read.append(absolute)
 
 
 def _deed(event: str, arguments: tuple[Any, ...]) -> str:

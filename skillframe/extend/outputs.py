@@ -95,6 +95,18 @@ class Grid(NamedTuple):
     caption: str = ""
 
 
+def part_problem(part: object) -> str:
+    """What is wrong with a part of a section, in words; "" if it is text, a `Grid` or an `Illustration`."""
+    from skillframe.extend.records import Illustration
+
+    if isinstance(part, Grid):
+        odd = [len(row) for row in part.rows if len(row) != len(part.head)]
+        return f"a row of its table has {odd[0]} cells, and its head {len(part.head)}" if odd else ""
+    if isinstance(part, str | Illustration):
+        return ""
+    return f"it gave {type(part).__name__}, not text, Grid or Illustration"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportFiles:
     """The files that a chapter of a report is made from.

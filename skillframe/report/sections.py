@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from skillframe.errors import SkillframeError
+from skillframe.extend.outputs import part_problem
 from skillframe.extend.records import Grid, Illustration, ReportFiles, SectionType
 from skillframe.extend.registry import registry
 from skillframe.report.markup import Markup, image, join, note, number, table, tag
@@ -76,17 +77,15 @@ def part_markup(part: object) -> Markup:
     Raises:
         BadSection: it is none of these.
     """
+    if problem := part_problem(part):
+        raise BadSection(problem)
     if isinstance(part, Grid):
         rows = [tuple(_cell(cell) for cell in row) for row in part.rows]
-        if any(len(row) != len(part.head) for row in rows):
-            raise BadSection(f"a row of its table has another number of cells than the head's {len(part.head)}")
         caption = tag("p", _escaped(part.caption), class_="caption") if part.caption else ""
         return join([table([_cell(cell) for cell in part.head], rows), caption])
     if isinstance(part, Illustration):
         return image(_text(part.title), _text(part.caption), _text(part.svg))
-    if isinstance(part, str):
-        return tag("p", _escaped(part))
-    raise BadSection(f"it gave {type(part).__name__}, not text, Grid or Illustration")
+    return tag("p", _escaped(part))
 
 
 def _cell(value: Any) -> Markup:

@@ -103,7 +103,7 @@ def fails(how):
         (lambda files: "one text", "it gave one text; give a list of parts"),
         (lambda files: None, "TypeError"),
         (lambda files: [b"bytes"], "it gave bytes, not text, Grid or Illustration"),
-        (lambda files: [Grid(("a", "b"), [(1,)])], "a row of its table has another number of cells than the head"),
+        (lambda files: [Grid(("a", "b"), [(1,)])], "a row of its table has 1 cells, and its head 2"),
         (lambda files: ["x" * (MOST_BYTES + 1)], "it is larger than 2 MB"),
         (lambda files: [files.path("../secret.txt")], "unknown file of the report"),
         (lambda files: [fails, EVIL], "it gave function"),

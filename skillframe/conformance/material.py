@@ -1,0 +1,132 @@
+"""Inputs to try exporters, scores and sections with: phases, traces of runs, and a campaign's folder.
+
+All are written down, so that they need no simulator and no plug-in. Their names, columns and units are those of real
+ones; what they show is a tool that slides down a plane, as in `skillframe.conformance.examples`.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from skillframe.campaign.rows import JUDGED, OUTCOME, cell
+from skillframe.conformance.examples import DOWN, FRICTION, NORMAL_FORCE, SPEED
+from skillframe.extend.records import MovingImpedance
+from skillframe.frames import Float
+from skillframe.run.trace import Trace
+
+RATE_HZ, APPROACH_S = 100.0, 0.4
+LONGEST_S = 20.0
+"""A run of the default length, for the time that a score takes."""
+
+
+def example_phase(**changes: Any) -> MovingImpedance:
+    """A push along -z that is free along x and turns freely about y; its gains lie along the axes, as read-only arrays.
+
+    Args:
+        **changes: fields that are to be other than these; the axes are "base" unless given.
+    """
+    given: dict[str, Any] = {
+        "axes": "base", "center": np.array([0.0, 0.0, 0.12]), "twist": np.array([0.0, 0.0, -0.02, 0.0, 0.0, 0.0]),
+        "stiffness": np.diag([0.0, 800.0, 800.0, 20.0, 0.0, 20.0]),
+        "damping": np.diag([40.0, 80.0, 80.0, 2.0, 1.0, 2.0]), "lead_force": 20.0, "lead_torque": 2.0,
+        "stop": {"lead_force_n": 20.0, "lead_torque_nm": 2.0, "time_limit_s": 20.0}, **changes,
+    }  # fmt: skip
+    for value in given.values():
+        if isinstance(value, np.ndarray):
+            value.setflags(write=False)
+    return MovingImpedance(**given)
+
+
+def example_trace(*, success: bool = True, duration_s: float = 4.0, diverged: bool = False, trial: int = 0) -> Trace:
+    """A trial: down to a plane, along it, and to its end, or stuck half way; its arrays are read-only.
+
+    Args:
+        success: it reached its goal.
+        duration_s: of the trial; 0 for a single sample.
+        diverged: the last quarter holds NaN, as after numbers that left all bounds.
+        trial: its number, from which its noise follows.
+    """
+    rng = np.random.default_rng([21, trial])
+    time = np.arange(round(duration_s * RATE_HZ) + 1) / RATE_HZ
+    touching = np.maximum(time - APPROACH_S, 0.0)
+    way = SPEED * (np.minimum(time, APPROACH_S) + (touching if success else np.minimum(touching, 0.3 * duration_s)))
+    position = np.array([0.4, 0.0, 0.2]) + way[:, None] * np.array([0.6, 0.0, -0.8])
+    force = np.where(touching > 0.0, NORMAL_FORCE * (1.0 if success else 3.0), 0.0)[:, None]
+    wrench = np.concatenate([force * [0.8 - 0.6 * FRICTION, 0.0, 0.6 + 0.8 * FRICTION], 0.0 * position], axis=1)
+    arrays: dict[str, Any] = {
+        "time": time, "position": position, "quaternion": np.tile(DOWN, (len(time), 1)),
+        "twist": np.concatenate([_rate_of(position), 0.0 * position], axis=1),
+        "wrench": wrench + rng.normal(size=wrench.shape) * np.repeat([0.05, 0.002], 3), "wrench_true": wrench,
+        "desired_position": position - np.array([0.0, 0.0, 0.005]), "desired_quaternion": np.tile(DOWN, (len(time), 1)),
+        "command_wrench": -wrench, "q": np.zeros((len(time), 7)), "body_position": np.zeros((len(time), 0, 3)),
+        "body_quaternion": np.zeros((len(time), 0, 4)),
+    }  # fmt: skip
+    if diverged:
+        for name in ("position", "twist", "wrench", "wrench_true", "command_wrench"):
+            arrays[name][3 * len(time) // 4 :] = np.nan
+    for array in arrays.values():
+        array.setflags(write=False)
+    meta = _meta(success, float(time[-1]), trial, float(np.abs(force).max()))
+    return Trace(meta=meta, **arrays)
+
+
+def _rate_of(position: Float) -> Float:
+    return np.gradient(position, 1.0 / RATE_HZ, axis=0) if len(position) > 1 else np.zeros_like(position)
+
+
+def _meta(success: bool, duration_s: float, trial: int, force: float) -> dict[str, Any]:
+    return {
+        "robot": "panda", "world": "valley", "params": {"slope": 0.8}, "seed": 7, "trial": trial,
+        "skill": "slide.skill.json", "draws": {"start.offset_x": 0.001 * trial}, **_outcome(success, duration_s, force),
+        "status": "SUCCESS" if success else "FAILURE", "reason": "reached the goal" if success else "stuck",
+        "center_of_compliance": [0.0, 0.0, 0.12], "events": [[APPROACH_S, "touched"]], "bodies": [], "progress": None,
+        "limits": {"force_n": 80.0},
+    }  # fmt: skip
+
+
+def _outcome(success: bool, duration_s: float, force: float) -> dict[str, Any]:
+    """The cells of a trial in results.csv that are no draw."""
+    return {
+        "success": success, "failure": "" if success else "stuck", "duration_s": duration_s, "peak_force_n": force,
+        "final_error_m": 0.0005 if success else 0.04, "final_error_rad": 0.001, "peak_force_filtered_n": force,
+        "peak_torque_share": 0.3, "peak_speed_share": 0.1, "ended_by": "goal" if success else "skill",
+        "peak_force_10ms_n": force,
+    }  # fmt: skip
+
+
+TOML = """name = "slide"
+seed = 7
+trials = 8
+robot = "panda"
+world = "valley"
+skills = ["slide.skill.json", "replay:slide.npz"]
+[vary]
+"start.offset_x" = { uniform = [-0.01, 0.01] }
+"""
+
+
+def example_campaign(folder: Path) -> Mapping[str, Path]:
+    """Write a small campaign's folder: campaign.toml, results.csv, summary.json and two traces; its files by name."""
+    (folder / "traces").mkdir(parents=True)
+    (folder / "campaign.toml").write_text(TOML, encoding="utf-8")
+    skills = ("slide.skill.json", "replay:slide.npz")
+    rows = [(trial, skill, trial % 3 != 0 or i == 0) for trial in range(8) for i, skill in enumerate(skills)]
+    with (folder / "results.csv").open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["trial", "skill", "seed", "start.offset_x", *OUTCOME, *JUDGED])
+        for trial, skill, success in rows:
+            given = _outcome(success, 4.0 + 0.1 * trial, 8.0 + trial)
+            cells = [trial, skill, 7, 0.001 * trial, *(given[name] for name in (*OUTCOME, *JUDGED))]
+            table.writerow([cell(value) for value in cells])
+    rates = {s: {"trials": 8, "successes": sum(row[2] for row in rows if row[1] == s)} for s in skills}
+    summary = {"format": "skillframe.campaign", "version": 1, "name": "slide", "complete": True, "skills": rates}
+    (folder / "summary.json").write_text(json.dumps(summary, sort_keys=True), encoding="utf-8")
+    for trial, success in ((0, False), (1, True)):
+        example_trace(success=success, trial=trial).save(folder / "traces" / f"{trial:06d}.npz")
+    return {p.relative_to(folder).as_posix(): p for p in sorted(folder.rglob("*")) if p.is_file()}
