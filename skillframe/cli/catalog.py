@@ -40,7 +40,15 @@ def found(registry: Registry, name: str) -> dict[str, Any]:
     return {
         "name": short, "kind": kind, "summary": record.summary, "distribution": plugin.distribution,
         "version": plugin.version, "settings": list(settings_of(settings)) if isinstance(settings, type) else None,
+        "facts": {what: str(getattr(record, field)) for field, what in FACTS.items() if getattr(record, field, None)},
     }  # fmt: skip
+
+
+FACTS = {
+    "contract": "written for contract", "unit": "unit", "axes": "axes", "checked": "checked against",
+    "folder": "folder", "title": "heading",
+}  # fmt: skip
+"""Fields of records that say what one is, and what they are called for people."""
 
 
 def rows_of(registry: Registry, kind: str) -> list[dict[str, Any]]:

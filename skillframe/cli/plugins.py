@@ -11,6 +11,7 @@ import click
 from skillframe.cli.catalog import by_kind
 from skillframe.cli.output import emit_json, note, quiet_option
 from skillframe.cli.settings import typed
+from skillframe.cli.template import EVERY, KINDS
 from skillframe.errors import UnknownName
 
 if TYPE_CHECKING:
@@ -85,6 +86,8 @@ def show(name: str, as_json: bool) -> None:
         emit_json(row)
         return
     click.echo(f"{row['kind']} {row['name']} ({row['distribution']} {row['version']}): {row['summary']}")
+    for what, text in row["facts"].items():
+        click.echo(f"  {what}: {text}")
     prefix = "world." if row["kind"] == "world" else ""
     for each in row["settings"] or ():
         unit = f" [{each['unit']}]" if each["unit"] else ""
@@ -126,19 +129,30 @@ def distribution_rows(registry: Registry) -> list[dict[str, Any]]:
 @click.option(
     "--out", type=click.Path(path_type=Path, file_okay=False), help="Folder to write (default: skillframe-NAME)."
 )
+@click.option(
+    "--kind",
+    "kinds",
+    multiple=True,
+    default=("skill",),
+    show_default=True,
+    type=click.Choice([*KINDS, EVERY]),
+    help="What it provides; repeat for several.",
+)
 @quiet_option
-def new(name: str, out: Path | None) -> None:
-    """Write a working plug-in to start from: one skill, with its conformance tests.
+def new(name: str, out: Path | None, kinds: tuple[str, ...]) -> None:
+    """Write a working plug-in to start from, with its conformance tests.
 
     \b
     Example:
       skillframe plugins new my_skill --out my-skill
+      skillframe plugins new my_lab --kind robot --kind world
+      skillframe plugins new my_lab --kind all
     """
     from skillframe.cli.template import plugin_name, write_template
 
     name = plugin_name(name)
     folder = out or Path(f"skillframe-{name.replace('_', '-')}")
-    for path in write_template(name, folder):
+    for path in write_template(name, folder, kinds):
         click.echo(path)
     note(f"next: pip install -e {folder} && skillframe plugins check {name}")
 
