@@ -4,6 +4,7 @@ import ast
 import importlib
 import inspect
 import re
+import shutil
 import sys
 import types
 from pathlib import Path
@@ -34,10 +35,13 @@ def test_every_hook_of_the_specification_is_one_that_the_registry_calls():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda code: re.search(r"def (skillframe_\w+)", code).group(1))
-def test_every_example_of_a_hook_loads_and_conforms(example, monkeypatch):
+def test_every_example_of_a_hook_loads_and_conforms(example, monkeypatch, tmp_path):
     from skillframe.conformance import check_plugin
+    from skillframe.robot import load_robot
 
     module = types.ModuleType("example_plugin")
+    module.__file__ = str(tmp_path / "example_plugin.py")
+    shutil.copytree(load_robot("free_tool").folder, tmp_path / "robots" / "my_arm")  # that the example ships
     monkeypatch.setitem(sys.modules, "example_plugin", module)
     exec(compile(example, "hooks.md", "exec"), module.__dict__)
     known = load_registry()
