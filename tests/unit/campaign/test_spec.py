@@ -164,6 +164,7 @@ AWKWARD = [  # text, label, files
     ("C:\\\\peg.skill.json", "C:\\peg.skill.json", ["C:\\peg.skill.json"]),
     ("sub dir/a=b,c.skill.json", "a=b,c.skill.json", ["sub dir/a=b,c.skill.json"]),
     ("lmc:sub dir/a,b.npz,t=1.npz,mode=x", "lmc:a,b.npz,t=1.npz,mode=x", ["sub dir/a,b.npz", "t=1.npz"]),
+    ("lmc:t=1.npz,sub dir/x.npz", "lmc:t=1.npz,x.npz", ["t=1.npz", "sub dir/x.npz"]),
     ("lmc:sub dir/t:1.npz,x.npz", "lmc:t:1.npz,x.npz", ["sub dir/t:1.npz", "x.npz"]),
 ]
 

@@ -55,12 +55,18 @@ def test_the_hand_is_the_option_or_the_demonstrations_own_or_the_learning_point(
     assert frame_of(demonstrations(meta), LearnOptions(at="tip", hand=option))["work_at"] == work_at
 
 
+def test_of_several_hands_the_first_ones_counts() -> None:
+    pair = demonstrations({"hand": [0.0, 0.0, 0.1]}, {"hand": [0.0, 0.0, 0.3]})
+    assert frame_of(pair, LearnOptions())["work_at"] == [0.0, 0.0, 0.1]
+
+
 @pytest.mark.parametrize(
     ("meta", "options", "said"),
     [
         ({}, {"axes": "bse"}, "--axes: 'bse' is neither base nor phase_start"),
         ({"frames": {"tip": ORIGIN}}, {"at": "tpi"}, "unknown point 'tpi'; did you mean 'tip'"),
         ({}, {"hand": "wrist"}, "unknown point 'wrist'"),
+        ({"hand": [0.0, 0.0, 0.1]}, {"hand": ""}, "unknown point ''"),
         ({"hand": "wrist"}, {}, "demo.npz: hand: unknown point 'wrist'"),
         ({"hand": [0.0, 1.0]}, {}, r"demo.npz: hand: is no point: \[0.0, 1.0\]; give \[x, y, z\] in metres"),
         ({"frames": {"tip": "x"}}, {}, "demo.npz: frames.tip: is no point: 'x'"),

@@ -126,6 +126,8 @@ AWKWARD = {
     "lmc:a,b.npz": SkillSource("lmc", ("a,b.npz",)),
     "lmc:a,b.npz,a.npz,mode=x": SkillSource("lmc", ("a,b.npz", "a.npz"), ("mode=x",)),
     "lmc:speed=2.npz,speed=3": SkillSource("lmc", ("speed=2.npz",), ("speed=3",)),
+    "lmc:x,y.npz": SkillSource("lmc", ("x,y.npz",)),  # although there is a file "x" as well
+    "lmc:x,b.npz": SkillSource("lmc", ("x", "b.npz")),
     "lmc:sub/t=1.npz": SkillSource("lmc", ("sub/t=1.npz",)),
     "lmc:t:1.npz": SkillSource("lmc", ("t:1.npz",)),
     "lmc:D:\\demos\\a.npz": SkillSource("lmc", ("D:\\demos\\a.npz",)),
