@@ -18,6 +18,7 @@ from skillframe.cli.numbers import POSITIVE, SEED
 from skillframe.cli.output import note, quiet_option
 
 if TYPE_CHECKING:
+    from skillframe.errors import SkillframeError
     from skillframe.run.trace import Trace
 
 LONGEST_S, RATE_HZ = 20.0, 100.0
@@ -79,7 +80,7 @@ def command(
     from skillframe.robot.guesses import guess_note
     from skillframe.run.executor import simulate
     from skillframe.run.prepare import load_robot_model, load_world, prepare, split_settings
-    from skillframe.run.scores import about, score_notes, scores_of
+    from skillframe.run.scores import about
 
     if video is not None:
         from skillframe.report.video import check_film
@@ -102,8 +103,7 @@ def command(
     trace = result.traces[0]
     typed = _typed(skill, world, robot, coc, settings, seed, duration, rate, scores)
     trace.meta.update({"skill": label, "seed": seed, "draws": draws, "command": typed})
-    if scores:
-        trace.meta["scores"] = score_notes(scores_of(trace, scores))
+    failed = _score(trace, scores)
     if not result.success[0] and (guess := guess_note(model.spec)):
         trace.meta["notes"] = [*trace.meta.get("notes", []), guess]
     if out is not None:
@@ -112,10 +112,24 @@ def command(
         _write_replay(trace, replay)
     if video is not None:
         _write_video(trace, video)
+    if failed is not None:  # the run is kept
+        raise failed
     _tell(trace.meta, {"trace": out, "replay": replay, "video": video}, as_json)
     if result.interrupted:
         raise KeyboardInterrupt
     return 0 if result.success[0] else 1
+
+
+def _score(trace: Trace, names: Sequence[str]) -> SkillframeError | None:
+    """Put the scores into the trace's metadata; the error of one that fails."""
+    from skillframe.run.scores import ScoreFailed, score_notes, scores_of
+
+    if names:
+        try:
+            trace.meta["scores"] = score_notes(scores_of(trace, names))
+        except ScoreFailed as error:
+            return error
+    return None
 
 
 def _typed(

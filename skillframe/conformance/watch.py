@@ -60,10 +60,10 @@ def read_elsewhere(seen: Seen, folder: Path) -> Iterator[str]:
     """Files that were read and lie neither in a folder nor where code and its settings lie, in words.
 
     Code lies on the path that modules are found on, in the interpreter's folders and the system's; libraries also read
-    what they keep in the user's `.cache` and `.config`.
+    what they keep in the user's `.cache` and `.config`. A place that the folder itself lies in does not count.
     """
     here = os.path.realpath(folder)
-    known = [here, *_code_places()]
+    known = [here, *(place for place in _code_places() if not here.startswith(place + os.sep))]
     for path in seen.read:
         real = os.path.realpath(path)
         if not any(real == place or real.startswith(place + os.sep) for place in known):

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from skillframe.extend.contract import CONTRACT
 from skillframe.extend.hookspecs import hookimpl
 from skillframe.extend.records import ExporterType, Lazy, ReaderType, RobotType, WorldType
+
+skillframe_contract = CONTRACT
 
 
 @hookimpl

@@ -35,6 +35,11 @@ class BadSection(SkillframeError):
     """A section gave something that cannot stand on a page."""
 
 
+def has_sections() -> bool:
+    """Does any plug-in have a section?"""
+    return bool(registry().names("section"))
+
+
 def made_sections(files: ReportFiles) -> list[MadeSection]:
     """The sections of all plug-ins that have something to say about a chapter, by name."""
     made = [made_section(record, files) for record in registry().records("section")]

@@ -23,7 +23,7 @@ from skillframe.errors import InputError, SkillframeError
 from skillframe.extend.records import ReportFiles
 from skillframe.files.documents import read_json, read_text
 from skillframe.report.results import Results, read_results
-from skillframe.report.sections import MadeSection, files_of, made_sections
+from skillframe.report.sections import MadeSection, files_of, has_sections, made_sections
 from skillframe.run.trace import Trace
 
 CAMPAIGN = ("campaign.toml", "results.csv", "summary.json")
@@ -123,12 +123,15 @@ def read_traces(paths: Sequence[Path]) -> Chapter:
     if len(paths) == 1:
         chapter.name = f"A run of {chapter.runs[0].trace.meta.get('skill') or paths[0].name}"
     names = [path.name for path in paths]
-    _add_sections(chapter, {p.name if names.count(p.name) == 1 else str(p): p for p in paths})
+    _add_sections(chapter, lambda: {p.name if names.count(p.name) == 1 else str(p): p for p in paths})
     return chapter
 
 
-def _add_sections(chapter: Chapter, files: Mapping[str, Path]) -> None:
+def _add_sections(chapter: Chapter, named: Callable[[], Mapping[str, Path]]) -> None:
     """What plug-ins make of the files; what they used counts as what the page was made from."""
+    if not has_sections():
+        return
+    files = named()
     given = ReportFiles(title=chapter.name, files=files)
     chapter.sections = made_sections(given)
     known = {name for name, _ in chapter.hashes}
@@ -156,7 +159,7 @@ def read_folder(folder: Path) -> Chapter:
     chapter.force_limit = _force_limit(folder)
     _read_folder_traces(chapter, folder)
     _read_demonstrations(chapter, folder)
-    _add_sections(chapter, files_of(folder))
+    _add_sections(chapter, lambda: files_of(folder))
     return chapter
 
 

@@ -143,6 +143,9 @@ def test_unknown_and_repeated_scores_are_refused_before_anything_runs(campaign, 
     (tmp_path / "c.toml").write_text(CAMPAIGN.format(scores='scores = ["way", "last", "way"]'))
     with pytest.raises(InputError, match=r"scores\[2\]: 'way' is named twice"):
         CampaignSpec.from_toml(tmp_path / "c.toml")
+    (tmp_path / "c.toml").write_text(CAMPAIGN.format(scores='scores = "way"'))
+    with pytest.raises(InputError, match="scores: expected a list"):
+        CampaignSpec.from_toml(tmp_path / "c.toml")
 
 
 def test_a_run_tells_its_scores_as_json_in_words_and_in_its_trace(campaign, tmp_path, capsys):
@@ -160,6 +163,23 @@ def test_a_run_tells_its_scores_as_json_in_words_and_in_its_trace(campaign, tmp_
     assert "score last: none" in said and "score way: " in said and " m\n" in said
     assert run([*typed[:-2], "--score", "wya"]) == 2
     assert "did you mean 'way'" in capsys.readouterr().err
+
+
+def test_a_score_that_fails_does_not_cost_the_run_that_it_was_asked_of(campaign, tmp_path, capsys):
+    campaign(out="first")
+    typed = ["run", "hold:demo.npz", "--world", "free", "--robot", "free_tool", "--score", "broken", "--out", "run.npz"]
+    assert run([*typed, "--duration", "0.1"]) == 2
+    assert "score broken raised KeyError" in capsys.readouterr().err
+    assert "scores" not in Trace.load(tmp_path / "run.npz").meta
+
+
+def test_a_worker_needs_the_plugin_of_a_score(campaign):
+    from skillframe.campaign.identity import identity, needed_plugins
+
+    spec = CampaignSpec.from_toml(campaign(["way"]) / "campaign.toml")
+    assert needed_plugins(spec, identity()) >= {"skillframe", "dist-measured"}
+    plain = CampaignSpec(name="x", seed=1, trials=1, robot="panda", world="free", skills=(), scores=("way",))
+    assert needed_plugins(plain, identity()) == {"skillframe", "dist-measured"}
 
 
 def test_a_report_shows_the_scores_of_a_campaign_and_of_a_run_without_the_plugin(campaign, tmp_path, monkeypatch):

@@ -43,7 +43,7 @@ def test_there_is_a_template_for_every_hook_but_the_papers_rows():
 def test_only_the_kinds_that_are_asked_for_are_written(tmp_path):
     folder = made(tmp_path / "two", "score", "robot")
     package = folder / "src" / PACKAGE
-    assert {p.name for p in package.iterdir()} == {"__init__.py", "score.py", "robots"}
+    assert {p.name for p in package.iterdir()} == {"__init__.py", "py.typed", "score.py", "robots"}
     assert (package / "robots" / NAME / "robot.toml").is_file()
     assert {p.name for p in (folder / "tests").iterdir()} == {f"test_{NAME}_score.py", f"test_{NAME}_robot.py"}
     hooks = re.findall(r"def (skillframe_\w+)", (package / "__init__.py").read_text())
