@@ -54,3 +54,20 @@ class Result:
     ended_by: Reasons = field(default_factory=lambda: no_reasons(0))
     traces: list[Trace] | None = None
     interrupted: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArmsResult(Result):
+    """What became of N trials of several arms; `traces` of the base class are the first arm's.
+
+    Attributes:
+        arms: their names.
+        joint_path_rad: (N, arms, joints) way each joint went.
+        turned_rad: (N, arms, 3) rotation vector of each tool since the start, base axes.
+        arm_traces: per trial a trace for every arm, by name, if asked for.
+    """
+
+    arms: tuple[str, ...]
+    joint_path_rad: Float
+    turned_rad: Float
+    arm_traces: list[dict[str, Trace]] | None = None

@@ -32,7 +32,7 @@ def setting():
 
 def loop(count):
     """A loop after its calibration in the air."""
-    from skillframe.run.machine import MachineLoop
+    from skillframe.run.executor import begin
     from tests.laws.pushing import Push
 
     stiffness, damping = np.diag([1e5] * 3 + [0.0] * 3), np.diag([5e4] * 3 + [1.0] * 3)
@@ -41,9 +41,9 @@ def loop(count):
         "robot.mass_scale": np.linspace(0.98, 1.02, count), "actuator.friction_scale": np.linspace(0.8, 1.2, count)
     }  # fmt: skip
     rngs = [np.random.default_rng(i) for i in range(count)]
-    made = MachineLoop(skill, setting(), draws, rngs, 100.0)
+    made = begin(skill, setting(), draws, rngs, 100.0)
     with np.errstate(invalid="ignore", over="ignore"):
-        made.tare()
+        made.prepare()
     return made
 
 
@@ -93,7 +93,7 @@ def second_run():
     made = loop(1)
     before = time.process_time()
     for _ in range(20):
-        made.bank.start(0.0)
+        made.drive.bank.start(0.0)
     return (time.process_time() - before) / 20
 
 

@@ -9,8 +9,7 @@ from skillframe_papers.rows.crane_runs import MOVING, Follow, diamond
 
 from skillframe.cli.main import run
 from skillframe.fmu.toolchain import find_compiler
-from skillframe.run.executor import Setup
-from skillframe.run.machine import MachineLoop
+from skillframe.run.executor import Setup, begin
 from skillframe.run.prepare import load_robot_model, load_world
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.system.worn_cylinder import campaign
@@ -58,7 +57,8 @@ def test_a_trial_whose_fmu_refuses_to_start_ends_at_once_with_its_sentence_and_t
     robot, where = load_robot_model(str(file)), load_world("pallets", {})
     draws = {"actuator.deadband": np.array([0.0, 1.5])}
     rngs = [np.random.default_rng(i) for i in range(2)]
-    loop = MachineLoop(Follow(diamond, MOVING), Setup(robot=robot, scene=where), draws, rngs, None)
-    assert loop.active.tolist() == [0]
+    loop = begin(Follow(diamond, MOVING), Setup(robot=robot, scene=where), draws, rngs, None)
+    loop.prepare()
+    assert loop.active.tolist() == [0] and loop.duration[1] == 0.0
     assert "parameter deadband is 1.5; it must be below 1" in loop.reason[1]
-    assert np.isfinite(loop.master.force[:3]).all()
+    assert np.isfinite(loop.drive.actuated.master.force[:3]).all()

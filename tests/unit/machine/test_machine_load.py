@@ -13,8 +13,7 @@ from skillframe.robot.chain import ClosedChain
 from skillframe.robot.model import load_model
 from skillframe.robot.payload import with_payload
 from skillframe.robot.spec import load_robot
-from skillframe.run.executor import simulate
-from skillframe.run.machine import MachineLoop
+from skillframe.run.executor import begin, simulate
 from skillframe.run.prepare import load_robot_model
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.oracle.hydraulic_law import terms
@@ -31,7 +30,7 @@ def crane(payload=475.0):
 
 def loop(draws):
     count = len(next(iter(draws.values())))
-    return MachineLoop(Follow(standing, MOVING), setup(), draws, rngs(range(count)), None)
+    return begin(Follow(standing, MOVING), setup(), draws, rngs(range(count)), None)
 
 
 def carried(payload):
@@ -44,9 +43,9 @@ def test_the_load_is_found_over_the_whole_rating_and_the_law_goes_by_it():
     """Told of 475 kg; found within 3 kg, as near the nominal one, and the tool is back where the swing began."""
     loads = np.array([0.0, 100.0, 200.0, 320.0])
     own = loop({"robot.payload": loads})
-    own.tare()
-    np.testing.assert_allclose(own.law.theta[:, CARRIER, 0], [carried(load) for load in loads], atol=3.0)
-    away = own.plant.tool_pose().position[:, own.task.axes] - own.home
+    own.prepare()
+    np.testing.assert_allclose(own.drive.law.theta[:, CARRIER, 0], [carried(load) for load in loads], atol=3.0)
+    away = own.plant.tool_pose().position[:, own.drive.task.axes] - own.drive.home
     assert np.abs(away).max() < 5e-3  # stiction over the spring of the force loop: 1 mm; at 4c3a7e9 0.07 to 0.7 m
 
 
@@ -86,8 +85,8 @@ def test_a_machine_at_rest_is_weighed_exactly_and_to_what_friction_may_hide(payl
 def test_the_controller_is_told_of_a_load_by_the_nominal_payload():
     """Its model's terms are those of a robot made with that load, by Pinocchio; the true load is another matter."""
     own = loop({"robot.nominal_payload": np.array([475.0, 200.0, 0.0])})
-    seen = own._measured()
-    found = own.law.terms(seen)
+    seen = own.drive._measured()
+    found = own.drive.law.terms(seen)
     for i, payload in enumerate([475.0, 200.0, 0.0]):
         other = terms(crane(payload), seen.z[i : i + 1], seen.rate[i : i + 1])
         for name in ("mass", "gravity"):

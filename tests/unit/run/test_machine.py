@@ -16,8 +16,8 @@ from skillframe.robot.driven import Gains
 from skillframe.robot.model import load_model
 from skillframe.robot.payload import with_payload
 from skillframe.robot.spec import load_robot, robot_names
-from skillframe.run.executor import Setup, simulate
-from skillframe.run.machine import MachineLoop
+from skillframe.run.drives.machine_start import holding_force
+from skillframe.run.executor import Setup, begin, simulate
 from skillframe.run.prepare import load_robot_model
 from skillframe.signals.delay import CommandDelay
 from skillframe.world.loops import SOLIMP
@@ -100,28 +100,28 @@ def _mechanical(chain, z, rate):
 def test_the_plant_carries_each_trials_own_payload():
     """Its mass matrix is that of a robot made with that payload, to rounding."""
     draws = {"robot.payload": np.array([0.0, 200.0, 475.0])}
-    loop = MachineLoop(Follow(diamond, MOVING), setup(), draws, rngs(range(3)), None)
+    loop = begin(Follow(diamond, MOVING), setup(), draws, rngs(range(3)), None)
     masses = loop.plant.mass_matrix()
     for mass, got in zip(draws["robot.payload"], masses, strict=True):
         robot = load_model(with_payload(load_robot_model("hiab_xs031").spec, float(mass)))
-        other = MachineLoop(Follow(diamond, MOVING), setup(robot), {}, rngs([0]), None)
+        other = begin(Follow(diamond, MOVING), setup(robot), {}, rngs([0]), None)
         assert np.allclose(got, other.plant.mass_matrix()[0], rtol=1e-9, atol=1e-9 * np.abs(got).max())
 
 
 def test_a_machine_starts_in_balance_with_what_it_carries():
     """What is left is MuJoCo's compliance of the loops: 1 - d of what a rod of 10.3 kg alone would do."""
     draws = {"robot.payload": np.array([475.0, 0.0]), "robot.mass_scale": np.array([1.1, 1.0])}
-    loop = MachineLoop(Follow(diamond, MOVING), setup(), draws, rngs(range(2)), None)
-    hold = loop._holding_force(loop._true_z(), draws)
-    left = np.abs(loop.coupled.motion(hold.ravel()).acceleration).reshape(2, -1)
+    loop = begin(Follow(diamond, MOVING), setup(), draws, rngs(range(2)), None)
+    hold = holding_force(loop.drive.chain, loop.drive._true_z(), draws)
+    left = np.abs(loop.drive.actuated.plant.motion(hold.ravel()).acceleration).reshape(2, -1)
     assert np.all(left < (1.0 - SOLIMP[0]) * np.abs(hold).max(axis=1, keepdims=True) / 10.3)
 
 
 def test_the_swing_in_air_finds_the_payload():
     """A tenth of the load less; found within 3 kg, a sixth of what 2 % of all masses would be."""
-    loop = MachineLoop(Follow(diamond, MOVING), setup(), {"robot.payload": np.array([427.5])}, rngs([0]), None)
-    loop.tare()
-    assert loop.estimator.identification.theta[0, -1] == pytest.approx(-47.5, abs=3.0)
+    loop = begin(Follow(diamond, MOVING), setup(), {"robot.payload": np.array([427.5])}, rngs([0]), None)
+    loop.prepare()
+    assert loop.drive.estimator.identification.theta[0, -1] == pytest.approx(-47.5, abs=3.0)
 
 
 def test_the_laws_own_defaults_are_those_of_the_crane_that_ships():
@@ -136,7 +136,7 @@ def test_filters_that_the_control_rate_is_too_low_for_are_warned_of_and_refused(
     sentence = f"{table}.{key} is 81, too fast a filter for control.rate_hz of 1000"
     assert [p.message for p in audit(spec).problems] == [sentence]
     with pytest.raises(InputError, match=re.escape(f"{sentence}; give 80 Hz at most")):
-        MachineLoop(Follow(standing, MOVING), setup(load_model(spec)), {}, rngs([0]), None)
+        begin(Follow(standing, MOVING), setup(load_model(spec)), {}, rngs([0]), None)
 
 
 @pytest.mark.slow
@@ -198,7 +198,7 @@ def test_a_payload_of_a_robot_that_declares_none_is_refused():
 @pytest.mark.parametrize("start", [(9.0, 0.0, 1.0), (0.3, 0.0, 0.2)])
 def test_a_start_out_of_reach_is_refused(start):
     with pytest.raises(SkillframeError):
-        MachineLoop(Follow(diamond, MOVING), setup(start=np.array(start)), {}, rngs([0]), None)
+        begin(Follow(diamond, MOVING), setup(start=np.array(start)), {}, rngs([0]), None)
 
 
 def test_a_machine_steers_its_tool_frame_only():
@@ -242,14 +242,14 @@ def test_a_crane_that_is_told_to_stand_in_the_air_stands():
 def test_the_record_holds_the_force_as_it_is_now_and_the_law_gets_the_late_one(runs):
     """Fed back, a force that looks ahead made the crane bounce to its force limit."""
     trace = runs[0].traces[0]
-    loop = MachineLoop(Follow(diamond, MOVING), setup(), of(DRAWS, [0]), rngs([0]), 100.0)
+    loop = begin(Follow(diamond, MOVING), setup(), of(DRAWS, [0]), rngs([0]), 100.0)
     force, feedback, answered = (np.array([row]) for row in ([3.0, 4.0], [1.0, 2.0], [0.5, 1.0]))
-    loop.estimate = loop.estimate._replace(force=force, feedback=feedback, answered=answered)
-    loop.terms = loop.law.terms(loop._measured())
-    seen = loop._observe(0.0)
+    loop.drive.estimate = loop.drive.estimate._replace(force=force, feedback=feedback, answered=answered)
+    loop.drive.terms = loop.drive.law.terms(loop.drive._measured())
+    seen = loop.drive._observe(0.0)
     np.testing.assert_array_equal(seen.wrench[0, [0, 2]], [1.0, 2.0])
-    np.testing.assert_array_equal(loop._read(seen).wrench[0, [0, 2]], [3.0, 4.0])
-    np.testing.assert_array_equal(loop._measured().force, [[0.5, 1.0]])
+    np.testing.assert_array_equal(loop.drive._read(seen).wrench[0, [0, 2]], [3.0, 4.0])
+    np.testing.assert_array_equal(loop.drive._measured().force, [[0.5, 1.0]])
     assert trace.machine["force_sigma"].shape[1:] == (2,) and set(np.unique(trace.machine["force_valid"])) <= {0.0, 1.0}
 
 

@@ -15,7 +15,7 @@ def small(monkeypatch, capacity, first=16):
         def __init__(self, plant, every, point):
             super().__init__(plant, every, point, capacity)
 
-    monkeypatch.setattr("skillframe.run.executor.Recorder", Small)
+    monkeypatch.setattr("skillframe.run.drives.torque.Recorder", Small)
     monkeypatch.setattr(recorder_module, "FIRST", first)
 
 

@@ -1,4 +1,4 @@
-"""Hydraulic machines in the one loop: the executor's tick, with cylinders as co-simulated FMUs between law and plant.
+"""Hydraulic machines: cylinders as co-simulated FMUs between command and plant.
 
     encoders, pressures -> filters -> force estimate -> Observation -> skill.step -> Command
         -> hydraulic law -> valve commands -> FMUs and plant, coupled by `cosim`
@@ -11,22 +11,17 @@ the tool follows from its joints and is not commanded.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from skillframe.control.endings import Ended
-from skillframe.cosim.coupling import coupling_numbers, require_stable
-from skillframe.cosim.master import CosimSettings, Master
+from skillframe.control.endings import Broken, Ended
+from skillframe.control.limits import LimitGuard
 from skillframe.errors import InputError
-from skillframe.frames import Float, Pose
-from skillframe.machine.checks.feasibility import require_feasible
+from skillframe.frames import Float, Pose, norm
 from skillframe.machine.checks.holding import require_held
 from skillframe.machine.columns import EnergyBill, columns, supply_pressures
-from skillframe.machine.coupled import CoupledPlant
 from skillframe.machine.cylinder.bank import banks, instance_parameters
 from skillframe.machine.force.calibration import CALIBRATION_S, SETTLE_S, hold_what_was_found, swing
 from skillframe.machine.force.compiled import CompiledEstimator
@@ -41,14 +36,19 @@ from skillframe.machine.law.vdc_actuator import cylinders
 from skillframe.machine.sensors import MachineSensors
 from skillframe.robot.chain import ClosedChain
 from skillframe.robot.driven import fast_filters
-from skillframe.run.executor import RAMP_S, Loop, Result, Setup
+from skillframe.run.drive import Shares, Trials
+from skillframe.run.drives.actuated import Actuated
+from skillframe.run.drives.machine_start import closed_configurations, holding_force
+from skillframe.run.drives.recording import WithColumns
 from skillframe.run.recorder import Recorder
+from skillframe.run.result import Result
+from skillframe.run.setup import Setup
 from skillframe.signals.delay import CommandDelay
-from skillframe.skill import Command, Observation, Skill
-from skillframe.world.placement import check_quantities, start_poses
-from skillframe.world.plant import Draws, Kinematics
+from skillframe.skill import Command, Observation
+from skillframe.world.placement import fixture_poses
+from skillframe.world.plant import Draws, Plant
 
-__all__ = ["MachineLoop", "simulate_machine"]
+__all__ = ["MachineDrive"]
 
 IMPEDANCE_RATE, LEAST_DAMPING = 2.0, 5e4  # 1/s and N s/m; D where a skill leaves it open, from teleoperation trials
 VALVES_S = 0.5
@@ -56,52 +56,37 @@ VALVES_S = 0.5
 AT_STOP, WILD = 0.99, 0.5
 """Opening of a valve at its stop, and the share of the swing for which one may be (ours; at 150 bar and with friction
 by a third too large it is 0.18, of a sound crane 0, and of one whose gains are ten times too large 0.97)."""
-RESIDUAL_LIMIT, RESIDUAL_ENERGY, RESIDUAL_TICKS = 1e-2, 200.0, 100
-"""Relative bond residual that ends a trial, once so many joules were exchanged; looked at every 100 ticks."""
 
 
-def simulate_machine(
-    skill: Skill,
-    setup: Setup,
-    draws: Mapping[str, Float],
-    rngs: Sequence[np.random.Generator],
-    *,
-    duration_s: float = 20.0,
-    trace_hz: float | None = None,
-    progress: Callable[[float], None] | None = None,
-) -> Result:
-    """Run a skill on a hydraulic machine, len(rngs) trials; arguments as `skillframe.run.executor.simulate`.
+class MachineDrive:
+    """N hydraulic machines in lock-step.
+
+    Args:
+        setup: robot, scene and settings.
+        draws: quantities per trial.
+        rngs: one generator per trial, for the sensors.
 
     Raises:
-        InputError: the machine cannot stand at a start, or a skill steers another point than the tool frame's origin.
+        InputError: the machine cannot stand at a start.
         StepTooLarge: the control rate is too low for the load on a cylinder.
-        UnknownName, SkillframeError: as `simulate`.
+        UnknownName, SkillframeError: as `skillframe.run.executor.simulate`.
     """
-    check_quantities(draws)
-    if np.any(np.abs(setup.center_of_compliance) > 1e-9):
-        raise InputError(
-            f"robot {setup.robot.spec.name}", "a hydraulic machine steers the origin of its tool frame",
-            "set the centre of compliance to 0 0 0",
-        )  # fmt: skip
-    with np.errstate(invalid="ignore", over="ignore"):  # as in `simulate`
-        loop = MachineLoop(skill, setup, draws, rngs, trace_hz)
-        loop.tare()
-        loop.run(duration_s, progress)
-        return loop.result()
 
-
-class MachineLoop(Loop):
-    """The executor's loop for N hydraulic machines in lock-step."""
-
-    def __init__(
-        self, skill: Skill, setup: Setup, draws: Draws, rngs: Sequence[np.random.Generator], trace_hz: float | None
-    ) -> None:
-        self.chain = ClosedChain(setup.robot)
+    def __init__(self, setup: Setup, draws: Draws, rngs: Sequence[np.random.Generator]) -> None:
+        self.setup, self.count, self.dt = setup, len(rngs), 1.0 / setup.robot.spec.control.rate_hz
+        robot, spec = setup.robot, setup.robot.spec
+        self.chain = ClosedChain(robot)
+        self.actuators = tuple(self.chain.actuated)
         self.task = plane_task(self.chain)
         first, second = self.task.axes
         self._plane = slice(first, second + 1, second - first)
-        super().__init__(skill, setup, draws, rngs, trace_hz)
-        spec = setup.robot.spec
+        fixture = fixture_poses(robot, draws, self.count)
+        self.plant = Plant(robot, setup.scene, self.count, fixture, draws, timestep=self.dt)
+        self.plant.reset(closed_configurations(self.chain, self.task, setup.scene, draws, self.count))
+        n, k = len(self.chain.independent), len(self.chain.actuated)
+        self.gauges = MachineSensors(spec.sensors, rngs, n, k, self.dt)
+        self.guard = LimitGuard(setup.limits, self.count, self.dt)
+        self.active = np.arange(self.count)
         known = cylinders(spec.actuation, spec.folder / "robot.toml")
         corner, estimate = spec.sensors.corner_hz, ForceSettings()
         noise = residual_noise(self.chain, known, spec.sensors, estimate.corner, self.dt)
@@ -109,49 +94,26 @@ class MachineLoop(Loop):
         self.law = CompiledLaw(self.chain, known, HydraulicGains.of(spec), self.count, self.dt)
         self.estimator = CompiledEstimator(self.chain, known, self.count, self.dt, estimate)
         self.valves = ValveIdentification(known, self.count, self.dt, ValveSettings(corner=corner))
-        self.coupled = CoupledPlant(self.plant, self.chain.actuated)
         self.bank = banks(spec, self.count)
-        self.master = Master(self.coupled, self.bank, CosimSettings(step=self.dt))
+        self.actuated = Actuated(self.plant, self.chain.actuated, self.bank, self.dt)
         self._pressures = [self.bank.outputs.index(f"pressure_{side}") for side in "ab"]
         self._z = [int(self.plant.model.joint(name).qposadr[0]) for name in self.chain.independent]
         late = np.asarray(draws.get("actuator.delay", np.zeros(self.count)))
         self._delay = CommandDelay(np.round(late / self.dt).astype(np.int64), len(known.area_a))
         self.findings: list[list[str]] = [[] for _ in rngs]
-        self._start(draws)
+        self._begin(draws)
 
-    def _configurations(self, draws: Draws) -> Float:
-        """Closed configurations (N, nq) with the tool's point at its start, the other joints as at home."""
-        robot, axes = self.setup.robot, self.task.axes
-        across = f"start.offset_{'xyz'[({0, 1, 2} - set(axes)).pop()]}"
-        if np.any(draws.get(across, 0.0)):
-            raise InputError(across, f"{robot.spec.name} moves its tool in a plane, and not across it", "leave it out")
-        home = self.chain.minimal(robot.home)
-        points = start_poses(robot, self.setup.scene, draws, self.count).position[:, axes]
-        rows = []
-        for point in points:
-            z = self.task.solve(self.chain, np.concatenate([point, home[2:]]), home)
-            require_feasible(self.chain, z)
-            rows.append(self.chain.configuration(z))
-        return np.array(rows)
-
-    def _sensors(self, rngs: Sequence[np.random.Generator], draws: Draws) -> Any:
-        n, k = len(self.chain.independent), len(self.chain.actuated)
-        self.gauges = MachineSensors(self.setup.robot.spec.sensors, rngs, n, k, self.dt)
-        return self.gauges
-
-    def _start(self, draws: Draws) -> None:
+    def _begin(self, draws: Draws) -> None:
         """FMUs in equilibrium with the load, the step judged against it, sensors and law at rest."""
         z = self._true_z()
-        hold = self._holding_force(z, draws)
+        hold = holding_force(self.chain, z, draws)
         own = instance_parameters(self.setup.robot.spec, draws, hold)
         supply = supply_pressures(own, self.law.cylinders.supply_pressure, self.count)
         require_held(self.setup.robot.spec.actuation, hold, supply, f"robot {self.setup.robot.spec.name}")
-        self.master.start(0.0, 0.0, own)
+        self.actuated.master.start(0.0, 0.0, own)
         self._require_pressures()
         self.bill = EnergyBill(self.bank, supply, self.dt)
-        if all(self.bank.capabilities(i).rollback for i in range(len(self.chain.actuated))):
-            numbers = coupling_numbers(self.bank, self.coupled.effective_mass(), self.dt)
-            require_stable(numbers, self.dt, self.chain.actuated)
+        self.actuated.require_stable()
         spec = self.setup.robot.spec
         for problem, fix in fast_filters(spec.sensors, spec.gains, spec.control.rate_hz):
             raise InputError(f"robot {spec.name}", problem, fix)
@@ -164,18 +126,6 @@ class MachineLoop(Loop):
         self.estimate = Estimate(nothing, nothing, np.zeros(self.count, dtype=bool), nothing, nothing)
         self.demand = Demand(*(np.zeros((self.count, len(self.chain.actuated))) for _ in range(3)))
         self.estimator.start(self._measured())
-        self._end_failed(0.0)
-
-    def _holding_force(self, z: Float, draws: Draws) -> Float:
-        """(N, k) piston forces that balance the gravity of each trial's own masses at rest."""
-        scale = np.asarray(draws.get("robot.mass_scale", np.ones(self.count)))
-        states = [self.chain.at(row, np.zeros(len(row))) for row in z]
-        hold = np.array([state.holding_force() for state in states])
-        payload = self.setup.robot.spec.payload
-        if payload is not None and "robot.payload" in draws:
-            more = (draws["robot.payload"] - payload.mass)[:, None] * self.chain.load_gravity(z)
-            hold += [np.linalg.solve(state.arms.T, row) for state, row in zip(states, more, strict=True)]
-        return np.asarray(scale[:, None] * hold)
 
     def _true_z(self) -> Float:
         z: Float = self.plant.state[0].take(self._z, axis=1)
@@ -197,8 +147,10 @@ class MachineLoop(Loop):
         gauges = self.gauges
         return Measured(gauges.z, gauges.rate, *gauges.pressures, self.estimate.answered, self.estimate.sigma)
 
-    def tare(self) -> None:
+    def prepare(self) -> list[Broken]:
         """Swing in the air and identify friction and payload, then hold what was found."""
+        broken = self.actuated.failed(self.active)
+        self._leave(broken)
         self.estimator.calibrate(True)
         stopped = np.zeros(self.count)
         for tick in range(round((CALIBRATION_S + SETTLE_S) / self.dt)):
@@ -216,21 +168,32 @@ class MachineLoop(Loop):
                     np.zeros_like(self.joint) + joint_rate,
                 )
             )  # fmt: skip
-            self._drive(self.demand.valve)
+            if failed := self.advance(self.active):
+                broken += failed
+                self._leave(failed)
             stopped += np.abs(self.demand.valve).max(axis=1) > AT_STOP
             if not len(self.active):
                 break
-        self._end_wild(stopped / (tick + 1))
+        broken += self._wild(stopped / (tick + 1))
         self.estimator.calibrate(False)
         hold_what_was_found(self.law, self.estimator.identification)
         self.findings = findings(self.law, self.load, self.estimator.identification, self.valves)
         self.bill.start()
+        return broken
 
-    def _end_wild(self, share: Float) -> None:
-        """End the trials whose valves were at their stops for such shares (N,) of the swing: nothing was identified."""
-        for i in self.active[share[self.active] > WILD]:
-            text = f"it swings by itself in the air, its valves at their stops for {share[i]:.0%} of the time"
-            self._end(np.array([i]), 0.0, f"{text}; lower gains.body, velocity_gain or force_gain in robot.toml", True)
+    def _leave(self, broken: Sequence[Broken]) -> None:
+        """Trials that failed before the start are not stepped any more."""
+        if broken:
+            rows = np.array([one.row for one in broken])
+            self.active = np.setdiff1d(self.active, rows)
+            self.end(rows)
+
+    def _wild(self, share: Float) -> list[Broken]:
+        """The trials whose valves were at their stops for such shares (N,) of the swing: nothing was identified."""
+        text = "it swings by itself in the air, its valves at their stops for {:.0%} of the time"
+        cure = "lower gains.body, velocity_gain or force_gain in robot.toml"
+        wild = self.active[share[self.active] > WILD]
+        return [Broken(int(i), Ended.MACHINE, f"{text.format(share[i])}; {cure}") for i in wild]
 
     def _look_at_valves(self, tick: int) -> None:
         """Identify them, and let the law go by what is known so far: what it learns of inertias depends on it."""
@@ -262,24 +225,25 @@ class MachineLoop(Loop):
         measured = self._seen._replace(z=self.gauges.now, force=self.estimate.answered, sigma=self.estimate.sigma)
         self.demand = self.law.step(measured, reference, self.active)
 
-    def _tick(self, tick: int) -> None:
-        time = tick * self.dt
+    def sense(self, tick: int, active: Trials) -> Observation:
+        """Pose and twist as the encoders say, wrench as the pressures say."""
+        self.active = active
         self._sample()
         self._estimate()
-        observation = self._observe(time)
-        command = self._ask(tick, observation)
-        reference, law = self._reference(command, observation, min(1.0, time / RAMP_S))
+        self._seen_tool = self._observe(tick * self.dt)
+        return self._seen_tool
+
+    def act(self, command: Command, ramp: float) -> Float:
+        """Valve commands of the law, and equation (1)'s wrench (N, 6) for limits and trace, returned."""
+        reference, self._wrench = self._reference(command, self._seen_tool, ramp)
         self._valve(reference)
-        self._feel(observation.wrench)
-        if self.recorder is not None:
-            due = self.recorder.due(tick)
-            seen, machine = (self._read(observation), self._columns()) if due else (observation, None)
-            self.recorder.record(tick, time, seen, command, law, machine)
-        self._stop_where_due(tick, time, observation, command, observation.pose.position, law)
-        if tick % RESIDUAL_TICKS == 0:
-            self._watch_bonds(time)
-        if len(self.active):
-            self._drive(self.demand.valve, time)
+        return self._wrench
+
+    def violations(self, tick: int, active: Trials) -> list[Broken]:
+        """The robot's limits, held to the estimate, and the energy that the coupling makes."""
+        seen = self._seen_tool
+        broken = self.guard.violations(seen.pose.position, seen.twist, seen.wrench, self._wrench, active)
+        return [*broken, *self.actuated.violations(tick, active)]
 
     def _observe(self, time: float) -> Observation:
         """Pose and twist as the encoders say, wrench as the pressures say."""
@@ -318,57 +282,47 @@ class MachineLoop(Loop):
         part: Float = matrix[..., self._plane, self._plane]
         return part
 
-    def _drive(self, torque: Float, time: float = 0.0) -> None:
-        """One coupled step under valve commands (N, k); trials whose FMU failed end with its sentence."""
-        self.coupled.active = self.active
-        self.bill.step(self.coupled.velocity)
-        if not self.master.step(self._delay.step(torque).ravel()):
-            self._end_failed(time)
+    def advance(self, active: Trials) -> list[Broken]:
+        """One coupled step under the valve commands; trials whose FMU failed, each with its sentence."""
+        self.bill.step(self.actuated.plant.velocity)
+        return self.actuated.step(self._delay.step(self.demand.valve), active)
 
-    def _end_failed(self, time: float) -> None:
-        """End the trials of which an FMU has failed."""
-        k = len(self.chain.actuated)
-        for index in range(self.bank.count):
-            trial = index // k
-            if trial in self.active and (problem := self.bank.problem(index)):
-                self._end(np.array([trial]), time, problem, True)
+    def end(self, rows: Trials) -> None:
+        """Their FMUs are not stepped any more."""
+        self.actuated.end(rows)
 
-    def _end(self, rows: NDArray[np.int64], time: float, reason: str, limit: bool, code: Ended = Ended.MACHINE) -> None:
-        super()._end(rows, time, reason, limit, code)
-        self.bank.active[(rows[:, None] * len(self.chain.actuated) + np.arange(len(self.chain.actuated))).ravel()] = 0
+    def contact_torque(self) -> Float:
+        """(N,) at the tool frame's origin [Nm]."""
+        return norm(self.plant.contact_wrench(self.setup.center_of_compliance)[:, 3:])
 
-    def _watch_bonds(self, time: float) -> None:
-        enough = self.master.exchanged > RESIDUAL_ENERGY
-        bad = (enough & (self.master.residual > RESIDUAL_LIMIT)).reshape(self.count, -1)
-        for trial in [int(i) for i in self.active if bad[i].any()]:
-            bond = int(np.argmax(bad[trial]))
-            value = self.master.residual.reshape(self.count, -1)[trial, bond]
-            name = self.chain.actuated[bond]
-            text = (
-                f"co-simulation of {name}: bond residual {value:.2g} is above {RESIDUAL_LIMIT:g}; take a smaller step"
-            )
-            self._end(np.array([trial]), time, f"{text} (at {time:.3f} s)", True)
+    def shares(self) -> Shares:
+        """Cylinders have no motors whose shares would be known."""
+        unknown = np.full(self.count, np.nan)
+        return Shares(self.guard.energy, unknown, unknown)
 
-    def _recorder(self, every: int) -> Recorder:
-        return Recorder(self.plant, every, self.coc, machine=columns(len(self.chain.actuated)))
+    def notes(self, i: int) -> list[str]:
+        """What law, FMUs and identification have to say."""
+        return [*self.law.notes, *self.bank.notes, *self.findings[i]]
+
+    def recording(self, every: int) -> WithColumns:
+        """A recorder with the machine's columns, and the force as it is now."""
+        point = np.asarray(self.setup.center_of_compliance, dtype=float)
+        recorder = Recorder(self.plant, every, point, machine=columns(len(self.actuators)))
+        return WithColumns(recorder, self._columns, self._read)
+
+    def outcome(self, result: Result) -> Result:
+        """As it is."""
+        return result
 
     def _columns(self) -> dict[str, Float]:
         pressure_a, pressure_b = self.gauges.pressures
         return {
             "pressure_a": pressure_a, "pressure_b": pressure_b, "valve": self.demand.valve,
             "piston_force": self.demand.present - self.estimator.friction(self.terms),
-            "piston_force_true": self.master.force.reshape(self.count, -1), "force_sigma": self.estimate.sigma,
+            "piston_force_true": self.actuated.force, "force_sigma": self.estimate.sigma,
             "force_valid": self.estimate.valid.astype(float),
             "energy_supply": self.bill.supply, "energy_pistons": self.bill.pistons,
         }  # fmt: skip
-
-    def _meta(self, i: int, success: bool, failure: str) -> dict[str, Any]:
-        meta = super()._meta(i, success, failure)
-        notes = [*meta["notes"], *self.law.notes, *self.bank.notes, *self.findings[i]]
-        return {**meta, "actuators": list(self.chain.actuated), "notes": notes}
-
-    def _kinematics(self) -> Kinematics:
-        return self.plant.kinematics(self.coc)
 
 
 def _times(matrix: Float, vector: Float) -> Float:

@@ -1,0 +1,42 @@
+"""`Setup`: robot, task and settings of a run, what does not change between the trials of a batch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.frames import Float
+from skillframe.robot.model import RobotModel
+from skillframe.robot.spec import Limits
+from skillframe.world.scene import Scene, State
+from skillframe.world.sensors import SensorSettings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setup:
+    """What does not change between the trials of a batch.
+
+    Attributes:
+        robot: the nominal robot.
+        scene: the task.
+        center_of_compliance: (3,) point of the tool frame that the skill sees and steers; (arms, 3) for several arms.
+        sensors: noise of the sensors.
+        filter_wrench: False hands the raw wrench to the skill and the limits.
+        stop_when: ends a trial as done, looked at every 10 ms; None leaves the end to the skill.
+    """
+
+    robot: RobotModel
+    scene: Scene
+    center_of_compliance: Float = field(default_factory=lambda: np.zeros(3))
+    sensors: SensorSettings = field(default_factory=SensorSettings)
+    filter_wrench: bool = True
+    stop_when: Callable[[State], NDArray[np.bool_]] | None = None
+
+    @property
+    def limits(self) -> Limits:
+        """The robot's limits; a free-flying tool has no joints whose torque rate could be limited."""
+        limits = self.robot.spec.limits
+        return replace(limits, torque_rate_nm_s=None) if self.robot.spec.base == "free" else limits
