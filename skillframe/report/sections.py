@@ -101,7 +101,7 @@ def _cell(value: Any) -> Markup:
 
 def _text(value: object) -> str:
     """Any value as plain text, also one that passes for markup; half a surrogate pair is no text."""
-    return "".join(str(value)).encode("utf-8", "replace").decode()
+    return str(value).encode("utf-8", "replace").decode()
 
 
 def _escaped(value: object) -> Markup:

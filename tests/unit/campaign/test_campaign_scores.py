@@ -165,6 +165,12 @@ def test_a_run_tells_its_scores_as_json_in_words_and_in_its_trace(campaign, tmp_
     assert "did you mean 'way'" in capsys.readouterr().err
 
 
+def test_a_score_is_no_quantity_that_varied_where_campaign_toml_is_missing(campaign):
+    from skillframe.report.results import read_results
+
+    assert read_results(campaign(["way", "last"]) / "results.csv").varied == ("start.offset_x",)
+
+
 def test_a_score_that_fails_does_not_cost_the_run_that_it_was_asked_of(campaign, tmp_path, capsys):
     campaign(out="first")
     typed = ["run", "hold:demo.npz", "--world", "free", "--robot", "free_tool", "--score", "broken", "--out", "run.npz"]

@@ -39,6 +39,14 @@ def test_a_robot_of_a_plugin_is_loaded_listed_and_completed_by_its_name(robot, c
     assert rows["panda"]["error"] is None
 
 
+def test_a_user_s_own_robot_comes_before_a_plugin_s_and_a_shipped_one(robot, tmp_path, monkeypatch):
+    for name in ("flier", "panda"):
+        shutil.copytree(robot, tmp_path / "robots" / name)
+    monkeypatch.setenv("SKILLFRAME_PATH", str(tmp_path))
+    for name in ("flier", "panda"):
+        assert load_robot(name).folder == robot_names()[name] == tmp_path / "robots" / name
+
+
 def test_a_robot_of_a_plugin_is_copied_into_a_campaign_s_folder(robot, tmp_path):
     from skillframe.campaign.folder import _copy_robot
     from skillframe.campaign.spec import CampaignSpec
