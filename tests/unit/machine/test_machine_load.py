@@ -100,11 +100,12 @@ def test_a_controller_told_too_little_goes_by_the_nominal_load_if_that_is_what_i
     """As weighed, 475 kg is robot.toml's own, to the bit, because it is the rating too."""
     loads = np.array([475.0, *others])
     own = loop({"robot.payload": loads, "robot.nominal_payload": np.full(len(loads), 200.0)})
-    own._sample()
-    own._weigh()
-    np.testing.assert_allclose(own.load.mass, loads, atol=5.0)
-    expected = [carried(load) for load in own.load.mass]
-    np.testing.assert_allclose(own.law.told[:, CARRIER, 0], expected, rtol=1e-9)
+    drive = own.drive
+    drive._sample()
+    drive._weigh()
+    np.testing.assert_allclose(drive.load.mass, loads, atol=5.0)
+    expected = [carried(load) for load in drive.load.mass]
+    np.testing.assert_allclose(drive.law.told[:, CARRIER, 0], expected, rtol=1e-9)
 
 
 @pytest.mark.parametrize(("told", "words"), [(476.0, "rating of 475 kg"), (-1.0, "rating of 475 kg")])
