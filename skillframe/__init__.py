@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from skillframe import doors, paths
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _PUBLIC = {
     "Command": "skillframe.skill",

@@ -27,7 +27,7 @@ class Identity(NamedTuple):
     Attributes:
         environment: as `provenance.environment`.
         architecture: of the processor: "x86_64".
-        plugins: by distribution, its version, and its error if it did not load: "0.1.0 (ImportError: ...)".
+        plugins: by distribution, its version, and its error if it did not load: "0.2.0 (ImportError: ...)".
         provides: by distribution, what it provides: "skill:lmc".
     """
 

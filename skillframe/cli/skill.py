@@ -63,7 +63,7 @@ def show(file: Path, as_json: bool) -> None:
 
 
 def _maker(created_by: dict[str, str]) -> str:
-    """In words: skillframe-lmc 0.1.0 with skillframe 0.1.0."""
+    """In words: skillframe-lmc 0.2.0 with skillframe 0.2.0."""
     core, plugin = f"skillframe {created_by.get('skillframe', '')}".strip(), created_by.get("plugin")
     if plugin in (None, "skillframe"):
         return core

@@ -11,6 +11,7 @@ import skillframe
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECTS = [ROOT, *sorted(path.parent for path in (ROOT / "plugins").glob("*/pyproject.toml"))]
+TEMPLATE = "skillframe/cli/plugin_template/pyproject.toml.in"
 
 
 def project(folder):
@@ -67,3 +68,16 @@ def test_the_citation_names_this_version_and_every_reference_has_what_its_format
     assert str(cited["version"]) == skillframe.__version__ == project(ROOT)["project"]["version"]
     assert {"cff-version", "message", "title", "authors"} <= cited.keys()
     assert all({"type", "title", "authors"} <= reference.keys() for reference in cited["references"])
+
+
+@pytest.mark.parametrize("folder", PROJECTS, ids=lambda path: path.name)
+def test_every_distribution_has_the_version_of_the_core(folder):
+    assert project(folder)["project"]["version"] == skillframe.__version__
+
+
+@pytest.mark.parametrize("place", [*(f"plugins/{folder.name}/pyproject.toml" for folder in PROJECTS[1:]), TEMPLATE])
+def test_a_plugin_asks_for_this_minor_version_of_the_core_and_not_the_next(place):
+    text = (ROOT / place).read_text(encoding="utf-8")
+    major, minor = map(int, skillframe.__version__.split(".")[:2])
+    asked = re.findall(r"\"skillframe(?:\[[a-z,]+\])?(>=[^\"]*)\"", text)
+    assert asked == [f">={major}.{minor},<{major}.{minor + 1}"]

@@ -122,7 +122,7 @@ def skill_document(kind: str = "lmc") -> dict[str, Any]:
     turn = {**part, "desired_direction": None, "speed": 0.0, "compliant_axes": [[0.0, 1.0, 0.0]],
             "stiffness": [[40, 0, 0], [0, 0, 0], [0, 0, 40]], "damping": [[2, 0, 0], [0, 1, 0], [0, 0, 2]]}  # fmt: skip
     return {
-        "format": "skillframe.skill", "version": 1, "type": kind, "created_by": "skillframe 0.1.0",
+        "format": "skillframe.skill", "version": 1, "type": kind, "created_by": {"skillframe": "0.2.0"},
         "learned_from": [{"file": "demo1.npz", "sha256": "ab" * 32}, {"file": "demo2.npz", "sha256": "cd" * 32}],
         "frame": {"work_at": [0, 0, 0.06], "learned_at": [0, 0, 0], "center_of_compliance": [0, 0, 0], "axes": "base"},
         "phases": [{"translation": part, "rotation": turn, "pitch": None, "stop": {"stall_s": 0.5}}],
@@ -182,7 +182,7 @@ def campaign(folder: Path, *, failure: str = "stalled", skill: str = "lmc") -> P
     }
     (folder / "scene.json").write_text(json.dumps(scene), encoding="utf-8")
     summary = {
-        "skills": {}, "wall_s": 41.3, "workers": 2, "versions": {"skillframe": "0.1.0", "mujoco": "4.0.0"},
+        "skills": {}, "wall_s": 41.3, "workers": 2, "versions": {"skillframe": "0.2.0", "mujoco": "4.0.0"},
         "hashes": {"scene": "ef" * 32},
     }  # fmt: skip
     (folder / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
