@@ -24,7 +24,7 @@ $(VENV)/.installed: $(PROJECTS)
 	@$(PIP) --version >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(VENV) || \
 	  { echo "could not make $(VENV); on Debian and Ubuntu type: sudo apt install python3-venv"; exit 1; }
 	@echo "installing skillframe, its plug-ins and what they need into $(VENV); once, a minute or two"
-	@$(PIP) install -e . -r plugins/all.txt
+	@$(PIP) install -e '.[all]' -r plugins/all.txt
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.installed

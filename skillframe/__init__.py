@@ -47,7 +47,10 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'skillframe' has no attribute {name!r}")
     from importlib import import_module
 
-    return getattr(import_module(_PUBLIC[name]), name)
+    from skillframe.errors import extras_named
+
+    with extras_named():
+        return getattr(import_module(_PUBLIC[name]), name)
 
 
 def _robots_of_plugins(name: str | None = None) -> "Mapping[str, Path]":

@@ -6,13 +6,38 @@ live with the executor. An error's text says what is wrong, where, and what to d
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from difflib import SequenceMatcher
+from importlib.util import find_spec
 
 MOST_NAMES = 30
 """Names that an error lists; more are no sentence any more."""
 LEAST_LIKENESS = 0.5
 """Share of letters in common (Ratcliff and Obershelp) from which on a name is suggested."""
+EXTRAS: Mapping[str, str] = {
+    "sim": "simulating robots and worlds",
+    "cluster": "a campaign with worker processes",
+    "video": "writing a video",
+    "ros": "reading a ROS bag",
+    "fmu": "an FMU",
+    "crane": "a hydraulic machine",
+}
+"""What each extra of the distribution is for; pyproject.toml says what it installs."""
+LIBRARIES: Mapping[str, tuple[str, str]] = {
+    "mujoco": ("mujoco", "sim"),
+    "pinocchio": ("pin", "sim"),
+    "distributed": ("distributed", "cluster"),
+    "dask": ("distributed", "cluster"),
+    "cryptography": ("cryptography", "cluster"),
+    "av": ("av", "video"),
+    "PIL": ("pillow", "video"),
+    "rosbags": ("rosbags", "ros"),
+    "fmpy": ("fmpy", "fmu"),
+    "lxml": ("lxml", "fmu"),
+    "casadi": ("casadi", "crane"),
+}
+"""By module: the distribution that it comes from, and the first extra that installs that."""
 
 
 class SkillframeError(Exception):
@@ -60,6 +85,41 @@ class MissingDependency(SkillframeError):
     def __init__(self, library: str, purpose: str, command: str) -> None:
         self.library, self.purpose, self.command = library, purpose, command
         super().__init__(f"{purpose} needs {library}, which is not installed; type: {command}")
+
+
+def missing_extra(module: str) -> MissingDependency | None:
+    """What is said where a module cannot be imported because an extra is not installed; None for any other module."""
+    if module.partition(".")[0] not in LIBRARIES:
+        return None
+    library, extra = LIBRARIES[module.partition(".")[0]]
+    return MissingDependency(library, EXTRAS[extra], f"pip install 'skillframe[{extra}]'")
+
+
+def need(module: str) -> None:
+    """Find out before any work is done for it whether a module of an extra is installed.
+
+    Raises:
+        MissingDependency: it is not.
+    """
+    missing = missing_extra(module)
+    if missing is not None and find_spec(module) is None:
+        raise missing
+
+
+@contextmanager
+def extras_named() -> Iterator[None]:
+    """Within this, an extra that is not installed is a sentence that names the line to type.
+
+    Raises:
+        MissingDependency: in place of `ModuleNotFoundError` for a library of an extra.
+    """
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        missing = missing_extra(error.name or "")
+        if missing is None:
+            raise
+        raise missing from error
 
 
 def suggest(name: str, known: Iterable[str]) -> str | None:

@@ -29,6 +29,12 @@ def shipped_dirs(kind: str) -> list[Path]:
     return [folder / kind for folder in (_PACKAGE / "_data", _PACKAGE.parent) if (folder / kind).is_dir()]
 
 
+def checkout() -> Path | None:
+    """The folder of the source code that this package runs from; None where it was installed from a wheel."""
+    folder = _PACKAGE.parent
+    return folder if (folder / "plugins" / "all.txt").is_file() else None
+
+
 def cache_dir(kind: str) -> Path:
     """A folder for things that can be made again (created if absent): `$XDG_CACHE_HOME/skillframe/<kind>`."""
     base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")

@@ -3,12 +3,13 @@
 The file holds pid and host; the operating system's advisory lock on it (`flock`) ends with the process, however that
 ends. So a file that is not locked is stale if it names this host, and is taken over. On another host (a shared file
 system) nobody can tell, so it is refused with the sentence that says what to do.
+
+Windows has no `flock`. There the file itself is the lock, and that of a killed writer has to be deleted by hand.
 """
 
 from __future__ import annotations
 
 import errno
-import fcntl
 import json
 import os
 import socket
@@ -18,7 +19,15 @@ from types import TracebackType
 
 from skillframe.errors import InputError
 
+try:
+    import fcntl
+except ModuleNotFoundError:  # Windows
+    ADVISORY = False
+else:
+    ADVISORY = True
+
 NAME = "lock"
+NO_LINK = getattr(os, "O_NOFOLLOW", 0)  # 0: Windows, which has none
 
 
 class FolderLock:
@@ -35,17 +44,23 @@ class FolderLock:
     def __enter__(self) -> FolderLock:
         self._descriptor = self._acquire()
         os.ftruncate(self._descriptor, 0)
-        os.pwrite(self._descriptor, json.dumps({"pid": os.getpid(), "host": socket.gethostname()}).encode(), 0)
+        os.lseek(self._descriptor, 0, os.SEEK_SET)
+        os.write(self._descriptor, json.dumps({"pid": os.getpid(), "host": socket.gethostname()}).encode())
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
+        if not ADVISORY:  # Windows removes no file that is open
+            os.close(self._descriptor)
         with suppress(FileNotFoundError):
             self._path.unlink()
-        os.close(self._descriptor)
+        if ADVISORY:
+            os.close(self._descriptor)
 
     def _acquire(self) -> int:
+        if not ADVISORY:
+            return self._acquire_by_name()
         while True:
             descriptor = self._open()
             try:
@@ -63,10 +78,18 @@ class FolderLock:
                 return descriptor
             os.close(descriptor)  # its owner removed it between our opening and locking it
 
+    def _acquire_by_name(self) -> int:
+        """The file, if this process is the one that makes it."""
+        try:
+            return os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644)
+        except FileExistsError:
+            pid, host = holder(self._path.parent) or (0, "")
+            raise _may_be_writing(self._path, pid, host) from None
+
     def _open(self) -> int:
         """The file, made if need be, and never through a link."""
         try:
-            return os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+            return os.open(self._path, os.O_RDWR | os.O_CREAT | NO_LINK, 0o644)
         except OSError as error:
             if error.errno == errno.ELOOP:
                 raise InputError(self._path, "is a link, and no lock of a campaign", "delete it") from None
@@ -80,26 +103,33 @@ class FolderLock:
     def _refuse_other_host(self, descriptor: int) -> None:
         pid, host = _owner(descriptor)
         if host not in ("", socket.gethostname()):
-            fix = f"make sure that it has ended there, then delete {self._path}"
-            raise InputError(self._path, f"process {pid} on {host} may be writing this campaign", fix)
+            raise _may_be_writing(self._path, pid, host)
+
+
+def _may_be_writing(path: Path, pid: int, host: str) -> InputError:
+    fix = f"make sure that it has ended there, then delete {path}"
+    return InputError(path, f"process {pid} on {host} may be writing this campaign", fix)
 
 
 def _owner(descriptor: int) -> tuple[int, str]:
     """Pid and host in a lock file; 0 and "" where it is empty or damaged."""
     try:
-        content = json.loads(os.pread(descriptor, 4096, 0))
+        os.lseek(descriptor, 0, os.SEEK_SET)
+        content = json.loads(os.read(descriptor, 4096))
         return int(content["pid"]), str(content["host"])
     except (ValueError, KeyError, TypeError):
         return 0, ""
 
 
 def holder(folder: Path) -> tuple[int, str] | None:
-    """Pid and host of the process that is writing a campaign, or None."""
+    """Pid and host of the process that is writing a campaign, or None; on Windows it may have been killed."""
     try:
         descriptor = os.open(folder / NAME, os.O_RDONLY)
     except FileNotFoundError:
         return None
     try:
+        if not ADVISORY:
+            return _owner(descriptor)
         fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
         return None
     except BlockingIOError:

@@ -31,6 +31,7 @@ from skillframe.files.documents import parse_json
 ROWS, RESULTS = "rows.jsonl", "results.csv"
 FORMAT, VERSION = "skillframe.campaign", 1
 ROWS_VERSION = 2
+BINARY = getattr(os, "O_BINARY", 0)  # Windows would turn line ends into two bytes otherwise
 """1 had no checksums; its files are read, and said to be so."""
 RAN_ON = "ran_on"
 """Key of a line that says in which of the noted environments its row ran."""
@@ -83,7 +84,7 @@ class RowLog:
         self.done, self.sessions, self.unchecked = found.done, list(found.sessions), found.unchecked
         self.ran_on = {(x.row["trial"], x.row["skill"]): x.ran_on for x in found.lines if x.ran_on is not None}
         self.environments = found.environments
-        self._descriptor = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+        self._descriptor = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | BINARY, 0o666)
         if os.fstat(self._descriptor).st_size == 0:
             self._write([{"format": FORMAT, "version": ROWS_VERSION, "campaign": campaign}])
 

@@ -29,7 +29,7 @@ from typing import NamedTuple
 
 from skillframe.campaign.rows import ChunkJob, Row
 from skillframe.campaign.work import WorkT
-from skillframe.errors import InputError, MissingDependency, SkillframeError, UnknownName
+from skillframe.errors import InputError, MissingDependency, SkillframeError, UnknownName, missing_extra
 from skillframe.extend.registry import BadPlugin, PluginConflict
 from skillframe.run.scores import ScoreFailed
 
@@ -94,6 +94,8 @@ def attempt(evaluate: Callable[[WorkT], list[Row]], job: WorkT) -> list[Row] | R
 
 def said(error: BaseException) -> str:
     """An error in words: its own sentence if it is one of ours, else with its kind; never empty."""
+    if isinstance(error, ModuleNotFoundError) and (missing := missing_extra(error.name or "")):
+        error = missing
     text = str(error)
     return text if isinstance(error, SkillframeError) and text else f"{type(error).__name__}: {text}".removesuffix(": ")
 

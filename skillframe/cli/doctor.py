@@ -11,10 +11,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from importlib.util import find_spec
+from typing import NamedTuple
 
 import click
 
 from skillframe.cli.output import emit_json, table
+from skillframe.errors import EXTRAS
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 COMPILERS = ("cc", "gcc", "clang")
@@ -68,6 +70,7 @@ def examine() -> Iterator[Check]:
     """Everything that skillframe uses, the required first."""
     yield _python()
     yield from _libraries()
+    yield from _extras("skillframe")
     yield _compiler()
     yield _browser()
     yield _recordings()
@@ -81,22 +84,57 @@ def _python() -> Check:
     return Check(name="python", found=version, needed_for="everything", required=True, fix=fix)
 
 
-def _libraries() -> Iterator[Check]:
-    """The declared dependencies, optional ones too, against what is installed; nothing is imported."""
-    for requirement in metadata.requires("skillframe") or []:
-        match = re.match(r"([\w.-]+)\s*(?:>=\s*([\d.]+))?", requirement)
+class _Requirement(NamedTuple):
+    """A declared dependency: its name, the lowest version, what is installed ("" for nothing), and by which extra."""
+
+    name: str
+    lowest: str
+    found: str
+    extra: str
+
+    @property
+    def met(self) -> bool:
+        return bool(self.found) and _numbers(self.found) >= _numbers(self.lowest)
+
+    def __str__(self) -> str:
+        return f"{self.name}>={self.lowest}"
+
+
+def _requirements(distribution: str) -> Iterator[_Requirement]:
+    """The declared dependencies of a distribution, held against what is installed; nothing is imported."""
+    for requirement in metadata.requires(distribution) or []:
+        match = re.match(r"([\w.-]+)(?:\[[\w,-]+\])?\s*(?:[<>=!,.\d]*>=\s*([\d.]+))?", requirement)
         if match is None:
             continue
-        name, lowest = match.group(1), match.group(2) or "0"
         try:
-            found = metadata.version(name)
+            found = metadata.version(match.group(1))
         except metadata.PackageNotFoundError:
             found = ""
-        enough = bool(found) and _numbers(found) >= _numbers(lowest)
-        fix = "" if enough else f"{sys.executable} -m pip install '{name}>={lowest}'"
         extra = re.search(r"extra == ['\"]([\w-]+)", requirement)
-        purpose = f"the optional part {extra.group(1)}" if extra else "the core"
-        yield Check(name=name, found=found, needed_for=purpose, required=extra is None, fix=fix)
+        yield _Requirement(match.group(1), match.group(2) or "0", found, extra.group(1) if extra else "")
+
+
+def _libraries() -> Iterator[Check]:
+    """What the core cannot do without."""
+    for needed in _requirements("skillframe"):
+        if not needed.extra:
+            fix = "" if needed.met else f"{sys.executable} -m pip install '{needed}'"
+            yield Check(name=needed.name, found=needed.found, needed_for="the core", required=True, fix=fix)
+
+
+def _extras(distribution: str) -> Iterator[Check]:
+    """What the extras of a distribution install, a row each; `all` is no more than the others together."""
+    requirements = list(_requirements(distribution))
+    for extra in dict.fromkeys(each.extra for each in requirements if each.extra not in ("", "all")):
+        needed = [each for each in requirements if each.extra == extra]
+        name, lacking = f"{distribution}[{extra}]", [str(each) for each in needed if not each.met]
+        fix = f"{sys.executable} -m pip install '{name}'  # lacks {', '.join(lacking)}" if lacking else ""
+        yield Check(
+            name=name,
+            found=", ".join(f"{each.name} {each.found}" for each in needed if each.found),
+            needed_for=EXTRAS[extra] if distribution == "skillframe" else f"a part of {distribution}",
+            fix=fix,
+        )
 
 
 def _numbers(version: str) -> tuple[int, ...]:
@@ -136,6 +174,7 @@ def _provided(provides: Sequence[str]) -> str:
 def _plugins() -> Iterator[Check]:
     from skillframe.extend.registry import registry
 
+    before = ""
     for plugin in registry().plugins:
         fix = f"{plugin.error}; {sys.executable} -m pip install --upgrade {plugin.distribution}" if plugin.error else ""
         yield Check(
@@ -144,3 +183,6 @@ def _plugins() -> Iterator[Check]:
             needed_for=_provided(plugin.provides),
             fix=fix,
         )
+        if plugin.distribution not in ("skillframe", before):
+            yield from _extras(plugin.distribution)
+        before = plugin.distribution

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from skillframe import __version__
-from skillframe.errors import SkillframeError
+from skillframe.errors import SkillframeError, extras_named
 
 if TYPE_CHECKING:
     from skillframe.extend.commands import PluginCommand
@@ -154,7 +154,8 @@ def run(arguments: Sequence[str], debug: bool = False) -> int:
     """Run a command line and return its exit code; messages go to stderr."""
     _print_anything()
     try:
-        result = cli.main(list(arguments), prog_name="skillframe", standalone_mode=False)
+        with extras_named():
+            result = cli.main(list(arguments), prog_name="skillframe", standalone_mode=False)
     except NO_ARGUMENTS as error:
         error.show()
         return 2

@@ -20,6 +20,7 @@ import click
 from skillframe.cli.names import robot_option
 from skillframe.cli.numbers import COUNT, SEED
 from skillframe.cli.output import bold, emit_json, is_quiet, quiet_option
+from skillframe.errors import need
 from skillframe.files import write_whole
 
 MARKER = ".skillframe-quickstart"
@@ -75,6 +76,8 @@ def command(out: Path, robot: str, trials: int, workers: int, seed: int, as_json
     Example:
       skillframe quickstart --out demo
     """
+    for library in ("mujoco", "pinocchio", "distributed", "cryptography"):
+        need(library)
     _make_room(out)
     began = time.perf_counter()
     for name, _, template, _ in TASKS:

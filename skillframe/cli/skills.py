@@ -27,6 +27,7 @@ def list_(as_json: bool) -> None:
       skillframe skills list --json
     """
     from skillframe.cli.catalog import rows_of
+    from skillframe.extend.homes import install_all
     from skillframe.extend.registry import registry
 
     known = registry()
@@ -37,7 +38,7 @@ def list_(as_json: bool) -> None:
         emit_json(rows)
     elif not rows:
         left_out = f"SKILLFRAME_PLUGINS leaves out {', '.join(known.unselected)}" if known.unselected else ""
-        click.echo(left_out or "no kind of skill is installed; type: make install (or: pip install -e plugins/lmc)")
+        click.echo(left_out or f"no kind of skill is installed; type: {install_all()}")
     else:
         lines = [(r["name"], "yes" if r["learns"] else "no", r["summary"], r["distribution"]) for r in rows]
         table(("skill", "learns", "what it is", "from"), lines, LIST_WIDTH)

@@ -95,7 +95,7 @@ def opened(path: Path) -> Iterator[Any]:
 
 
 def _no_rosbags(path: Path) -> MissingDependency:
-    return MissingDependency("rosbags", f"reading {path}", "pip install rosbags")
+    return MissingDependency("rosbags", f"reading {path}", "pip install 'skillframe[ros]'")
 
 
 @contextmanager

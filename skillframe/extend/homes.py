@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+from skillframe.paths import checkout
+
 HOMES = {
     "skill:lmc": "lmc",
     "skill:policy": "segmenter",
@@ -30,7 +32,17 @@ def where_to_get(kind: str, name: str, known: Collection[str], here: Collection[
     """
     home = HOMES.get(f"{kind}:{name}")
     if home is not None and home not in here:
-        return f"{name} is in skillframe-{home}, which is not installed; type: pip install -e plugins/{home}"
+        return f"{name} is in skillframe-{home}, which is not installed; type: {install_line(home)}"
     if home is None and not known and "lmc" not in here:
-        return f"no plug-in with a {kind} is installed; type: make install"
+        return f"no plug-in with a {kind} is installed; type: {install_all()}"
     return ""
+
+
+def install_line(home: str) -> str:
+    """What to type to install a first-party plug-in: from the checkout where there is one."""
+    return f"pip install -e plugins/{home}" if checkout() else f"pip install skillframe-{home}"
+
+
+def install_all() -> str:
+    """What to type to have a kind of skill at all."""
+    return "make install" if checkout() else install_line("lmc")

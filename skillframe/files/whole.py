@@ -51,7 +51,7 @@ def writing_whole(path: Path) -> Iterator[Path]:
         raise not_written(path, error) from None
     try:
         yield temporary
-        _sync(temporary)
+        _sync(temporary, os.O_RDWR)  # Windows flushes no file that is open for reading only
         os.replace(temporary, path)
         sync_folder(path.parent)
     except OSError as error:
@@ -63,7 +63,7 @@ def writing_whole(path: Path) -> Iterator[Path]:
 def sync_folder(folder: Path) -> None:
     """Make the names in a folder last over a power cut; a file system that cannot is left as it is."""
     with suppress(OSError):
-        _sync(folder)
+        _sync(folder, os.O_RDONLY)
 
 
 def remove_temporary(folder: Path) -> None:
@@ -106,8 +106,8 @@ def _created_beside(path: Path) -> Path:
     return temporary
 
 
-def _sync(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
+def _sync(path: Path, mode: int) -> None:
+    descriptor = os.open(path, mode)
     try:
         os.fsync(descriptor)
     finally:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import secrets
 import shutil
 import signal
@@ -23,10 +22,17 @@ from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
 
-from skillframe.errors import InputError, SkillframeError
+from skillframe.errors import InputError, SkillframeError, need
 from skillframe.fmu.bindings import InstanceFailed
 from skillframe.fmu.channel import Channel, Garbled
 from skillframe.fmu.confine import EVERYTHING
+
+try:
+    import resource
+except ModuleNotFoundError:  # Windows
+    CONFINES = False
+else:
+    CONFINES = hasattr(os, "waitid")  # macOS has it from Python 3.13 on
 
 TELLING = 0.25
 """Share of the memory allowed from which on a crash is told with it; below, the same crash has the same words."""
@@ -64,9 +70,17 @@ class ChildLost(SkillframeError):
 
 
 class Child:
-    """One child process and its end of the socket."""
+    """One child process and its end of the socket.
+
+    Raises:
+        InputError: the system has no limits to run an FMU under.
+        MissingDependency: fmpy, which the child needs, is not installed.
+    """
 
     def __init__(self, path: Path, name: str, limits: SandboxLimits) -> None:
+        if not CONFINES:
+            raise InputError(path, "cannot be run: an FMU runs under limits that this system lacks", "use Linux")
+        need("fmpy")
         self.path, self.name, self.limits = path, name, limits
         self._folder = _private_folder()
         token = secrets.randbits(64)

@@ -10,10 +10,8 @@ folder, and leaves. When the worker ends, it does the same and ends as the worke
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
-import resource
 import select
 import shutil
 import signal
@@ -24,6 +22,10 @@ from contextlib import suppress
 from typing import Any, NoReturn
 
 from skillframe.fmu import confine
+
+with suppress(ModuleNotFoundError):  # Windows, where `Child` starts no keeper
+    import fcntl
+    import resource
 
 HIGH = 20_000
 """Descriptor of the worker's socket, where the system allows as many: what an FMU writes to small numbers misses it."""

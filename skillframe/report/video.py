@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.errors import InputError
+from skillframe.errors import InputError, need
 from skillframe.files import writing_whole
 from skillframe.frames import Float, norm
 from skillframe.report.raster import Canvas, Image, blank, paint, picture
@@ -42,9 +42,12 @@ def check_film(path: Path) -> None:
 
     Raises:
         InputError: the file's name ends in something that is no film.
+        MissingDependency: the libraries that write it are not installed.
     """
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(path, "is not a name of a film", f"let it end in {' or '.join(SUFFIXES)}")
+    for library in ("av", "PIL"):
+        need(library)
 
 
 def write_film(trace: Trace, path: Path, tell: Callable[[int, int], None] = lambda done, total: None) -> int:

@@ -177,13 +177,16 @@ def test_a_damaged_document_is_refused_by_its_key(documents, kind, change, said)
         registry().skill(kind).check(document)
 
 
-def test_without_the_library_a_dmp_says_what_to_type_and_still_runs(documents, monkeypatch):
+@pytest.mark.parametrize(("kind", "hidden"), [("dmp", ["movement_primitives.dmp"]), ("seds", ["casadi"])])
+def test_without_its_library_a_skill_says_what_to_type_and_still_runs(documents, monkeypatch, kind, hidden):
     import sys
 
-    monkeypatch.setitem(sys.modules, "movement_primitives.dmp", None)
-    with pytest.raises(MissingDependency, match=r"pip install 'skillframe-baselines\[dmp\]'"):
-        learn("dmp")
-    assert commands(documents["dmp"], start_of(approach(1.0)), [0.0, 0.1])
+    for module in hidden:
+        monkeypatch.setitem(sys.modules, module, None)
+    monkeypatch.delitem(sys.modules, "skillframe_baselines.seds_fit", raising=False)
+    with pytest.raises(MissingDependency, match=rf"pip install 'skillframe-baselines\[{kind}\]'"):
+        learn(kind)
+    assert commands(documents[kind], start_of(approach(1.0)), [0.0, 0.1])
 
 
 def test_the_rollout_is_the_librarys(documents):

@@ -4,8 +4,11 @@ import sys
 from importlib import metadata
 from pathlib import Path
 
+import pytest
+
 from skillframe.cli import doctor
 from skillframe.cli.main import run
+from skillframe.errors import EXTRAS
 
 
 def findings(capsys, code=0):
@@ -20,30 +23,55 @@ def test_json_is_alone_on_stdout_and_every_missing_thing_has_what_to_type(capsys
         assert row["found"] or row["fix"]
 
 
-def test_every_declared_dependency_is_looked_at(capsys):
-    declared = {re.match(r"[\w.-]+", r).group() for r in metadata.requires("skillframe")}
-    assert declared <= findings(capsys).keys()
+def test_every_declared_dependency_and_every_extra_is_looked_at(capsys):
+    rows = findings(capsys)
+    for requirement in metadata.requires("skillframe"):
+        library, extra = re.match(r"[\w.-]+", requirement).group(), re.search(r"extra == ['\"](\w+)", requirement)
+        if extra is None:
+            assert rows[library]["required"]
+        elif extra.group(1) != "all":
+            row = rows[f"skillframe[{extra.group(1)}]"]
+            assert library in row["found"] + row["fix"] and row["needed_for"] == EXTRAS[extra.group(1)]
 
 
-def test_a_missing_library_is_required_and_exits_1(capsys, monkeypatch):
+@pytest.mark.needs_plugins
+def test_the_extras_of_a_plugin_are_looked_at(capsys):
+    assert {"skillframe-baselines[dmp]", "skillframe-baselines[seds]"} <= findings(capsys).keys()
+
+
+def versions(monkeypatch, **changed):
+    """Let libraries have other versions; None for one that is not installed."""
     real = metadata.version
 
     def version(name):
-        if name == "mujoco":
+        if changed.get(name, "") is None:
             raise metadata.PackageNotFoundError(name)
-        return real(name)
+        return changed.get(name) or real(name)
 
     monkeypatch.setattr(metadata, "version", version)
-    row = findings(capsys, code=1)["mujoco"]
+
+
+def test_a_missing_library_of_the_core_is_required_and_exits_1(capsys, monkeypatch):
+    versions(monkeypatch, scipy=None)
+    row = findings(capsys, code=1)["scipy"]
     assert row["found"] == ""
-    assert row["fix"].startswith(sys.executable) and "mujoco>=4.0" in row["fix"]
+    assert row["fix"].startswith(sys.executable) and "scipy>=1.13" in row["fix"]
+
+
+def test_a_missing_library_of_an_extra_is_not_required_and_the_extra_installs_it(capsys, monkeypatch):
+    versions(monkeypatch, mujoco=None)
+    rows = findings(capsys)
+    assert rows["skillframe[sim]"]["found"] == f"pin {metadata.version('pin')}"
+    assert rows["skillframe[sim]"]["fix"] == f"{sys.executable} -m pip install 'skillframe[sim]'  # lacks mujoco>=4.0"
+    assert "lacks mujoco>=4.0" in rows["skillframe[crane]"]["fix"]
+    assert not rows["skillframe[video]"]["fix"]
 
 
 def test_a_library_that_is_too_old_is_told_with_both_versions(capsys, monkeypatch):
-    real = metadata.version
-    monkeypatch.setattr(metadata, "version", lambda name: "3.9.9" if name == "mujoco" else real(name))
-    row = findings(capsys, code=1)["mujoco"]
-    assert row["found"] == "3.9.9" and "mujoco>=4.0" in row["fix"]
+    versions(monkeypatch, mujoco="3.9.9", numpy="1.26.4")
+    rows = findings(capsys, code=1)
+    assert "mujoco 3.9.9" in rows["skillframe[sim]"]["found"] and "mujoco>=4.0" in rows["skillframe[sim]"]["fix"]
+    assert rows["numpy"]["found"] == "1.26.4" and "numpy>=2.0" in rows["numpy"]["fix"]
 
 
 def test_versions_are_compared_as_numbers():

@@ -112,6 +112,12 @@ def test_a_plugin_that_is_installed_is_not_to_be_installed_again():
     assert where_to_get("skill", "lmc", ["dmp"], ["baselines", "lmc"]) == ""
 
 
+def test_where_there_is_no_checkout_a_plugin_is_installed_by_its_name(monkeypatch):
+    monkeypatch.setattr("skillframe.extend.homes.checkout", lambda: None)
+    assert where_to_get("skill", "lmc", ["dmp"], []).endswith("type: pip install skillframe-lmc")
+    assert where_to_get("skill", "mine", [], []).endswith("type: pip install skillframe-lmc")
+
+
 @pytest.mark.needs_plugins
 def test_every_name_that_a_plugin_of_ours_provides_has_its_home():
     ours = {

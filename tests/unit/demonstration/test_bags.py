@@ -213,7 +213,7 @@ def test_without_rosbags_the_command_that_installs_it_is_said(
     path = write_bag(tmp_path / "demo.bag", {"/tool": poses(demo), "/ft": wrenches(demo)})
     for name in [n for n in sys.modules if n.split(".")[0] == "rosbags"]:
         monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(MissingDependency, match="pip install rosbags"):
+    with pytest.raises(MissingDependency, match=r"pip install 'skillframe\[ros\]'"):
         read_demonstration(path)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from skillframe.config import build as configured
 from skillframe.demonstration.record import Demonstration
-from skillframe.errors import InputError
+from skillframe.errors import InputError, MissingDependency
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, Pose, move_twist, norm, rotation_matrix, rotation_vector
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
@@ -92,9 +92,14 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
 
     Raises:
         InputError: no demonstration, or demonstrations or settings that do not suit.
+        MissingDependency: `casadi` is not installed.
     """
-    from skillframe_baselines.seds_fit import fit
-
+    try:
+        from skillframe_baselines.seds_fit import fit
+    except ModuleNotFoundError as error:
+        if error.name != "casadi":
+            raise
+        raise MissingDependency("casadi", "learning a seds", "pip install 'skillframe-baselines[seds]'") from None
     settings = configured(SedsSettings, options.settings, "seds settings")
     frame = frame_in_base("seds", demonstrations, options)
     positive(settings, "seds")

@@ -1,0 +1,159 @@
+"""Extras: what installs what, and that a missing one is a sentence with the line to type."""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import skillframe
+from skillframe.errors import EXTRAS, LIBRARIES, MissingDependency, extras_named, missing_extra, need
+
+ROOT = Path(__file__).resolve().parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+OPTIONAL = PROJECT["optional-dependencies"]
+
+
+def names(requirements):
+    return {re.match(r"[\w.-]+", each).group() for each in requirements}
+
+
+def test_every_extra_says_what_it_is_for():
+    assert EXTRAS.keys() == OPTIONAL.keys() - {"all"}
+
+
+def test_the_extra_all_is_all_others_together():
+    assert sorted(OPTIONAL["all"]) == sorted({each for name in EXTRAS for each in OPTIONAL[name]})
+
+
+def test_every_library_is_named_with_an_extra_that_installs_it():
+    assert all(library in names(OPTIONAL[extra]) for library, extra in LIBRARIES.values())
+    assert {library for library, _ in LIBRARIES.values()} == names(OPTIONAL["all"])
+
+
+def imported(path):
+    """Modules at top level that a file imports, wherever it does."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.partition(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module.partition(".")[0]
+
+
+@pytest.mark.parametrize("place", ["skillframe", *(f"plugins/{p.name}/src" for p in (ROOT / "plugins").glob("*/"))])
+def test_whatever_is_imported_is_declared(place):
+    toml = ROOT / Path(place).parent / "pyproject.toml"
+    if not toml.is_file():
+        pytest.skip("no distribution")
+    project = tomllib.loads(toml.read_text(encoding="utf-8"))["project"]
+    lists = [project["dependencies"], *project.get("optional-dependencies", {}).values()]
+    through_core = names(PROJECT["dependencies"]) if place != "skillframe" else set()
+    through_core |= names(OPTIONAL["sim"]) if any("skillframe[sim]" in each for each in lists[0]) else set()
+    declared = {name.replace("-", "_") for each in lists for name in names(each)} | through_core
+    modules = {module for path in (ROOT / place).rglob("*.py") for module in imported(path)}
+    foreign = modules - sys.stdlib_module_names - {"yaml"} - {m for m in modules if m.startswith("skillframe")}
+    assert {LIBRARIES.get(module, (module, ""))[0] for module in foreign} <= declared
+
+
+def test_a_module_of_no_extra_is_not_explained():
+    assert missing_extra("numpy") is None
+    need("not_there")  # says nothing of what no extra installs
+    with pytest.raises(ModuleNotFoundError, match="not_there"), extras_named():
+        import not_there  # noqa: F401
+
+
+def test_a_missing_module_within_a_library_names_its_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco.batch", None)
+    with (
+        pytest.raises(MissingDependency, match=r"needs mujoco, .* type: pip install 'skillframe\[sim\]'"),
+        extras_named(),
+    ):
+        import mujoco.batch  # noqa: F401
+
+
+def without(hidden, *words, code=2, plugins=""):
+    """What the command line says on stderr, in a process in which libraries are not installed."""
+    script = (
+        f"import sys; sys.modules.update(dict.fromkeys({list(hidden)!r}))\n"
+        f"from skillframe.cli.main import run; sys.exit(run({[str(word) for word in words]!r}))"
+    )
+    environment = {**os.environ, "SKILLFRAME_PLUGINS": plugins, "SKILLFRAME_STRICT_PLUGINS": "1"}
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=environment, check=False)
+    assert run.returncode == code, run.stderr
+    return run.stderr.strip()
+
+
+def test_without_a_simulator_a_command_that_needs_one_says_what_to_type(tmp_path):
+    skill = ROOT / "docs" / "how-to" / "corner.skill.json"
+    for words in (
+        ["robots", "show", "panda"],
+        ["demonstration", "record", "--world", "valley", "--out", tmp_path / "a.npz"],
+    ):
+        said = without(["mujoco", "pinocchio"], *words)
+        assert re.fullmatch(
+            r"error: .* needs (mujoco|pin), which is not .*; type: pip install 'skillframe\[sim\]'", said
+        )
+    said = without(["mujoco"], "run", skill, "--world", "free", "--out", tmp_path / "a.npz")
+    assert said == f"error: {missing_extra('mujoco')}"
+
+
+def test_without_its_libraries_a_video_is_refused_before_the_run(tmp_path):
+    said = without(["av"], "run", "none.json", "--world", "valley", "--video", tmp_path / "a.mp4")
+    assert said == f"error: {missing_extra('av')}"
+
+
+def test_without_worker_processes_the_quickstart_is_refused_before_it_writes(tmp_path):
+    assert (
+        without(["distributed"], "quickstart", "--out", tmp_path / "demo") == f"error: {missing_extra('distributed')}"
+    )
+    assert not (tmp_path / "demo").exists()
+
+
+def test_without_fmpy_an_fmu_says_what_to_type(tmp_path):
+    file = tmp_path / "a.fmu"
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("modelDescription.xml", "<fmiModelDescription fmiVersion='2.0'/>")
+    assert without(["fmpy"], "fmu", "check", file) == f"error: {missing_extra('fmpy')}"
+
+
+LEARN_WITHOUT_EXTRAS = """
+from pathlib import Path
+from skillframe.cli.main import run
+from skillframe.conformance.examples import example_demonstrations
+from skillframe.extend.reading import write_demonstration
+files = ["left.csv", "right.csv"]
+for file, demonstration in zip(files, example_demonstrations()):
+    write_demonstration(demonstration, Path(file))
+assert run(["demonstration", "check", *files]) == 0
+assert run(["condition", "left.csv", "--out", "clean.npz"]) == 0
+assert run(["learn", *files, "--out", "slide.json"]) == 0
+assert run(["skill", "show", "slide.json"]) == 0
+assert run(["skill", "explain", "slide.json", "--out", "slide.html"]) == 0
+assert run(["export", "slide.json", "--to", "crisp", "--coc", "0,0,0", "--out", "slide.yaml"]) == 0
+assert run(["plugins", "list"]) == run(["doctor"]) == run(["worlds", "list"]) == 0
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.needs_plugins
+def test_reading_a_table_learning_explaining_and_exporting_need_no_extra(tmp_path):
+    code = (
+        f"import sys; sys.modules.update(dict.fromkeys({list(LIBRARIES.keys() - {'PIL'})!r}))\n{LEARN_WITHOUT_EXTRAS}"
+    )
+    environment = {**os.environ, "SKILLFRAME_PLUGINS": "lmc"}
+    command = [sys.executable, "-c", code]
+    run = subprocess.run(command, capture_output=True, text=True, env=environment, cwd=tmp_path, check=False)
+    assert run.returncode == 0, run.stdout + run.stderr
+    assert "push along" in run.stdout
+
+
+def test_a_public_name_that_needs_an_extra_names_it(monkeypatch):
+    monkeypatch.setitem(skillframe._PUBLIC, "anything", "mujoco.batch")
+    monkeypatch.setitem(sys.modules, "mujoco.batch", None)
+    with pytest.raises(MissingDependency, match=r"skillframe\[sim\]"):
+        _ = skillframe.anything
