@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from skillframe import hookimpl
 from skillframe.extend.records import Lazy, SkillType
 
+skillframe_contract = "0.2"
+
 
 @hookimpl
 def skillframe_skills() -> Iterable[SkillType]:

@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from skillframe import hookimpl
 from skillframe.extend.records import CoordinatorType, Lazy, WorldType
 
+skillframe_contract = "0.2"
+
 
 @hookimpl
 def skillframe_coordinators() -> Iterable[CoordinatorType]:

@@ -12,6 +12,8 @@ from collections.abc import Iterable
 from skillframe import hookimpl
 from skillframe.extend.records import RowType
 
+skillframe_contract = "0.2"
+
 
 @hookimpl
 def skillframe_rows() -> Iterable[RowType]:

@@ -14,6 +14,8 @@ from functools import partial
 from skillframe.extend.hookspecs import hookimpl
 from skillframe.extend.records import Lazy, SkillType
 
+skillframe_contract = "0.2"
+
 SUMMARIES = {
     "search": "looks where a blindfolded person looked, with the forces that were felt, until it falls in",
     "spiral": "searches along an Archimedean spiral around the start, a baseline",

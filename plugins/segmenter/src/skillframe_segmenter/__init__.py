@@ -14,6 +14,8 @@ from functools import partial
 from skillframe.extend.hookspecs import hookimpl
 from skillframe.extend.records import Lazy, SegmenterType, SkillType
 
+skillframe_contract = "0.2"
+
 
 @hookimpl
 def skillframe_segmenters() -> Iterable[SegmenterType]:
