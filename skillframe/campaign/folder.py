@@ -158,8 +158,12 @@ def _copy_robot_file(source: Path, target: Path) -> str:
 def _copy_beside(source: Path, place: Path, file: str, key: str) -> None:
     """A file that robot.toml names, at the same place in the copied folder."""
     inside = place / file
-    if not inside.resolve().is_relative_to(place.resolve()):
-        raise InputError(f"{source}: {key}", f"{file} lies outside the robot's folder", "put both into one folder")
+    if not inside.resolve().is_relative_to(place.parent.resolve()):
+        raise InputError(
+            f"{source}: {key}",
+            f"{file} lies outside the robot's folder and those beside it",
+            "put both into one folder",
+        )
     inside.parent.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(source.parent / file, inside)
 

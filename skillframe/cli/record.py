@@ -120,7 +120,7 @@ def _recorded(
 ) -> Recording:  # fmt: skip
     """By an operator, somebody blindfolded, or somebody who sees."""
     _refuse_idle(teacher, person, places)
-    if machine.spec.actuation or any(map(_given, operated.values())):
+    if machine.spec.hydraulic or any(map(_given, operated.values())):
         given = {**operated, **dict(zip(("noise", "delay", "scale"), person, strict=True))}
         return _operated(machine, scene, teacher, given, common)
     if teacher == "blind":
@@ -159,7 +159,7 @@ def _operated(
     from skillframe.errors import InputError
 
     name = machine.spec.name
-    if not machine.spec.actuation:
+    if not machine.spec.hydraulic:
         option = next(key for key, value in given.items() if _given(value)).replace("_", "-")
         raise InputError(f"--{option}", f"is for hydraulic machines, which {name} is not", "leave it out")
     if teacher != "teleoperation":

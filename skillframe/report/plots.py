@@ -135,7 +135,7 @@ def _read_off(trace: Trace) -> list[tuple[float, str]]:
     touching = np.flatnonzero(np.nan_to_num(norm(trace.wrench_true[:, :3])) > CONTACT_N)
     events = [(float(time[touching[0]]), "first contact")] if len(touching) else []
     if force.max() > CONTACT_N:
-        how = "estimated" if trace.machine else "measured"
+        how = "estimated" if trace.estimated else "measured"
         events.append((float(time[np.argmax(force)]), f"highest {how} force, {force.max():.0f} N"))
     reason = str(trace.meta.get("reason") or trace.meta.get("failure") or "")
     return [*events, (float(time[-1]), f"the end: {reason}" if reason else "the end")]
@@ -156,13 +156,13 @@ def run_plots(trace: Trace, force_limit: float | None = None) -> list[Markup]:
     plots = [
         time_plot("Contact force", "N", time, [true_size, *_components(trace.wrench[:, :3], "thin"), size],
                   limit=None if limit is None else float(limit), events=events,
-                  caption=(ESTIMATE_CAPTION if trace.machine else FORCE_CAPTION) + _short_peak(trace)),
+                  caption=(ESTIMATE_CAPTION if trace.estimated else FORCE_CAPTION) + _short_peak(trace)),
         time_plot("Position", "mm", time, moved, events=events, caption=POSITION_CAPTION),
         time_plot("Attitude", "°", time, turns, events=events, caption=ATTITUDE_CAPTION),
         time_plot("Contact torque", "Nm", time, _components(trace.wrench[:, 3:], ""), events=events,
                   caption=TORQUE_CAPTION),
     ]  # fmt: skip
-    return plots[:2] if trace.machine else plots
+    return plots[:2] if trace.estimated else plots
 
 
 def _short_peak(trace: Trace) -> str:

@@ -12,6 +12,7 @@ from skillframe.errors import SkillframeError
 from skillframe.frames import quaternion_from_matrix, rotation_vector
 from skillframe.robot.bodies import rigid_bodies
 from skillframe.robot.chain import ClosedChain
+from skillframe.robot.driven import Actuation
 from skillframe.robot.kinematics import tool_pose
 from skillframe.robot.link_checks import given_inertias
 from skillframe.robot.model import RobotModel
@@ -56,11 +57,8 @@ def _machine(robot: RobotModel) -> list[str]:
     """Lines on loops, actuators, what it measures with, and payload; none for a robot without them."""
     spec = robot.spec
     lines = [f"  loop: {loop.frame_a} meets {loop.frame_b}" for loop in spec.loop]
-    lines += [
-        f"  {a.joint} is driven by {a.fmu}, with gains of {a.velocity_gain:g} m and {a.force_gain:g} m2/(N s)"
-        for a in spec.actuation
-    ]
-    if spec.actuation:
+    lines += [f"  {a.joint} is driven by {a.fmu}{_how(a, spec)}" for a in spec.actuation]
+    if spec.hydraulic:
         seen, gains = spec.sensors, spec.gains
         noise = f"encoders {seen.encoder:g} rad (m), pressures {seen.pressure:g} Pa"
         lines.append(f"  sensors: noise of {noise}, behind filters of {seen.corner_hz:g} Hz")
@@ -71,6 +69,12 @@ def _machine(robot: RobotModel) -> list[str]:
         load = spec.payload
         lines.append(f"  payload {load.mass:g} kg in {load.link!r}, rated for {load.rating:g} kg")
     return ["", *lines] if lines else []
+
+
+def _how(actuation: Actuation, spec: RobotSpec) -> str:
+    if spec.servo:
+        return ", which takes a position" if "target" in actuation.inputs else ", which takes a torque"
+    return f", with gains of {actuation.velocity_gain:g} m and {actuation.force_gain:g} m2/(N s)"
 
 
 def as_json(robot: RobotModel) -> dict[str, Any]:
@@ -89,7 +93,10 @@ def as_json(robot: RobotModel) -> dict[str, Any]:
 
 def _machine_values(spec: RobotSpec) -> dict[str, Any]:
     values = {"loops": [asdict(loop) for loop in spec.loop], "payload": spec.payload and asdict(spec.payload)}
-    if spec.actuation:
+    if spec.servo:
+        drives = [{"joint": a.joint, "fmu": a.fmu, "inputs": a.inputs, "outputs": a.outputs} for a in spec.actuation]
+        values |= {"actuation": drives}
+    elif spec.actuation:
         kept = ("joint", "fmu", "velocity_gain", "force_gain")
         drives = [{name: getattr(drive, name) for name in kept} for drive in spec.actuation]
         values |= {"actuation": drives, "sensors": asdict(spec.sensors), "gains": asdict(spec.gains)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 LEAST_CORNER, LARGEST_CORNER = 5.0, 0.08
 """Of filters: [Hz]; share of the control rate (from 0.13 on a `RateFilter` is unstable). Ours: 5 Hz lag by 64 ms."""
@@ -17,6 +17,13 @@ class LoopClosure:
 
     frame_a: str
     frame_b: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DeclaredDrive:
+    """What kind of actuators `[[actuation]]` names: hydraulic cylinders, or electric servos."""
+
+    kind: Literal["hydraulic", "servo"] = "hydraulic"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,8 +41,9 @@ class Actuation:
 
     Attributes:
         parameters: of the FMU, by its names; inputs, outputs: our names to the FMU's.
-        nominal: what the controller takes the cylinder for, by our names, where the FMU is not told so in `parameters`.
+        nominal: what the controller takes the actuator for, by our names, where the FMU is not told so in `parameters`.
         initial_force: the FMU's parameter for the force [N] that it holds at the start; "" if it has none.
+        unused: inputs and outputs of the FMU that are left alone on purpose, so that nothing is said of them.
         velocity_gain, force_gain: k_x [m] and k_f [m^2/(N s)] of its piston (`skillframe.machine.law.vdc_actuator`).
     """
 
@@ -46,12 +54,13 @@ class Actuation:
     outputs: dict[str, str] = field(default_factory=dict)
     nominal: dict[str, Any] = field(default_factory=dict)
     initial_force: str = ""
+    unused: tuple[str, ...] = ()
     velocity_gain: float = 5e-3
     force_gain: float = 4e-9
 
     @property
     def known(self) -> dict[str, Any]:
-        """Parameters of the cylinder as the controller knows them, by our names."""
+        """Parameters of the cylinder or servo as the controller knows them, by our names."""
         return {**self.parameters, **self.nominal}
 
 

@@ -38,8 +38,8 @@ def joint_warnings(robot: RobotModel) -> Iterator[Problem]:
 
 
 def _passive(robot: RobotModel) -> tuple[str, ...]:
-    """Joints without a motor: followers and, of a machine whose actuators are named, all that carry none."""
-    driven = {actuation.joint for actuation in robot.spec.actuation}
+    """Joints without a motor: followers and, of a hydraulic machine, all that carry no cylinder."""
+    driven = {actuation.joint for actuation in robot.spec.actuation if robot.spec.hydraulic}
     rest = [name for name in robot.urdf.joints if driven and name not in driven]
     return (*robot.followers, *rest)
 

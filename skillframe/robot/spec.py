@@ -14,7 +14,15 @@ from typing import Literal
 from skillframe.config import build, read_toml
 from skillframe.errors import InputError, UnknownName
 from skillframe.paths import OFFERS, data_dirs
-from skillframe.robot.driven import Actuation, DeclaredPayload, Gains, LoopClosure, MachineNoise, impossible
+from skillframe.robot.driven import (
+    Actuation,
+    DeclaredDrive,
+    DeclaredPayload,
+    Gains,
+    LoopClosure,
+    MachineNoise,
+    impossible,
+)
 from skillframe.robot.numbers import LARGEST
 
 Vector = tuple[float, float, float]
@@ -97,6 +105,7 @@ class RobotFile:
     inertia: dict[str, LinkInertia] = field(default_factory=dict)
     payload: DeclaredPayload | None = None
     loop: tuple[LoopClosure, ...] = ()
+    drive: DeclaredDrive | None = None
     actuation: tuple[Actuation, ...] = ()
     sensors: MachineNoise = field(default_factory=MachineNoise)
     gains: Gains = field(default_factory=Gains)
@@ -115,7 +124,7 @@ class RobotSpec:
         home: joint positions by joint name [rad or m]; joints not named stand at the neutral position.
         friction_share: part of the drawn `robot.joint_friction` that a joint gets, by name; 1 for joints not named.
         payload: what is carried, where it can be changed.
-        inertia: overlay by link name; loop: closed chains; actuation: what drives joints.
+        inertia: overlay by link name; loop: closed chains; actuation: what drives joints, of the kind in `drive`.
         sensors, gains: of a machine with actuators.
     """
 
@@ -135,9 +144,20 @@ class RobotSpec:
     inertia: dict[str, LinkInertia] = field(default_factory=dict)
     payload: DeclaredPayload | None = None
     loop: tuple[LoopClosure, ...] = ()
+    drive: DeclaredDrive | None = None
     actuation: tuple[Actuation, ...] = ()
     sensors: MachineNoise = field(default_factory=MachineNoise)
     gains: Gains = field(default_factory=Gains)
+
+    @property
+    def hydraulic(self) -> bool:
+        """Whether hydraulic cylinders drive it, which is what actuators are where nothing else is said."""
+        return bool(self.actuation) and (self.drive is None or self.drive.kind == "hydraulic")
+
+    @property
+    def servo(self) -> bool:
+        """Whether electric servos drive it."""
+        return bool(self.actuation) and not self.hydraulic
 
     def require_simulated(self) -> None:
         """Refuse to be simulated where that would be wrong.
@@ -265,12 +285,19 @@ def _check_values(declared: RobotFile, where: str) -> None:
 
 
 def _check_machine(declared: RobotFile, where: str) -> None:
-    """Sensors and gains of a machine, and of nothing else."""
-    if declared.actuation:
+    """Sensors and gains of a hydraulic machine, and of nothing else."""
+    kind = None if declared.drive is None else declared.drive.kind
+    if kind is not None and not declared.actuation:
+        raise InputError(f"{where}: drive", "there is no [[actuation]] that it could be the kind of", "leave it out")
+    if kind == "servo" and (declared.loop or len(declared.arm) > 1):
+        what = "closed loops" if declared.loop else "several arms"
+        raise InputError(f"{where}: drive", f"servos drive one open arm, and this robot has {what}", "leave it out")
+    if declared.actuation and kind != "servo":
         for key, problem, fix in impossible(declared.actuation, declared.sensors, declared.gains):
             raise InputError(f"{where}: {key}", problem, fix)
     elif (declared.sensors, declared.gains) != (MachineNoise(), Gains()):
-        text = "[sensors] and [gains] are those of a machine with actuators, and there is no [[actuation]]"
+        none = "its actuators are servos" if declared.actuation else "there is no [[actuation]]"
+        text = f"[sensors] and [gains] are those of a machine with actuators, and {none}"
         raise InputError(where, text, "leave them out; a wrist sensor's noise is varied as `sensor.*` in a campaign")
 
 

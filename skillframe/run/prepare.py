@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from skillframe.config.units import si
+from skillframe.cosim.servos import require_servos
 from skillframe.demonstration.record import resolve_point
 from skillframe.document.file import understood
 from skillframe.document.frame import read_frame, with_center
@@ -76,11 +77,14 @@ def load_robot_model(name: str) -> RobotModel:
 
     Raises:
         SkillframeError: unknown, does not load, has no arm, needs loops or actuators that a run does not simulate, or
-            cylinders whose figures are missing or impossible.
+            cylinders or servos whose figures are missing or impossible.
     """
     spec = load_robot(name)
     spec.require_simulated()
-    require_figures(spec)
+    if spec.servo:
+        require_servos(spec)
+    else:
+        require_figures(spec)
     return load_model(spec)
 
 
@@ -147,7 +151,7 @@ def _inside(robot: RobotModel, corners: Float, attitude: Float) -> bool:
     if robot.spec.limits.workspace_m is not None:
         low, high = np.array(robot.spec.limits.workspace_m)
         return bool(np.all(corners >= low) and np.all(corners <= high))
-    if robot.spec.actuation:  # a machine's path is judged by its cylinders
+    if robot.spec.hydraulic:  # a machine's path is judged by its cylinders
         return True
     q = robot.home
     try:

@@ -52,7 +52,9 @@ class Trace:
         command_wrench: (T, 6) the law's output at that point, robot on environment, base axes.
         q: (T, nq) configuration.
         body_position, body_quaternion: (T, B, 3), (T, B, 4) poses of the drawn bodies in base, x, y, z, w.
-        machine: of a hydraulic machine with k actuators, else empty: `pressure_a`, `pressure_b` (T, k) measured [Pa],
+        machine: of a robot with k actuators of its own, else empty. Servos: `servo_command` (T, k) [N m or rad] and
+            `servo_` with each output that is mapped, such as `servo_force` [N m] and `servo_motor_velocity` [rad/s].
+            A hydraulic machine: `pressure_a`, `pressure_b` (T, k) measured [Pa],
             `valve` (T, k) commanded, `piston_force` (T, k) from pressures and friction as known, `piston_force_true`
             (T, k) [N], `force_sigma` (T, 2) of the estimated contact force in the machine's plane [N], `force_valid`
             (T,), `energy_supply` and `energy_pistons` (T,) since the start [J].
@@ -61,7 +63,7 @@ class Trace:
             `peak_speed_share`, `ended_by`, `final_error_m`, `final_error_rad`, `center_of_compliance`, `skill`,
             `progress` (`word`, `of_m`, `reached_m`; null in a world without a depth), `events` ([[t, text]]),
             `scores` ({name: {`value`, `unit`, `summary`}}, null for a trial without that figure; where asked for),
-            `actuators` (names of a machine's), `notes` (sentences about what stood in for what), and `bodies`:
+            `actuators` (joints with one of their own), `notes` (sentences about what stood in for what), and `bodies`:
             [{`name`, `geoms`: [{`kind`, `size`, `position`, `quaternion`, `rgba`, `vertices`, `faces`}]}] in the order
             of the body arrays.
     """
@@ -80,6 +82,11 @@ class Trace:
     body_quaternion: Float
     machine: dict[str, Float] = field(default_factory=dict)
     meta: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def estimated(self) -> bool:
+        """Whether the contact force was estimated, as from a hydraulic machine's pressures, and not measured."""
+        return "force_sigma" in self.machine
 
     def save(self, path: Path) -> None:
         """Write the trace, whole or not at all.

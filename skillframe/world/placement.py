@@ -59,6 +59,9 @@ def _lacking(key: str, robot: RobotModel) -> str:
     """Why a quantity would do nothing on this robot; "" if it does something."""
     if not robot.spec.actuation:
         return "has no actuators of its own" if key in (*_ACTUATOR, "robot.nominal_payload") else ""
+    if robot.spec.servo:
+        lacking = key == "robot.nominal_payload" or (key in _ACTUATOR and key != "actuator.friction_scale")
+        return "is driven by servos, which have no such quantity" if lacking else ""
     if key.startswith("sensor."):
         return "has no wrench sensor: its contact force is estimated from pressures"
     return "moves in a plane, and does not turn its tool to a start" if key.startswith("start.tilt_") else ""

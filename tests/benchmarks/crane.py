@@ -84,7 +84,7 @@ def reference_actuators():
 def fresh_banks():
     """Banks that were opened before count as not there, here and afterwards."""
     stack = ExitStack()
-    stack.enter_context(mock.patch("skillframe.machine.cylinder.bank._KEPT", {}))
+    stack.enter_context(mock.patch("skillframe.fmu.kept._KEPT", {}))
     return stack
 
 

@@ -8,9 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from skillframe.cosim.servos import actuator_specs, unfit_servo
 from skillframe.errors import InputError, SkillframeError
+from skillframe.fmu.unmapped import unmapped
 from skillframe.machine.checks.feasibility import problems
-from skillframe.machine.checks.figures import lacks_static_friction, unfit_figures
+from skillframe.machine.checks.figures import CYLINDER, lacks_static_friction, unfit_figures
+from skillframe.machine.cylinder.bank import foreign_specs
 from skillframe.robot.audit import Audit
 from skillframe.robot.audit import audit as audit_robot
 from skillframe.robot.chain import ClosedChain
@@ -33,9 +36,13 @@ def audit(robot: RobotSpec | RobotModel) -> Audit:
 
 def machine_warnings(robot: RobotModel) -> Iterator[Problem]:
     """Figures that no cylinder has, or that are not given; loops that do not close, home, and limits made for arms."""
-    slips = [_warning("cannot_run", *slip) for one in robot.spec.actuation for slip in unfit_figures(one)]
-    yield from slips
     spec = robot.spec
+    yield from _unmapped(spec)
+    if spec.servo:
+        yield from (_warning("cannot_run", *slip) for one in spec.actuation for slip in unfit_servo(one))
+        return
+    slips = [_warning("cannot_run", *slip) for one in spec.actuation for slip in unfit_figures(one)]
+    yield from slips
     for problem, fix in fast_filters(spec.sensors, spec.gains, spec.control.rate_hz) if spec.actuation else ():
         yield _warning("cannot_run", problem, fix)
     if tied := [a.joint for a in spec.actuation if lacks_static_friction(a)]:
@@ -53,6 +60,21 @@ def machine_warnings(robot: RobotModel) -> Iterator[Problem]:
     for text in unfit:
         yield _warning("impossible_home", f"at home {text}", "choose another [home]")
     yield from _limits(robot.spec.limits)
+
+
+def _unmapped(spec: RobotSpec) -> Iterator[Problem]:
+    """Inputs and outputs of other makers' FMUs that no mapping names; an FMU that cannot be read is told as that."""
+    rows = actuator_specs(spec) if spec.servo else foreign_specs(spec)
+    unused = [a.unused for a in spec.actuation if spec.servo or a.fmu != CYLINDER]
+    try:
+        found = unmapped(rows, unused, spec.folder)
+    except SkillframeError as error:
+        text, fix = (error.problem, error.fix) if isinstance(error, InputError) else (str(error), "correct it")
+        yield _warning("cannot_run", f"its FMU cannot be read: {text}", fix)
+        return
+    for row in found:
+        for text in row.sentences:
+            yield _warning("not_mapped", text, "map it in the [[actuation]], or name it in unused")
 
 
 def _limits(given: Limits) -> Iterator[Problem]:

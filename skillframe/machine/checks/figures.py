@@ -86,7 +86,8 @@ def _missing(actuation: Actuation) -> Iterator[Unfit]:
     missing = [name for name in NEEDED if name not in actuation.known]
     if missing:
         text = f"the cylinder on {actuation.joint} has no {', '.join(missing)}"
-        yield Unfit(text, "add it to parameters or nominal of its [[actuation]]")
+        fix = 'add it to parameters or nominal of its [[actuation]], or write [drive] kind = "servo" if it is a servo'
+        yield Unfit(text, fix)
 
 
 def _slips(actuation: Actuation) -> Iterator[Unfit]:

@@ -9,13 +9,12 @@ import numpy as np
 
 from skillframe.errors import InputError
 from skillframe.fmu.actuator import Actuators, ActuatorSpec
+from skillframe.fmu.kept import kept
 from skillframe.frames import Float
 from skillframe.machine.checks.figures import CYLINDER, completed
 from skillframe.machine.cylinder.opening import open_cylinders
+from skillframe.robot.driven import Actuation
 from skillframe.robot.spec import RobotSpec
-
-_KEPT: dict[tuple[Any, ...], Actuators] = {}
-KEPT_AT_MOST = 2
 
 
 def banks(spec: RobotSpec, trials: int) -> Actuators:
@@ -26,16 +25,19 @@ def banks(spec: RobotSpec, trials: int) -> Actuators:
     Raises:
         InputError, UnknownName, MissingDependency, InstanceFailed: an actuator cannot be opened.
     """
-    specs = [
-        ActuatorSpec(fmu=a.fmu, parameters=completed(a), inputs=dict(a.inputs), outputs=dict(a.outputs), name=a.joint)
-        for a in spec.actuation
-    ]
-    key = (str(spec.folder), repr(specs), trials)
-    if key not in _KEPT:
-        while len(_KEPT) >= KEPT_AT_MOST:
-            _KEPT.pop(next(iter(_KEPT))).close()
-        _KEPT[key] = open_cylinders(specs, trials, spec.folder)
-    return _KEPT[key]
+    specs = [_as_spec(actuation) for actuation in spec.actuation]
+    return kept((str(spec.folder), repr(specs), trials), lambda: open_cylinders(specs, trials, spec.folder))
+
+
+def foreign_specs(spec: RobotSpec) -> list[ActuatorSpec]:
+    """The cylinders whose FMU is not `hydraulic_cylinder`, all of whose variables are known here."""
+    return [_as_spec(actuation) for actuation in spec.actuation if actuation.fmu != CYLINDER]
+
+
+def _as_spec(a: Actuation) -> ActuatorSpec:
+    return ActuatorSpec(
+        fmu=a.fmu, parameters=completed(a), inputs=dict(a.inputs), outputs=dict(a.outputs), name=a.joint
+    )
 
 
 def instance_parameters(spec: RobotSpec, draws: Mapping[str, Float], hold: Float) -> list[dict[str, float]]:

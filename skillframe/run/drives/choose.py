@@ -35,7 +35,11 @@ def chosen_drive(skill: Skill, setup: Setup, draws: Draws, rngs: Sequence[np.ran
         require_arms(setup)
         single = np.ndim(setup.center_of_compliance) == 1
         return FirstArm(skill) if single else skill, ArmsDrive(setup, draws, rngs)
-    if setup.robot.spec.actuation:
+    if setup.robot.spec.servo:
+        from skillframe.run.drives.servo import ServoDrive
+
+        return skill, ServoDrive(setup, draws, rngs)
+    if setup.robot.spec.hydraulic:
         from skillframe.run.drives.machine import MachineDrive
 
         check_quantities(draws)

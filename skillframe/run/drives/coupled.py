@@ -32,6 +32,7 @@ class CoupledPlant:
     Attributes:
         count: number of bonds, trials x joints.
         active: ids of the trials that are stepped.
+        dofs: (k,) generalised velocities of the driven joints, MuJoCo's order.
         load: (N, nv) generalised forces besides the bonds', MuJoCo's order; zero unless written.
     """
 
@@ -39,9 +40,9 @@ class CoupledPlant:
         self.plant, self.trials, self.joints = plant, plant.count, tuple(joints)
         self.count = self.trials * len(self.joints)
         self._qpos = np.array([plant.model.joint(name).qposadr[0] for name in joints])
-        self._dofs = np.array([plant.model.joint(name).dofadr[0] for name in joints])
+        self.dofs = np.array([plant.model.joint(name).dofadr[0] for name in joints])
         self._timestep = float(plant.model.opt.timestep)
-        self._spread: Float = np.eye(plant.model.nv)[self._dofs]
+        self._spread: Float = np.eye(plant.model.nv)[self.dofs]
         self.active: NDArray[np.int64] = np.arange(self.trials)
         self.load: Float = np.zeros((self.trials, plant.model.nv))
         self._saved: tuple[Float, Float] = plant.state
@@ -49,17 +50,17 @@ class CoupledPlant:
     def motion(self, force: Float) -> Motion:
         """Motion (count,) of the pistons now, with forces (count,) [N] acting on them."""
         acceleration = self.plant.acceleration(self._torque(force), self.active)
-        return Motion(*self.where(), acceleration.take(self._dofs, axis=1).ravel())
+        return Motion(*self.where(), acceleration.take(self.dofs, axis=1).ravel())
 
     def where(self) -> tuple[Float, Float]:
         """Positions and velocities (count,) of the pistons now."""
         position, velocity = self.plant.state
-        return position.take(self._qpos, axis=1).ravel(), velocity.take(self._dofs, axis=1).ravel()
+        return position.take(self._qpos, axis=1).ravel(), velocity.take(self.dofs, axis=1).ravel()
 
     @property
     def velocity(self) -> Float:
         """(trials, joints) of the driven joints now."""
-        velocity: Float = self.plant.state[1].take(self._dofs, axis=1)
+        velocity: Float = self.plant.state[1].take(self.dofs, axis=1)
         return velocity
 
     def advance(self, begin: Float, end: Float, step: float) -> None:

@@ -19,10 +19,12 @@ import numpy as np
 from skillframe.control.endings import Broken, Ended
 from skillframe.control.limits import LimitGuard
 from skillframe.errors import InputError
+from skillframe.fmu.unmapped import unmapped
 from skillframe.frames import Float, Pose, norm
+from skillframe.machine.checks.figures import CYLINDER
 from skillframe.machine.checks.holding import require_held
 from skillframe.machine.columns import EnergyBill, columns, supply_pressures
-from skillframe.machine.cylinder.bank import banks, instance_parameters
+from skillframe.machine.cylinder.bank import banks, foreign_specs, instance_parameters
 from skillframe.machine.force.calibration import CALIBRATION_S, SETTLE_S, hold_what_was_found, swing
 from skillframe.machine.force.compiled import CompiledEstimator
 from skillframe.machine.force.findings import findings
@@ -101,6 +103,9 @@ class MachineDrive:
         late = np.asarray(draws.get("actuator.delay", np.zeros(self.count)))
         self._delay = CommandDelay(np.round(late / self.dt).astype(np.int64), len(known.area_a))
         self.findings: list[list[str]] = [[] for _ in rngs]
+        meant = [a.unused for a in spec.actuation if a.fmu != CYLINDER]
+        rows = unmapped(foreign_specs(spec), meant, spec.folder)
+        self._unmapped = [text for row in rows for text in row._replace(outputs=()).sentences]
         self._begin(draws)
 
     def _begin(self, draws: Draws) -> None:
@@ -302,7 +307,7 @@ class MachineDrive:
 
     def notes(self, i: int) -> list[str]:
         """What law, FMUs and identification have to say."""
-        return [*self.law.notes, *self.bank.notes, *self.findings[i]]
+        return [*self.law.notes, *self.bank.notes, *self._unmapped, *self.findings[i]]
 
     def recording(self, every: int) -> WithColumns:
         """A recorder with the machine's columns, and the force as it is now."""

@@ -53,7 +53,7 @@ def test_nothing_is_wrong_with_the_shipped_crane(changed):
 def test_static_friction_that_is_not_given_is_the_coulomb_friction_and_check_says_so(changed, monkeypatch):
     """As the FMUs are opened and each trial's are set; the FMU's own default is 4000 N, the shipped crane's."""
     monkeypatch.setattr(bank, "open_cylinders", lambda specs, trials, folder: specs)
-    monkeypatch.setattr(bank, "_KEPT", {})
+    monkeypatch.setattr("skillframe.fmu.kept._KEPT", {})
     robot = changed(("coulomb_friction = 4000.0", "coulomb_friction = 1500.0"), ("static_friction = 4000.0, ", ""))
     text = warnings(robot)["static_friction"]
     assert text.startswith("no static_friction is given for lift_piston, tilt_piston, extension")
