@@ -40,6 +40,7 @@ from skillframe.robot.chain import ClosedChain
 from skillframe.robot.driven import fast_filters
 from skillframe.run.drive import Shares, Trials
 from skillframe.run.drives.actuated import Actuated
+from skillframe.run.drives.machine_reference import LEAST_DAMPING, plane_reference
 from skillframe.run.drives.machine_start import closed_configurations, holding_force
 from skillframe.run.drives.recording import WithColumns
 from skillframe.run.recorder import Recorder
@@ -52,7 +53,6 @@ from skillframe.world.plant import Draws, Plant
 
 __all__ = ["MachineDrive"]
 
-IMPEDANCE_RATE, LEAST_DAMPING = 2.0, 5e4  # 1/s and N s/m; D where a skill leaves it open, from teleoperation trials
 VALVES_S = 0.5
 """So often the swing's rows are fitted again for overlap and supply pressure of the valves (ours)."""
 AT_STOP, WILD = 0.99, 0.5
@@ -240,7 +240,7 @@ class MachineDrive:
 
     def act(self, command: Command, ramp: float) -> Float:
         """Valve commands of the law, and equation (1)'s wrench (N, 6) for limits and trace, returned."""
-        reference, self._wrench = self._reference(command, self._seen_tool, ramp)
+        reference, self._wrench = plane_reference(command, self._seen_tool, ramp, self._plane, self.joint)
         self._valve(reference)
         return self._wrench
 
@@ -264,28 +264,6 @@ class MachineDrive:
         wrench = observation.wrench.copy()
         wrench[:, self.task.axes] = self.estimate.force
         return observation._replace(wrench=wrench)
-
-    def _reference(self, command: Command, seen: Observation, ramp: float) -> tuple[Reference, Float]:
-        """What the law follows, and equation (1)'s wrench (N, 6) for limits and trace."""
-        plane, count = self._plane, self.count
-        stiffness = self._in_plane(command.impedance.stiffness)
-        if command.impedance.damping is None:
-            largest = np.linalg.eigvalsh(stiffness)[..., -1]
-            damping = np.maximum(largest / IMPEDANCE_RATE, LEAST_DAMPING)[..., None, None] * np.eye(2)
-        else:
-            damping = self._in_plane(command.impedance.damping)
-        velocity, push = ramp * command.twist[:, plane], ramp * command.feedforward[:, plane]
-        law = np.zeros((count, 6))
-        error = (command.pose.position - seen.pose.position)[:, plane]
-        law[:, plane] = push + _times(stiffness, error) + _times(damping, velocity - seen.twist[:, plane])
-        return Reference(
-            command.pose.position[:, plane], velocity, stiffness, damping, push, self.joint, np.zeros_like(self.joint)
-        ), law  # fmt: skip
-
-    def _in_plane(self, matrix: Float) -> Float:
-        """(N, 2, 2) of (N, 6, 6), or (2, 2) of one (6, 6) for all, which spreads where it is used."""
-        part: Float = matrix[..., self._plane, self._plane]
-        return part
 
     def advance(self, active: Trials) -> list[Broken]:
         """One coupled step under the valve commands; trials whose FMU failed, each with its sentence."""
@@ -328,8 +306,3 @@ class MachineDrive:
             "force_valid": self.estimate.valid.astype(float),
             "energy_supply": self.bill.supply, "energy_pistons": self.bill.pistons,
         }  # fmt: skip
-
-
-def _times(matrix: Float, vector: Float) -> Float:
-    result: Float = (matrix @ vector[..., None])[..., 0]
-    return result

@@ -13,6 +13,8 @@ from skillframe.cosim.servos import servos
 from skillframe.errors import InputError, SkillframeError, UnknownName
 from skillframe.fmu.library import fmu_folders
 from skillframe.machine.checks.audit import audit
+from skillframe.report.machine import machine_plots
+from skillframe.report.plots import run_plots
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot, robot_names
 from skillframe.run.executor import Setup, begin, simulate
@@ -117,6 +119,25 @@ def test_a_trial_is_the_same_to_the_last_bit_alone_and_beside_others(name):
             assert np.array_equal(getattr(together.traces[i], column), getattr(alone.traces[0], column)), column
         for column, values in together.traces[i].machine.items():
             assert np.array_equal(values, alone.traces[0].machine[column]), column
+
+
+def test_the_law_reads_the_motors_speeds_and_knows_their_rotors():
+    loop = begin(HoldSkill(), setup("panda_position"), {}, generators(2))
+    limb, ideal = loop.drive.limb, begin(HoldSkill(), setup("panda"), {}, generators(2)).drive.limb
+    column = limb.bank.outputs.index("motor_velocity")
+    limb.bank.y[:, column] = np.linspace(0.1, 1.4, 14)
+    np.testing.assert_array_equal(limb.kinematics(loop.active).velocity, limb.bank.y[:, column].reshape(2, 7))
+    np.testing.assert_array_equal(limb.plant.state[1], np.zeros((2, 7)))
+    rotors = np.diag([0.5] * 4 + [0.15] * 3) / 3.0  # the inner loop's 1 + K_p/k
+    np.testing.assert_allclose(limb.mass_matrix() - ideal.mass_matrix(), np.tile(rotors, (2, 1, 1)), atol=1e-12)
+
+
+def test_a_report_shows_torques_and_motors_and_calls_the_force_measured(runs):
+    trace = runs["panda_servo"]
+    titles = ["".join(map(str, plot)) if isinstance(plot, list) else str(plot) for plot in machine_plots(trace)]
+    assert len(titles) == 2 and "Joint torques" in titles[0] and "Motors" in titles[1]
+    assert len(run_plots(trace)) == 4  # with torque and attitude, which a hydraulic machine does not have
+    assert not machine_plots(replace(trace, machine={"thrust": np.zeros((len(trace.time), 2))}))  # another's columns
 
 
 def test_friction_that_is_drawn_reaches_the_servos():
