@@ -74,6 +74,22 @@ def test_every_python_block_in_the_docs_parses():
             ast.parse(block, filename=str(page))
 
 
+def test_every_evidence_page_names_its_command_and_is_linked_both_ways_with_an_explanation():
+    explained = {page.name: page.read_text(encoding="utf-8") for page in (DOCS / "explanation").glob("*.md")}
+    pages = list((DOCS / "evidence").glob("*.md"))
+    assert pages
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        assert re.search(r"make (figures|bench)|pytest", text), page.name
+        sources = re.findall(r"\.\./explanation/([\w-]+\.md)", text)
+        assert any(f"../evidence/{page.name}" in explained[source] for source in sources), page.name
+
+
+def test_explanations_of_how_it_works_hold_no_seeds():
+    found = [p.name for p in (DOCS / "explanation").glob("*.md") if re.search(r"[Ss]eeds? \d", p.read_text("utf-8"))]
+    assert found in ([], ["reproduced.md"])  # the page that `skillframe reproduce` writes is a table of evidence itself
+
+
 def test_maths_in_the_pages_is_marked_as_the_builder_reads_it():
     assert not [page.name for page in DOCS.rglob("*.md") if r"\(" in page.read_text(encoding="utf-8")]
 
