@@ -11,7 +11,7 @@ PYTEST := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q --
 SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist worksteal
 PROJECTS := pyproject.toml plugins/all.txt $(wildcard plugins/*/pyproject.toml)
 
-.PHONY: demo install test test-core test-rest test-beside test-slow figures bench docs lint clean
+.PHONY: demo install wheels test test-core test-rest test-beside test-slow figures bench docs lint clean
 
 demo: install
 	$(BIN)/skillframe quickstart --out $(OUT)
@@ -26,6 +26,12 @@ $(VENV)/.installed: $(PROJECTS)
 	@echo "installing skillframe, its plug-ins and what they need into $(VENV); once, a minute or two"
 	@$(PIP) install -e '.[all]' -r plugins/all.txt
 	@touch $@
+
+# A wheel of every distribution, in dist/.
+wheels: $(VENV)/.installed
+	@rm -rf dist
+	@$(PIP) wheel --no-deps --wheel-dir dist . $(patsubst %/pyproject.toml,./%,$(wildcard plugins/*/pyproject.toml))
+	@echo "dist/: install one with: pip install --find-links dist 'skillframe[sim]' skillframe-lmc"
 
 $(VENV)/.test: $(VENV)/.installed
 	$(PIP) install "pip>=25.1"

@@ -1,4 +1,4 @@
-"""What is installed is typed and whole: a user's own checker sees the types, and data that ships is found."""
+"""What is installed works without the checkout, is light to import, and is typed: a user's checker sees its types."""
 
 import json
 import os
@@ -54,7 +54,9 @@ def installed(wheels, tmp_path_factory):
     (site,) = folder.glob("lib/python*/site-packages")
     for wheel in wheels.values():
         zipfile.ZipFile(wheel).extractall(site)
-    (site / "libraries.pth").write_text(sysconfig.get_path("purelib"))  # what stands in its own .pth is not read
+    libraries = Path(sysconfig.get_path("purelib"))
+    lines = [libraries, libraries / "cmeel.prefix" / site.relative_to(folder)]  # Pinocchio; other .pth are not read
+    (site / "libraries.pth").write_text("\n".join(map(str, lines)))
     return folder / "bin" / "python"
 
 
@@ -98,3 +100,42 @@ def test_a_row_is_computed_from_the_wheels_and_held_against_the_verdict_that_shi
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert [row["verdict"] for row in json.loads(done.stdout)] == ["pass"]
+
+
+@pytest.fixture
+def typed(installed, tmp_path, monkeypatch):
+    """Type a command in an empty folder, with what is installed only; its exit code, output and messages."""
+    for name in ("PYTHONPATH", "SKILLFRAME_PLUGINS", "SKILLFRAME_PATH"):
+        monkeypatch.delenv(name, raising=False)
+
+    def run(*words):
+        command = [installed, *words]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=600, check=False)
+        return done.returncode, done.stdout, done.stderr
+
+    return run
+
+
+def test_importing_the_installed_package_loads_nothing_but_itself_and_python(typed, installed):
+    code = (
+        "import sys; before = set(sys.modules); import skillframe as s; print(s.__file__, *set(sys.modules) - before)"
+    )
+    place, *loaded = typed("-c", code)[1].split()
+    assert Path(place).is_relative_to(installed.parents[1])
+    assert {name.partition(".")[0] for name in loaded} <= {"skillframe", *sys.stdlib_module_names}
+
+
+def test_the_quickstart_works_in_an_empty_folder_from_wheels_alone(typed, tmp_path):
+    few = ["--robot", "free_tool", "--trials", "2", "--workers", "1", "--json"]
+    code, said, told = typed("-m", "skillframe.cli.main", "quickstart", "--out", "demo", *few)
+    assert code == 0, told
+    assert [p.name for p in tmp_path.iterdir()] == ["demo"]
+    assert (tmp_path / json.loads(said)["report"]).stat().st_size > 100_000
+    assert "checkout" not in told and "Traceback" not in told
+
+
+def test_the_installed_package_finds_its_robots_and_its_fmus(typed):
+    for words, names in ((["robots"], {"panda", "hiab_xs031"}), (["fmu"], {"hydraulic_cylinder"})):
+        code, said, told = typed("-m", "skillframe.cli.main", *words, "list", "--json")
+        assert code == 0, told
+        assert names <= {row["name"] for row in json.loads(said)}

@@ -11,7 +11,7 @@ import skillframe
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECTS = [ROOT, *sorted(path.parent for path in (ROOT / "plugins").glob("*/pyproject.toml"))]
-TEMPLATE = "skillframe/cli/plugin_template/pyproject.toml.in"
+TEMPLATE = "skillframe/cli/plugin_template/common/pyproject.toml.in"
 
 
 def project(folder):

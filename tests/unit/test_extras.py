@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tomllib
 import zipfile
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -157,3 +158,32 @@ def test_a_public_name_that_needs_an_extra_names_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco.batch", None)
     with pytest.raises(MissingDependency, match=r"skillframe\[sim\]"):
         _ = skillframe.anything
+
+
+PAGE = (ROOT / "docs" / "how-to" / "install.md").read_text(encoding="utf-8")
+
+
+def test_the_page_on_installing_says_what_every_extra_brings():
+    for extra in EXTRAS:
+        (row,) = [line for line in PAGE.splitlines() if line.startswith(f"| `skillframe[{extra}]`")]
+        assert names(OPTIONAL[extra]) - {"lxml"} == {name.strip() for name in row.split("|")[3].split(",")}
+
+
+def test_a_csv_reader_and_lmc_need_under_400_mb():
+    """The files of everything that the two distributions depend on, as they are installed here."""
+    found, waiting = {}, sorted(names(PROJECT["dependencies"]))
+    while waiting:
+        name = waiting.pop()
+        if name in found:
+            continue
+        try:
+            distribution = metadata.distribution(name)
+        except metadata.PackageNotFoundError:
+            continue  # of another system or Python
+        files = [file.locate() for file in distribution.files or []]
+        found[name] = sum(Path(file).stat().st_size for file in files if Path(file).is_file())
+        waiting += [
+            re.match(r"[\w.-]+", each).group() for each in distribution.requires or [] if "extra ==" not in each
+        ]
+    assert {"numpy", "scipy", "matplotlib"} <= found.keys()
+    assert sum(found.values()) < 400e6, found
