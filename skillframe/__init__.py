@@ -1,10 +1,23 @@
 """skillframe: teach robots compliant assembly from human demonstration, and prove the skill.
 
-The story in seven files: `skillframe.demonstration.record`, the LMC plug-in's learner and runtime, `skillframe.skill`,
-`skillframe.control.controller`, `skillframe.world.scene` and `skillframe.run.executor`. Importing the package loads
-none of the scientific libraries.
+    from skillframe import Campaign, learn, record, report, run
+
+    demonstrations = record("peg_in_hole", "panda", count=2, seed=1)
+    skill = learn(demonstrations).save("peg.skill.json")
+    print(skill)
+    print(run(skill, "peg_in_hole", "panda", coc="tip", set={"fixture.tilt_y": "4deg"}))
+    tilted = {"fixture.tilt_y": {"uniform": [-0.1, 0.1]}}
+    results = Campaign(world="peg_in_hole", skills=skill, coc="tip", vary=tilted, trials=40).run()
+    print(results)
+    report(results, "peg.html")
+
+The method in seven files: `skillframe.demonstration.record`, the LMC plug-in's learner and runtime,
+`skillframe.skill`, `skillframe.control.controller`, `skillframe.world.scene`, `skillframe.run.executor`. Importing the
+package loads none of the scientific libraries.
 """
 
+import sys
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from skillframe import doors, paths
@@ -12,16 +25,27 @@ from skillframe import doors, paths
 __version__ = "0.2.0"
 
 _PUBLIC = {
+    "Campaign": "skillframe.api.campaigns",
+    "CampaignResults": "skillframe.api.campaigns",
     "Command": "skillframe.skill",
     "Demonstration": "skillframe.demonstration.record",
     "Impedance": "skillframe.skill",
+    "LearnedSkill": "skillframe.api.learning",
     "Observation": "skillframe.skill",
     "Pose": "skillframe.frames",
+    "Recording": "skillframe.teaching.sessions",
+    "SingleRun": "skillframe.api.running",
     "Skill": "skillframe.skill",
     "SkillframeError": "skillframe.errors",
+    "SkillframeWarning": "skillframe.errors",
     "Status": "skillframe.skill",
     "hookimpl": "skillframe.extend.hookspecs",
+    "learn": "skillframe.api.learning",
     "per_trial": "skillframe.skill",
+    "record": "skillframe.api.recording",
+    "report": "skillframe.api.reporting",
+    "run": "skillframe.api.running",
+    "segment": "skillframe.api.learning",
 }
 __all__ = ["__version__", *sorted(_PUBLIC)]
 
@@ -29,8 +53,18 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from skillframe.api.campaigns import Campaign as Campaign
+    from skillframe.api.campaigns import CampaignResults as CampaignResults
+    from skillframe.api.learning import LearnedSkill as LearnedSkill
+    from skillframe.api.learning import learn as learn
+    from skillframe.api.learning import segment as segment
+    from skillframe.api.recording import record as record
+    from skillframe.api.reporting import report as report
+    from skillframe.api.running import SingleRun as SingleRun
+    from skillframe.api.running import run as run
     from skillframe.demonstration.record import Demonstration as Demonstration
     from skillframe.errors import SkillframeError as SkillframeError
+    from skillframe.errors import SkillframeWarning as SkillframeWarning
     from skillframe.extend.hookspecs import hookimpl as hookimpl
     from skillframe.frames import Pose as Pose
     from skillframe.skill import Command as Command
@@ -39,6 +73,19 @@ if TYPE_CHECKING:
     from skillframe.skill import Skill as Skill
     from skillframe.skill import Status as Status
     from skillframe.skill import per_trial as per_trial
+    from skillframe.teaching.sessions import Recording as Recording
+
+
+class _Package(ModuleType):
+    """`skillframe` itself, whose functions `run` and `report` have the names of two rooms.
+
+    Python binds a submodule in its package when it is imported. Here the function keeps its name: `from skillframe
+    import run` is the function, `from skillframe.run.trace import Trace` the room.
+    """
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if not (name in _PUBLIC and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
 
 
 def __getattr__(name: str) -> Any:
@@ -60,5 +107,11 @@ def _robots_of_plugins(name: str | None = None) -> "Mapping[str, Path]":
     return folders(name)
 
 
+def __dir__() -> list[str]:
+    """The public names, for completion."""
+    return sorted({*globals(), *_PUBLIC})
+
+
+sys.modules[__name__].__class__ = _Package
 doors.install()
 paths.OFFERS["robots"] = _robots_of_plugins

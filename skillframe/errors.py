@@ -122,6 +122,10 @@ def extras_named() -> Iterator[None]:
         raise missing from error
 
 
+class SkillframeWarning(UserWarning):
+    """Something that looks wrong and may be right: a biased recording, a bare number that reads like millimetres."""
+
+
 def suggest(name: str, known: Iterable[str]) -> str | None:
     """Nearest of the known names, or None if none is near; a name can be near as a whole or by its beginning."""
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Float = NDArray[np.float64]
+"""An array of double-precision numbers; docstrings give its shape."""
 _NEXT, _AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])
 _LOWER, _UPPER = np.array([7, 2, 3]), np.array([5, 6, 1])  # of the antisymmetric part of a flat 3 x 3 matrix
 

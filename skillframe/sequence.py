@@ -28,6 +28,7 @@ from skillframe.skill import Command, Impedance, Observation, Reasons, Skill, St
 
 Rows = NDArray[np.intp]
 END = -1
+"""What `Composition.follows` gives where no part follows."""
 
 
 class Part(NamedTuple):

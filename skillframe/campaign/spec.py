@@ -155,7 +155,21 @@ class CampaignSpec:
             InputError: what is wrong and where, as "file: section.key".
             UnknownName: there is no such world, or no such score.
         """
-        file = build(_File, read_toml(path), f"{path}: campaign")
+        return cls.from_table(read_toml(path), path, params)
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any], path: Path, params: type | None = None) -> CampaignSpec:
+        """A checked campaign from the keys of a campaign file.
+
+        Args:
+            table: keys and values as in campaign.toml.
+            path: the file that they stand in, or would stand in: errors name it, relative paths start in its folder.
+            params: the world's parameter dataclass; None looks it up in the registry.
+
+        Raises:
+            InputError, UnknownName: as `from_toml`.
+        """
+        file = build(_File, table, f"{path}: campaign")
         params = params or _world_params(file.world)
         _check_numbers(file, path)
         _check_skills(file, path)

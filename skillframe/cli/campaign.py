@@ -65,15 +65,12 @@ def run(file: Path, out: Path, as_json: bool, **settings: Any) -> int:
       skillframe campaign run peg.toml --out results --workers 2
     """
     options = _options(settings)
-    from skillframe.campaign import evaluate
-    from skillframe.campaign.folder import prepare
-    from skillframe.campaign.spec import CampaignSpec
-    from skillframe.extend.registry import registry
+    from skillframe.api.campaigns import Campaign
 
-    spec = CampaignSpec.from_toml(file)
+    campaign = Campaign(file)
     with terminable() as code:
         try:
-            prepare(spec, out, evaluate.describe, registry().world(spec.world).params)
+            campaign.prepare(out)
         except KeyboardInterrupt:
             click.echo("interrupted before the first trial; nothing is left", err=True)
             return code()

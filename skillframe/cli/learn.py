@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from skillframe.cli import names
 from skillframe.cli.endings import SKILL
+from skillframe.cli.output import emit_json, warned
 from skillframe.cli.words import tell
-
-if TYPE_CHECKING:
-    from skillframe.demonstration.record import Demonstration
 
 
 @click.command()
@@ -50,32 +46,16 @@ def command(
       skillframe learn left.csv right.csv --at wrist --out peg.skill.json
       skillframe learn demo.npz --axes phase_start --set moving_m=0.002 --out snap.skill.json
     """
+    from skillframe.api.learning import learn_with
     from skillframe.config import parse_setting
-    from skillframe.document.file import save
-    from skillframe.document.source import learned
-    from skillframe.extend.reading import read_demonstration
     from skillframe.extend.records import LearnOptions
-    from skillframe.extend.registry import registry
 
-    kind = registry().behaviour(skill)
     options = LearnOptions(at=at, hand=hand, axes=axes, settings=dict(parse_setting(text) for text in settings))
-    demonstrations = [read_demonstration(path) for path in files]
-    document = learned(kind, demonstrations, options)
-    save(document, out)
-    _warn(demonstrations)
-    lines = kind.describe(document) if kind.describe is not None else [kind.summary]
-    tell([f"{out}: {kind.name} from {len(files)} demonstration{'s' * (len(files) != 1)}", *lines], err=as_json)
+    with warned():
+        learned = learn_with(files, skill, options)
+    learned.save(out)
+    made = f"{out}: {learned.type} from {len(files)} demonstration{'s' * (len(files) != 1)}"
+    tell([made, *learned.words], err=as_json)
     if as_json:
-        from skillframe.cli.output import emit_json
-
-        emit_json(document)
+        emit_json(learned.document)
     return 0
-
-
-def _warn(demonstrations: Sequence[Demonstration]) -> None:
-    """What looks wrong in the recordings, on stderr: a skill learned from a biased wrench is learned from the bias."""
-    from skillframe.conditioning.audit import audit, compared
-
-    for found in compared(list(demonstrations), [audit(d) for d in demonstrations]):
-        for text in found.warnings:
-            click.echo(f"warning: {found.file}: {text}", err=True)

@@ -7,6 +7,7 @@ import os
 import shutil
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import zip_longest
@@ -48,6 +49,25 @@ def note(text: str) -> None:
     """A line on stderr that is not needed; `-q` leaves it out."""
     if not is_quiet():
         click.echo(text, err=True)
+
+
+@contextmanager
+def warned() -> Iterator[None]:
+    """Within this, warnings of the API are lines on stderr, which `-q` leaves as they are."""
+    from skillframe.errors import SkillframeWarning
+
+    with warnings.catch_warnings():
+        other = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
+            if issubclass(category, SkillframeWarning):
+                click.echo(f"warning: {message}", err=True)
+            else:
+                other(message, category, *rest, **more)
+
+        warnings.simplefilter("always", SkillframeWarning)
+        warnings.showwarning = show
+        yield
 
 
 GAP = 2  # columns of blanks between the columns of a table

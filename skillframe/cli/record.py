@@ -10,13 +10,12 @@ import click
 
 from skillframe.cli.names import robot_option, world_option
 from skillframe.cli.numbers import COUNT, NOT_NEGATIVE, NUMBER, POSITIVE, SEED
-from skillframe.cli.output import note, progress, quiet_option
+from skillframe.cli.output import note, progress, quiet_option, warned
 
 if TYPE_CHECKING:
+    from skillframe.api.recording import Person
     from skillframe.robot.model import RobotModel
-    from skillframe.teaching.blind import BlindSettings
-    from skillframe.teaching.sessions import Recording
-    from skillframe.teaching.teacher import TeacherSettings
+    from skillframe.teaching.teleoperation import OperatorSettings
     from skillframe.world.scene import Scene
 
 QUIET_S = 5.0  # a recording that is over by then needs no progress
@@ -87,22 +86,27 @@ def command(
       skillframe demonstration record --world pallets --robot hiab_xs031 --teacher teleoperation --delay 0.15 \\
         --angle -40 --count 2 --out push.npz
     """
-    from skillframe.cli.settings import warn
+    from skillframe.api.inputs import robot_of, scene_of
+    from skillframe.api.recording import record
     from skillframe.config import parse_setting
     from skillframe.extend.reading import check_writable
-    from skillframe.run.prepare import load_robot_model, load_world, split_settings
 
     check_writable(out)
-    given = dict(parse_setting(text) for text in settings)
-    params, draws = split_settings(world, given)
-    warn(world, given)
-    machine, scene = load_robot_model(robot), load_world(world, params)
-    common: dict[str, Any] = {"count": count, "seed": seed, "draws": draws, "progress": note}
-    common |= {} if rate is None else {"rate_hz": rate}
+    with warned():
+        scene, draws = scene_of(world, dict(parse_setting(text) for text in settings), depth=1)
+    machine = robot_of(robot)
+    _refuse_idle(teacher, (noise, delay, scale), (belief, centre))
+    person: Person
+    if machine.spec.actuation or any(map(_given, operated.values())):
+        scene, person = _operated(machine, scene, teacher, {**operated, "noise": noise, "delay": delay, "scale": scale})
+    else:
+        person = _person(scene, teacher, (noise, delay, scale), (belief, centre))
     with progress("s simulated", QUIET_S) as show:
-        common["watch"] = lambda now, longest: show(round(now, 1), longest)
-        recording = _recorded(machine, scene, teacher, (noise, delay, scale), (belief, centre), operated, common)
-    files = _write(recording, out, count)
+        recording = record(
+            scene, machine, teacher=person, count=count, seed=seed, set=draws, rate_hz=rate, progress=note,
+            watch=lambda now, longest: show(round(now, 1), longest),
+        )  # fmt: skip
+    files = recording.save(out)
     if as_json:
         where = {"robot": machine.spec.name, "world": world}
         click.echo(json.dumps({**where, "files": [str(f) for f in files], "rejected": recording.rejected}))
@@ -112,24 +116,6 @@ def command(
     for text in recording.rejected:
         click.echo(f"redrawn: {text}")
     return 0
-
-
-def _recorded(
-    machine: RobotModel, scene: Scene, teacher: str, person: tuple[float | None, float | None, float | None],
-    places: tuple[str | None, str | None], operated: dict[str, Any], common: dict[str, Any],
-) -> Recording:  # fmt: skip
-    """By an operator, somebody blindfolded, or somebody who sees."""
-    _refuse_idle(teacher, person, places)
-    if machine.spec.hydraulic or any(map(_given, operated.values())):
-        given = {**operated, **dict(zip(("noise", "delay", "scale"), person, strict=True))}
-        return _operated(machine, scene, teacher, given, common)
-    if teacher == "blind":
-        from skillframe.teaching.blind_sessions import record_blind
-
-        return record_blind(machine, scene, _blind(scene, *places), **common)
-    from skillframe.teaching.sessions import record
-
-    return record(machine, scene, _seeing(teacher, *person), **common)
 
 
 def _refuse_idle(
@@ -151,8 +137,8 @@ def _refuse_idle(
 
 
 def _operated(
-    machine: RobotModel, scene: Scene, teacher: str, given: dict[str, Any], common: dict[str, Any]
-) -> Recording:
+    machine: RobotModel, scene: Scene, teacher: str, given: dict[str, Any]
+) -> tuple[Scene, OperatorSettings]:  # fmt: skip
     """A hydraulic machine and its operator."""
     from math import radians
 
@@ -166,7 +152,7 @@ def _operated(
         raise InputError(
             f"--teacher {teacher}", f"nobody leads {name} by hand, it is a hydraulic machine", "use teleoperation"
         )
-    from skillframe.teaching.machine_sessions import aimed, record_operated
+    from skillframe.teaching.machine_sessions import aimed
     from skillframe.teaching.teleoperation import OperatorSettings
 
     angle, noise = given.pop("angle"), given.pop("noise")
@@ -175,7 +161,7 @@ def _operated(
     if noise is not None:
         values["aim_noise"] = radians(noise)
     where = scene if angle is None else aimed(machine, scene, radians(angle))
-    return record_operated(machine, where, OperatorSettings(**values), **common)
+    return where, OperatorSettings(**values)
 
 
 def _given(value: object) -> bool:
@@ -183,34 +169,22 @@ def _given(value: object) -> bool:
     return value is not None and value is not False
 
 
-def _write(recording: Recording, out: Path, count: int) -> list[Path]:
-    from skillframe.extend.reading import write_demonstration
-
-    files = [out] if count == 1 else [out.with_name(f"{out.stem}{i + 1}{out.suffix}") for i in range(count)]
-    for path, demonstration in zip(files, recording.demonstrations, strict=True):
-        write_demonstration(demonstration, path)
-    return files
-
-
-def _seeing(teacher: str, noise: float | None, delay: float | None, scale: float | None) -> TeacherSettings:
+def _person(
+    scene: Scene, teacher: str, person: tuple[float | None, float | None, float | None],
+    places: tuple[str | None, str | None],
+) -> Person:  # fmt: skip
+    """Somebody who sees, or is blindfolded; what is not given is as by default."""
+    from dataclasses import replace
     from math import radians
 
-    from skillframe.teaching.teacher import TeacherSettings
+    from skillframe.api.recording import seeing
 
-    remote = teacher == "teleoperation"
-    return TeacherSettings(
-        kind=teacher, aim_noise=radians(8.0 if noise is None else noise),
-        delay_s=(0.1 if remote else 0.0) if delay is None else delay,
-        scale=(2.0 if remote else 1.0) if scale is None else scale,
-    )  # fmt: skip
-
-
-def _blind(scene: Scene, belief: str | None, centre: str | None) -> BlindSettings:
-    from skillframe.teaching.blind import BlindSettings
-
-    spread = scene.task.believed if belief is None else _place(belief, "--belief")
-    middle = (0.0, 0.0, 0.0) if centre is None else _place(centre, "--centre")
-    return BlindSettings(believed=spread, centre=middle)
+    noise, delay, scale = person
+    given: dict[str, Any] = {"aim_noise": None if noise is None else radians(noise), "delay_s": delay, "scale": scale}
+    belief, centre = places
+    given |= {"believed": None if belief is None else _place(belief, "--belief")}
+    given |= {"centre": None if centre is None else _place(centre, "--centre")}
+    return replace(seeing(teacher, scene), **{key: value for key, value in given.items() if value is not None})
 
 
 def _place(text: str, option: str) -> tuple[float, float, float]:

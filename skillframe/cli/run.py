@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-import shlex
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -16,10 +14,6 @@ from skillframe.cli.endings import PAGE, TRACE
 from skillframe.cli.names import robot_option, world_option
 from skillframe.cli.numbers import POSITIVE, SEED
 from skillframe.cli.output import note, quiet_option
-
-if TYPE_CHECKING:
-    from skillframe.errors import SkillframeError
-    from skillframe.run.trace import Trace
 
 LONGEST_S, RATE_HZ = 20.0, 100.0
 JUDGED = ("peak_force_filtered_n", "peak_force_10ms_n", "peak_torque_share", "peak_speed_share", "ended_by")
@@ -71,98 +65,33 @@ def command(
         --set fixture.tilt_y=0.07 --set world.friction=0.3 --out run.npz --replay run.html
       skillframe run peg.skill.json --world peg_in_hole --video run.mp4
     """
-    import numpy as np
-
-    from skillframe.cli.output import progress
-    from skillframe.cli.settings import warn
+    from skillframe.api.running import once
+    from skillframe.cli.output import progress, warned
     from skillframe.config import parse_setting
-    from skillframe.document.source import load_skill
-    from skillframe.robot.guesses import guess_note
-    from skillframe.run.executor import simulate
-    from skillframe.run.prepare import load_robot_model, load_world, prepare, split_settings
-    from skillframe.run.scores import about
 
     if video is not None:
         from skillframe.report.video import check_film
 
         check_film(video)
-    for name in scores:
-        about(name)  # an unknown one is told before the run
-    given = dict(parse_setting(text) for text in settings)
-    params, draws = split_settings(world, given)
-    warn(world, given)
-    label, document = load_skill(skill)
-    model = load_robot_model(robot)
-    runnable, setup = prepare(model, load_world(world, params), document, coc)
-    with progress("s simulated", QUIET_S) as show:
-        result = simulate(
-            runnable, setup, {key: np.array([value]) for key, value in draws.items()}, [np.random.default_rng(seed)],
-            duration_s=duration, trace_hz=rate, progress=lambda now: show(round(now, 2), duration),
+    with progress("s simulated", QUIET_S) as show, warned():
+        done = once(
+            skill, world, robot, coc=coc, set=dict(parse_setting(text) for text in settings), seed=seed,
+            duration_s=duration, rate_hz=rate, scores=scores,
+            progress=lambda now, longest: show(round(now, 2), longest),
         )  # fmt: skip
-    assert result.traces is not None
-    trace = result.traces[0]
-    typed = _typed(skill, world, robot, coc, settings, seed, duration, rate, scores)
-    trace.meta.update({"skill": label, "seed": seed, "draws": draws, "command": typed})
-    failed = _score(trace, scores)
-    if not result.success[0] and (guess := guess_note(model.spec)):
-        trace.meta["notes"] = [*trace.meta.get("notes", []), guess]
     if out is not None:
-        trace.save(out)
+        done.save(out)
     if replay is not None:
-        _write_replay(trace, replay)
+        done.replay(replay)
     if video is not None:
-        _write_video(trace, video)
-    if failed is not None:  # the run is kept
-        raise failed
-    _tell(trace.meta, {"trace": out, "replay": replay, "video": video}, as_json)
-    if result.interrupted:
+        with progress("frames") as show:
+            done.video(video, show)
+    if done.unscored is not None:  # the run is kept
+        raise done.unscored
+    _tell(done.trace.meta, {"trace": out, "replay": replay, "video": video}, as_json)
+    if done.interrupted:
         raise KeyboardInterrupt
-    return 0 if result.success[0] else 1
-
-
-def _score(trace: Trace, names: Sequence[str]) -> SkillframeError | None:
-    """Put the scores into the trace's metadata; the error of one that fails."""
-    from skillframe.run.scores import ScoreFailed, score_notes, scores_of
-
-    if names:
-        try:
-            trace.meta["scores"] = score_notes(scores_of(trace, names))
-        except ScoreFailed as error:
-            return error
-    return None
-
-
-def _typed(
-    skill: str, world: str, robot: str, coc: str | None, settings: Sequence[str], seed: int, duration: float,
-    rate: float, scores: Sequence[str],
-) -> str:  # fmt: skip
-    """What to type to get the same run again, without where it goes."""
-    words = ["skillframe", "run", skill, "--world", world, "--robot", robot]
-    words += [] if coc is None else ["--coc", coc]
-    words += [word for text in settings for word in ("--set", text)]
-    words += ["--seed", f"{seed}"]
-    words += [] if duration == LONGEST_S else ["--duration", f"{duration:g}"]
-    words += [] if rate == RATE_HZ else ["--rate", f"{rate:g}"]
-    return shlex.join([*words, *(word for name in scores for word in ("--score", name))])
-
-
-def _write_replay(trace: Trace, path: Path) -> None:
-    from tempfile import TemporaryDirectory
-
-    from skillframe.report.page import write_report
-
-    with TemporaryDirectory() as folder:
-        file = Path(folder) / f"{path.stem}.npz"
-        trace.save(file)
-        write_report([file], path)
-
-
-def _write_video(trace: Trace, path: Path) -> None:
-    from skillframe.cli.output import progress
-    from skillframe.report.video import write_film
-
-    with progress("frames") as show:
-        write_film(trace, path, show)
+    return 0 if done.success else 1
 
 
 def _known(value: Any) -> Any:

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from skillframe.cli import names
 from skillframe.cli.endings import SKILL
 from skillframe.cli.numbers import WHOLE
+from skillframe.cli.output import emit_json
 from skillframe.cli.words import tell
-
-if TYPE_CHECKING:
-    from skillframe.extend.records import Document
 
 
 @click.command()
@@ -57,29 +55,17 @@ def command(
       skillframe segment a.csv b.csv c.csv --phases 3 --at tip --out box.policy.json
       skillframe segment left.npz right.npz --set-boundary 2:1=3.45 --out valley.policy.json
     """
+    from skillframe.api.learning import segment_with
     from skillframe.config import parse_setting
-    from skillframe.document.file import save
-    from skillframe.document.source import learned
-    from skillframe.extend.reading import read_demonstration
     from skillframe.extend.records import LearnOptions
-    from skillframe.extend.registry import registry
 
-    registry().segmenter(segmenter)
-    kind = registry().skill("policy")
     values: dict[str, Any] = dict(parse_setting(text) for text in settings)
     values |= {"segmenter": segmenter, "skill": skill, "phases": phases, "set_boundary": list(boundaries)}
-    options = LearnOptions(at=at, hand=hand, axes=axes, settings=values)
-    document = learned(kind, [read_demonstration(path) for path in files], options)
-    save(document, out)
-    count = len(document["phases"])
+    policy = segment_with(files, LearnOptions(at=at, hand=hand, axes=axes, settings=values))
+    policy.save(out)
+    count = len(policy.phases)
     made = f"{out}: {count} phase{'s' * (count != 1)} from {len(files)} demonstration{'s' * (len(files) != 1)}"
-    tell([made, *(kind.describe(document) if kind.describe is not None else [kind.summary])], err=as_json)
+    tell([made, *policy.words], err=as_json)
     if as_json:
-        _emit(document)
+        emit_json(policy.document)
     return 0
-
-
-def _emit(document: Document) -> None:
-    from skillframe.cli.output import emit_json
-
-    emit_json(document)

@@ -51,7 +51,8 @@ def show(world: str, as_json: bool) -> None:
     Example:
       skillframe worlds show peg_in_hole
     """
-    from skillframe.cli.settings import of_world, typed
+    from skillframe.api.settings import of_world
+    from skillframe.cli.settings import typed
     from skillframe.extend.registry import registry
     from skillframe.extend.worlds import make_scene
 

@@ -112,28 +112,40 @@ def load(path: Path) -> Document:
             number that is not finite; names the key.
         UnknownName: no such kind of skill is installed.
     """
-    document = _parse(path)
-    _check(document, str(path))
+    return checked(_parse(path), path)
+
+
+def checked(document: Document, where: object) -> Document:
+    """The same document, checked as `load` does.
+
+    Args:
+        document: as read.
+        where: its file, for messages.
+
+    Raises:
+        InputError, UnknownName: as `load`.
+    """
+    _check(document, str(where))
     try:
         skill = registry().behaviour(document["type"])
     except UnknownName as error:
-        raise UnknownName(error.kind, error.name, error.known, where=str(path)) from None
+        raise UnknownName(error.kind, error.name, error.known, where=str(where)) from None
     if document.get("type_version", 1) > skill.version:
         raise InputError(
-            path,
+            where,
             f"holds version {document['type_version']} of skill type {skill.name}, newer than {skill.version}",
             "update the plug-in that provides it",
         )
     try:
         if skill.check is not None:
-            with understood(path):
+            with understood(where):
                 skill.check(document)
         if skill.describe is not None:
-            with understood(path):
+            with understood(where):
                 skill.describe(document)
     except InputError as error:
-        where = path if error.where == str(path) else f"{path}: {error.where}"
-        raise InputError(where, error.problem, error.fix) from None
+        spot = where if error.where == str(where) else f"{where}: {error.where}"
+        raise InputError(spot, error.problem, error.fix) from None
     return document
 
 

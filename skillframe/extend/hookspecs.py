@@ -35,6 +35,7 @@ from skillframe.extend.records import (
 GROUP = "skillframe"
 hookspec = pluggy.HookspecMarker(GROUP)
 hookimpl = pluggy.HookimplMarker(GROUP)
+"""Decorator of a plug-in's functions that implement the hooks below."""
 
 
 @hookspec

@@ -21,6 +21,7 @@ from skillframe.report.stage import Camera
 
 Image = NDArray[np.uint8]
 INK = np.array([0.13, 0.17, 0.22])
+PAPER = (250, 250, 251)
 KEY_LIGHT = np.array([0.35, -0.55, 0.76])
 OVERSAMPLE = 2
 NEAR = 1e-3
@@ -162,6 +163,13 @@ def _windows(axis: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
 def _sides(values: Float, axis: int) -> tuple[Float, Float]:
     first, second = _windows(axis)
     return values[first], values[second]
+
+
+def over_paper(image: Image) -> Image:
+    """A picture (H, W, 3) on paper of one (H, W, 4) that is clear where nothing is."""
+    opacity = image[..., 3:] / 255.0
+    result: Image = np.round(image[..., :3] * opacity + np.array(PAPER) * (1.0 - opacity)).astype(np.uint8)
+    return result
 
 
 def png(image: Image) -> bytes:

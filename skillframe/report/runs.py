@@ -10,11 +10,11 @@ from skillframe.report.machine import machine_plots
 from skillframe.report.markup import Markup, data_uri, figure, join, json_script, note, number, table, tag
 from skillframe.report.plots import demonstration_plots, events_of, run_plots
 from skillframe.report.quantities import quantity
-from skillframe.report.raster import draw, png
+from skillframe.report.raster import Image, draw, png
 from skillframe.report.replay import run_data, scene_data, scene_key, viewer
 from skillframe.report.scores import said_of
 from skillframe.report.sources import Chapter, Run
-from skillframe.report.stage import Stage, stage_of
+from skillframe.report.stage import Camera, Stage, stage_of
 
 STILL_WIDTH, STILL_HEIGHT = 560, 420
 STILLS_NOTE = "Stills are drawn without OpenGL, as a shaded wireframe with hidden lines removed; fixtures are cut open."
@@ -132,13 +132,18 @@ def _still(stage: Stage, name: str, frame: int, time: float) -> Markup:
 
 
 def still_image(stage: Stage, frame: int, alt: str) -> Markup:
-    """A picture of the stage at a sample, close, cut open."""
+    """A picture of the stage at a sample, close, cut open, for a page."""
+    image = png(still(stage, frame, stage.close, STILL_WIDTH, STILL_HEIGHT))
+    return tag("img", src=data_uri("image/png", image), alt=alt, width=STILL_WIDTH, height=STILL_HEIGHT)
+
+
+def still(stage: Stage, frame: int, camera: Camera, width: int, height: int) -> Image:
+    """A picture (height, width, 4) of the stage at a sample, fixtures near the tip cut open."""
     meshes = [
         stage.placed(b, frame) if cut is None else cut.placed(stage.position[frame, b], stage.quaternion[frame, b])
         for b, cut in enumerate(stage.cut)
     ]
-    image = png(draw(meshes, stage.close, STILL_WIDTH, STILL_HEIGHT))
-    return tag("img", src=data_uri("image/png", image), alt=alt, width=STILL_WIDTH, height=STILL_HEIGHT)
+    return draw(meshes, camera, width, height)
 
 
 def cover(chapter: Chapter) -> Markup:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from skillframe.errors import InputError, need
 from skillframe.files import writing_whole
 from skillframe.frames import Float, norm
-from skillframe.report.raster import Canvas, Image, blank, paint, picture
+from skillframe.report.raster import PAPER, Canvas, Image, blank, over_paper, paint, picture
 from skillframe.report.shapes import Mesh
 from skillframe.report.stage import Camera, Stage, stage_of
 from skillframe.run.trace import Trace
@@ -25,7 +25,7 @@ FRAME_RATE = 25
 FAR_WIDTH, CLOSE_WIDTH, HEIGHT, STRIP = 400, 560, 480, 80
 QUALITY = "20"  # libx264's constant rate factor: hardly told from the original
 SUFFIXES = (".mp4", ".m4v", ".mov")
-INK, FAINT, FORCE, PAPER = (38, 46, 56), (176, 184, 194), (204, 60, 46), (250, 250, 251)
+INK, FAINT, FORCE = (38, 46, 56), (176, 184, 194), (204, 60, 46)
 LEFT = 16  # of the force curve [pixels]
 
 
@@ -99,7 +99,7 @@ def _frames(
     for done, sample in enumerate(samples.tolist(), start=1):
         frame = np.empty((HEIGHT + STRIP, FAR_WIDTH + CLOSE_WIDTH, 3), dtype=np.uint8)
         for pane in panes:
-            seen = _over_paper(picture(paint(pane.background.copy(), _moving(stage, sample), pane.camera)))
+            seen = over_paper(picture(paint(pane.background.copy(), _moving(stage, sample), pane.camera)))
             frame[:HEIGHT, pane.column : pane.column + seen.shape[1]] = seen
         frame[:HEIGHT, FAR_WIDTH] = FAINT
         frame[HEIGHT:] = strip.at(sample)
@@ -122,12 +122,6 @@ def _mesh(stage: Stage, body: int, sample: int) -> Mesh:
     if cut is None:
         return stage.placed(body, sample)
     return cut.placed(stage.position[sample, body], stage.quaternion[sample, body])
-
-
-def _over_paper(image: Image) -> Image:
-    opacity = image[..., 3:] / 255.0
-    result: Image = np.round(image[..., :3] * opacity + np.array(PAPER) * (1.0 - opacity)).astype(np.uint8)
-    return result
 
 
 class _Strip:

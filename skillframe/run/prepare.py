@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from skillframe.frames import Float, Pose
 from skillframe.machine.checks.figures import require_figures
 from skillframe.robot.kinematics import UnreachablePose, inverse_kinematics
 from skillframe.robot.model import RobotModel, load_model
-from skillframe.robot.spec import load_robot
+from skillframe.robot.spec import RobotSpec, load_robot
 from skillframe.run.executor import Setup
 from skillframe.skill import Skill
 from skillframe.world.placement import start_poses
@@ -34,14 +35,19 @@ from skillframe.world.quantities import QUANTITIES, UNITS
 from skillframe.world.scene import Scene
 
 
-def split_settings(world: str, settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, float]]:
+def split_settings(world: str | None, settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, float]]:
     """Scene parameters (without the `world.` prefix) and per-trial quantities out of `--set` keys.
+
+    Args:
+        world: its name; None where its scene is built already, which leaves the per-trial quantities.
+        settings: by name.
 
     Raises:
         UnknownName: a key that exists in neither, with the nearest one.
         InputError: a quantity that is not a number, or has a unit of another dimension.
     """
-    fields = {f"world.{f.name}" for f in dataclasses.fields(registry().world(world).params)}
+    params_type = None if world is None else registry().world(world).params
+    fields = set() if params_type is None else {f"world.{f.name}" for f in dataclasses.fields(params_type)}
     params: dict[str, Any] = {}
     draws: dict[str, float] = {}
     for key, value in settings.items():
@@ -72,14 +78,14 @@ def load_world(name: str, params: Mapping[str, Any]) -> Scene:
     return make_scene(registry().world(name), params)
 
 
-def load_robot_model(name: str) -> RobotModel:
-    """A robot by name or path, ready to be simulated.
+def load_robot_model(robot: str | Path | RobotSpec) -> RobotModel:
+    """A robot by name, by path or as declared, ready to be simulated.
 
     Raises:
         SkillframeError: unknown, does not load, has no arm, needs loops or actuators that a run does not simulate, or
             cylinders or servos whose figures are missing or impossible.
     """
-    spec = load_robot(name)
+    spec = robot if isinstance(robot, RobotSpec) else load_robot(robot)
     spec.require_simulated()
     if spec.servo:
         require_servos(spec)

@@ -29,7 +29,8 @@ from skillframe.skill import Command, Impedance, Observation, Reasons, Skill, St
 from skillframe.world.scene import Vector
 
 LEVER = 0.023  # m per rad: what a turn counts as in the length of a step
-CUT = 2.5  # standard deviations
+CUT = 2.5
+"""Standard deviations at which a belief ends: nobody looks farther away."""
 REST_S = 1.0  # the push grows for this long before the hand moves
 SMOOTH_S = 0.1  # how gently the push changes
 LEAN_S, LEAN_M = 0.2, 0.004  # how fast, and how far at most, the hand leans on

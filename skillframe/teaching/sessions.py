@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import overload
 
 import numpy as np
 
 from skillframe.demonstration.convention import STANDARD
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import SkillframeError
+from skillframe.extend.reading import write_demonstration
 from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, rotate
 from skillframe.robot.guesses import guess_note
 from skillframe.robot.model import RobotModel
@@ -34,12 +37,47 @@ ESTIMATED = SensorSettings(force_noise=1.0, torque_noise=0.07)
 """A teleoperated machine's wrench is often an estimate: 0.4 to 2.3 N of noise are seen on such recordings."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Recording:
-    """Demonstrations in order, and how many attempts failed on the way, with their reasons."""
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Recording(Sequence[Demonstration]):
+    """Demonstrations in order, and how many attempts failed on the way, with their reasons; a sequence of the first."""
 
     demonstrations: list[Demonstration]
     rejected: list[str]
+
+    def __len__(self) -> int:
+        """Number of demonstrations."""
+        return len(self.demonstrations)
+
+    @overload
+    def __getitem__(self, index: int) -> Demonstration: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Demonstration]: ...
+    def __getitem__(self, index: int | slice) -> Demonstration | list[Demonstration]:
+        """One demonstration, or some."""
+        return self.demonstrations[index]
+
+    def __repr__(self) -> str:
+        seconds = ", ".join(f"{d.duration:.2f} s" for d in self)
+        where = f" of {self[0].meta.get('task')}" if self else ""
+        return f"Recording({len(self)}{where}: {seconds}; {len(self.rejected)} redrawn)"
+
+    def save(self, path: Path | str) -> list[Path]:
+        """Write each demonstration to a file; the ending chooses the format.
+
+        Args:
+            path: of one demonstration; several get NAME1, NAME2, ... in the same folder.
+
+        Returns:
+            the files.
+
+        Raises:
+            InputError: an ending that no format writes, or a place that cannot be written to.
+        """
+        path, count = Path(path), len(self)
+        files = [path] if count == 1 else [path.with_name(f"{path.stem}{i + 1}{path.suffix}") for i in range(count)]
+        for file, demonstration in zip(files, self, strict=True):
+            write_demonstration(demonstration, file)
+        return files
 
 
 def record(

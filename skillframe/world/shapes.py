@@ -9,6 +9,7 @@ from skillframe.frames import Float, quaternion_from_matrix, rotation_matrix
 from skillframe.world.scene import Geom
 
 TOOL_COLOUR = (0.85, 0.45, 0.15, 1.0)
+"""Red, green, blue and opacity of tools."""
 FIXTURE_COLOUR = (0.55, 0.62, 0.70, 1.0)
 
 

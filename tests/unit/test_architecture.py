@@ -26,6 +26,7 @@ FLOORS = [
     {"run"},
     {"teaching", "campaign"},
     {"report", "conformance"},
+    {"api"},
     {"testing"},
     {"cli"},
 ]

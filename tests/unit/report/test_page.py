@@ -9,6 +9,7 @@ from report_fakes import campaign, skill_document, trace
 from skillframe.cli.main import run
 from skillframe.errors import InputError
 from skillframe.extend.records import Illustration, SkillType
+from skillframe.report import learned, runs
 from skillframe.report.learned import skill_block
 from skillframe.report.page import MOST_BYTES, render, write_report
 from skillframe.report.sources import read_chapters
@@ -22,8 +23,8 @@ OUTSIDE = re.compile(
 @pytest.fixture(autouse=True)
 def small_stills(monkeypatch):
     """The stills' size is no matter here, their cost is."""
-    monkeypatch.setattr("skillframe.report.runs.STILL_WIDTH", 56)
-    monkeypatch.setattr("skillframe.report.runs.STILL_HEIGHT", 42)
+    monkeypatch.setattr(runs, "STILL_WIDTH", 56)
+    monkeypatch.setattr(runs, "STILL_HEIGHT", 42)
 
 
 @pytest.fixture(scope="module")
@@ -168,7 +169,7 @@ def test_a_plug_ins_words_and_pictures_are_shown_as_text_and_image(monkeypatch):
         name="lmc", summary="", build=lambda d: None, describe=lambda d: ["push along -z", "<b>x</b>"],
         explain=lambda d: [Illustration("<i>t</i>", "why", "<svg onload='alert(1)'/>")],
     )  # fmt: skip
-    monkeypatch.setattr("skillframe.report.learned.registry", lambda: Registry(kind))
+    monkeypatch.setattr(learned, "registry", lambda: Registry(kind))
     text = skill_block("x.skill.json", skill_document())
     assert "push along -z" in text
     assert "&lt;b&gt;" in text
@@ -181,7 +182,7 @@ def test_a_plug_in_that_raises_costs_its_own_part_only(monkeypatch):
         raise ZeroDivisionError("oops")
 
     kind = SkillType(name="lmc", summary="", build=broken, describe=broken, explain=broken)
-    monkeypatch.setattr("skillframe.report.learned.registry", lambda: Registry(kind))
+    monkeypatch.setattr(learned, "registry", lambda: Registry(kind))
     text = skill_block("x.skill.json", skill_document())
     assert "could not describe it (ZeroDivisionError: oops)" in text
     assert "stiffness" in text

@@ -1,6 +1,7 @@
 import numpy as np
 
-import skillframe.run.recorder as recorder_module
+from skillframe.run import executor
+from skillframe.run import recorder as recorder_module
 from skillframe.run.recorder import Recorder
 from tests.laws.pushing import Push, impedance
 from tests.laws.runs import run, setup

@@ -18,8 +18,9 @@ from skillframe.extend.records import Document, LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import Float
 from skillframe.robot.model import RobotModel
-from skillframe.run.executor import Result, simulate
+from skillframe.run.executor import simulate
 from skillframe.run.prepare import load_robot_model, load_world, prepare
+from skillframe.run.result import Result
 from skillframe.teaching.blind import CUT, BlindSettings
 from skillframe.teaching.blind_sessions import record_blind
 from skillframe.world.scene import Scene

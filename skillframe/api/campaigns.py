@@ -1,0 +1,293 @@
+"""`Campaign` and `CampaignResults`: a skill run many times over declared uncertainty, and what came of it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import tempfile
+import weakref
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.api.inputs import File, Robot
+from skillframe.api.learning import LearnedSkill, Skills, skill_of
+from skillframe.api.running import SingleRun
+from skillframe.campaign import evaluate
+from skillframe.campaign.entries import parse_entry
+from skillframe.campaign.folder import campaign_hash, load, prepare
+from skillframe.campaign.replay import pick_label
+from skillframe.campaign.rows import columns
+from skillframe.campaign.runner import Options, Progress, run_campaign, trace_path
+from skillframe.campaign.spec import CampaignSpec
+from skillframe.campaign.store import ordered, read_content
+from skillframe.campaign.summary import read_summary
+from skillframe.config import read_toml
+from skillframe.document.file import save
+from skillframe.errors import InputError
+from skillframe.extend.registry import registry
+from skillframe.robot.model import RobotModel
+from skillframe.robot.spec import RobotSpec, load_robot
+
+DEFAULTS: Mapping[str, Any] = {"robot": "panda", "trials": 100, "seed": 0}
+"""Of a plan that stands in no file; our choice."""
+PLAN = Path("campaign")
+"""What errors call a plan that stands in no file."""
+
+
+class SkillRate(NamedTuple):
+    """How often a skill succeeded.
+
+    Attributes:
+        trials, successes: counts.
+        rate: successes over trials; None without a trial.
+        interval_95: bounds of the success probability; None where no interval holds, for the reason in `method`.
+        method: of the interval, in words.
+    """
+
+    trials: int
+    successes: int
+    rate: float | None
+    interval_95: tuple[float, float] | None
+    method: str
+
+
+class CampaignResults:
+    """The results of a campaign, read from its folder.
+
+    Attributes:
+        folder: where everything is kept; what `skillframe campaign` and `skillframe report` take.
+        summary: content of summary.json.
+        rows: a dict a trial and skill, by the columns of results.csv.
+
+    Args:
+        folder: of a campaign that ran.
+
+    Raises:
+        InputError: not a campaign's folder, or damaged or changed rows.
+    """
+
+    def __init__(self, folder: File) -> None:
+        self.folder = Path(folder)
+        self.spec = load(self.folder)
+        self.summary = read_summary(self.folder)
+        done = read_content(self.folder, campaign_hash(self.spec), self.spec).done.values()
+        self.rows = ordered(self.spec, done, self.summary["stopped_after_trial"])
+
+    @property
+    def skills(self) -> dict[str, SkillRate]:
+        """Rate and interval of each skill, by its label."""
+        return {label: _rate(self.summary["skills"][label]) for label in self.spec.labels}
+
+    @property
+    def comparisons(self) -> list[dict[str, Any]]:
+        """Every pair of skills on the trials that both ran, as in summary.json: `only_first`, `p_value` ..."""
+        compared: list[dict[str, Any]] = self.summary["comparisons"]
+        return compared
+
+    def table(self, skill: str | None = None) -> dict[str, NDArray[Any]]:
+        """The columns of results.csv as arrays (trials,), for one skill, in the order of the trials.
+
+        Args:
+            skill: its label or the label's beginning; None for the first.
+
+        Raises:
+            UnknownName: no such skill.
+        """
+        label = pick_label(self.spec.labels, skill)
+        mine = [row for row in self.rows if row["skill"] == label]
+        return {name: np.array([row.get(name, "") for row in mine]) for name in columns(self.spec)}
+
+    def run_of(self, trial: int, skill: str | None = None) -> SingleRun:
+        """A trial that left a trace: of each skill the first two and the first failures.
+
+        Raises:
+            InputError: it left none. UnknownName: no such skill.
+        """
+        path = trace_path(self.folder, trial, pick_label(self.spec.labels, skill))
+        if not path.is_file():
+            again = f"type skillframe campaign replay {self.folder} {trial} --out trial.npz"
+            raise InputError(path, f"trial {trial} left no trace", again)
+        return SingleRun.load(path)
+
+    def __repr__(self) -> str:
+        lines = [f"  {label}: {_said(rate)}" for label, rate in self.skills.items()]
+        where = f"{self.spec.name}, {self.spec.robot_name} in {self.spec.world}"
+        return "\n".join([f"CampaignResults({where})", *lines])
+
+
+def _rate(found: Mapping[str, Any]) -> SkillRate:
+    interval = found["interval_95"]
+    bounds = None if interval is None else (float(interval[0]), float(interval[1]))
+    return SkillRate(found["trials"], found["successes"], found["rate"], bounds, found["method"])
+
+
+def _said(rate: SkillRate) -> str:
+    if rate.rate is None:
+        return "no trial yet"
+    text = f"{rate.successes} of {rate.trials}, rate {rate.rate:.3f}"
+    return text if rate.interval_95 is None else f"{text} ({rate.interval_95[0]:.3f} to {rate.interval_95[1]:.3f})"
+
+
+class Campaign:
+    """A plan of what runs, how often, and what varies.
+
+    The plan is a campaign.toml, a dict with its keys, or keywords; keywords replace keys of the file or dict. Relative
+    paths start in the file's folder, those of a dict and of keywords in the working directory.
+
+    Attributes:
+        spec: the checked plan.
+
+    Args:
+        plan: a campaign.toml, or a dict with its keys; None where keywords say it all.
+        world: a world's name.
+        skills: learned skills, skill files, "TYPE:DEMONSTRATION", or a dict of these by the names they get in results.
+        **keys: the other keys of campaign.toml: `robot` ("panda" if nothing says otherwise), `trials` (100), `seed`
+            (0), `vary` {"fixture.tilt_y": {"uniform": [-0.1, 0.1]}}, `set`, `coc`, `duration_s`, `stop`, `expect`,
+            `name`.
+
+    Raises:
+        InputError: a key or value that cannot be used; names it.
+        UnknownName: no such world, quantity, distribution or key.
+    """
+
+    def __init__(
+        self, plan: File | Mapping[str, Any] | None = None, *, world: str | None = None,
+        skills: Skills | Sequence[Skills] | Mapping[str, Skills] | None = None, robot: Robot | None = None, **keys: Any,
+    ) -> None:  # fmt: skip
+        given: dict[str, Any] = {"world": world, "skills": skills, "robot": robot, **keys}
+        given = {key: value for key, value in given.items() if value is not None}
+        if isinstance(plan, str | os.PathLike) and not given:
+            self.spec = CampaignSpec.from_toml(Path(plan))
+            return
+        self._stage = Path(tempfile.mkdtemp(prefix="skillframe-"))
+        weakref.finalize(self, shutil.rmtree, self._stage, ignore_errors=True)
+        table: dict[str, Any] = {**_table(plan), **given}
+        if "skills" in given or isinstance(plan, Mapping):
+            table["skills"] = self._entries(table.get("skills", ()))
+        table["robot"] = _robot_entry(table["robot"])
+        name = Path(plan) if isinstance(plan, str | os.PathLike) else PLAN
+        self.spec = CampaignSpec.from_table(table, name)
+
+    def _entries(self, skills: Skills | Sequence[Skills] | Mapping[str, Skills]) -> list[str]:
+        """The entries of `skills`, with absolute paths; what is in memory is written into a folder of its own."""
+        if isinstance(skills, Mapping) and "format" not in skills:
+            return [self._written(skill_of(skill), name) for name, skill in skills.items()]
+        alone = isinstance(skills, str | os.PathLike | LearnedSkill | Mapping)
+        several: Sequence[Any] = [skills] if alone else skills  # type: ignore[assignment, list-item]
+        return [self._entry(skill) for skill in several]
+
+    def _entry(self, skill: Skills) -> str:
+        if isinstance(skill, str | os.PathLike):
+            return _absolute(os.fspath(skill), Path.cwd())
+        learned = skill_of(skill)
+        return self._written(learned, learned.name)
+
+    def _written(self, skill: LearnedSkill, name: str) -> str:
+        path = self._stage / f"{name}.skill.json"
+        if path.exists():
+            raise InputError("campaign: skills", f"two are called {name!r}", 'name them: skills={"a": ..., "b": ...}')
+        save(skill.document, path)
+        return str(path)
+
+    def prepare(self, out: File) -> Path:
+        """Make the campaign's folder, with copies of all that it needs, without running a trial.
+
+        Raises:
+            InputError: the folder holds something, or skill, robot and world do not fit together.
+        """
+        prepare(self.spec, Path(out), evaluate.describe, registry().world(self.spec.world).params)
+        return Path(out)
+
+    def run(
+        self, out: File | None = None, *, workers: int | None = None, traces: int = 8,
+        progress: Callable[[Progress], None] | None = None,
+    ) -> CampaignResults:  # fmt: skip
+        """Run it.
+
+        Args:
+            out: folder for the results, absent or empty; None for a temporary one that goes with the results.
+            workers: processes on this machine; None for this one alone. None of this changes a row.
+            traces: how many trials per skill leave a trace.
+            progress: called after every chunk of trials, and now and then within one.
+
+        Raises:
+            InputError: the folder holds something, or skill, robot and world do not fit together.
+            CampaignError: trouble of the environment stopped it; finished rows are kept in `out`.
+            KeyboardInterrupt: Ctrl-C; likewise.
+        """
+        parent = Path(tempfile.mkdtemp(prefix="skillframe-")) if out is None else None
+        try:
+            folder = self.prepare(parent / "results" if parent is not None else Path(os.fspath(out or "")))
+            with _script_unseen():
+                run_campaign(folder, evaluate.evaluate, Options(workers=workers, traces=traces), progress)
+            results = CampaignResults(folder)
+        except BaseException:
+            if parent is not None:
+                shutil.rmtree(parent, ignore_errors=True)
+            raise
+        if parent is not None:
+            weakref.finalize(results, shutil.rmtree, parent, ignore_errors=True)
+        return results
+
+    def __repr__(self) -> str:
+        spec = self.spec
+        return (
+            f"Campaign({spec.name}: {', '.join(spec.labels)}; {spec.trials} trials, {spec.robot_name} in {spec.world})"
+        )
+
+
+@contextmanager
+def _script_unseen() -> Iterator[None]:
+    """Within this, worker processes do not run the user's script again.
+
+    `multiprocessing` imports the main module in every process that it spawns, so that a script without a
+    `__name__ == "__main__"` would start over in each. What workers run stands in modules of its own.
+    """
+    main = sys.modules["__main__"]
+    kept = {name: getattr(main, name) for name in ("__file__", "__spec__") if hasattr(main, name)}
+    try:
+        main.__spec__ = None
+        main.__dict__.pop("__file__", None)
+        yield
+    finally:
+        for name, value in kept.items():
+            setattr(main, name, value)
+
+
+def _table(plan: File | Mapping[str, Any] | None) -> dict[str, Any]:
+    """The keys of a plan; a file's, with absolute paths."""
+    if plan is None or isinstance(plan, Mapping):
+        return {**DEFAULTS, **(plan or {})}
+    table, folder = read_toml(Path(plan)), Path(plan).absolute().parent
+    if isinstance(table.get("skills"), list):
+        table["skills"] = [_absolute(text, folder) if isinstance(text, str) else text for text in table["skills"]]
+    robot = table.get("robot")
+    if isinstance(robot, str) and (folder / robot).exists():
+        table["robot"] = str(folder / robot)
+    return table
+
+
+def _absolute(entry: str, folder: Path) -> str:
+    return parse_entry(entry).moved(lambda file: str(folder / file)).text
+
+
+def _robot_entry(robot: object) -> object:
+    """What a campaign file calls a robot; what is no robot is left to the plan's own check."""
+    if isinstance(robot, RobotModel | RobotSpec):
+        spec = robot.spec if isinstance(robot, RobotModel) else robot
+        file = spec.folder / "robot.toml"
+        if not file.is_file() or load_robot(file) != replace(spec):
+            fix = "write what differs into a robot.toml and give that"
+            raise InputError(f"robot {spec.name}", f"differs from {file}, which a campaign copies", fix)
+        return str(file)
+    if isinstance(robot, str | os.PathLike):
+        text = os.fspath(robot)
+        return str(Path(text).absolute()) if Path(text).exists() else text
+    return robot

@@ -1,0 +1,123 @@
+"""What is public is said on one page, and documented; how-tos, examples and first-party plug-ins use nothing else."""
+
+import ast
+import importlib
+import inspect
+import re
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+API = (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8")
+MODULES = re.findall(r"^\.\. automodule:: (\S+)\n((?:   :.*\n)*)", API, re.MULTILINE)
+PENDING = "skillframe.reproduce."  # until the rows of the papers are a plug-in
+PAGES = [*ROOT.glob("docs/how-to/*.md"), *ROOT.glob("docs/tutorial/*.md"), *ROOT.glob("docs/reference/*.md")]
+PAGES += [ROOT / "README.md", *ROOT.glob("plugins/*/README.md")]
+SOURCES = [
+    *ROOT.glob("plugins/*/src/**/*.py"),
+    *ROOT.glob("examples/*.py"),
+    *ROOT.glob("skillframe/cli/plugin_template/**/*.py"),
+]
+
+
+def option(text, name):
+    """The names that an option of a directive lists."""
+    found = re.search(rf":{name}: (.*)", text)
+    return {part.strip() for part in found[1].split(",")} if found else set()
+
+
+@cache
+def public():
+    """Names by module that the page documents."""
+    found = {"skillframe": set(importlib.import_module("skillframe").__all__)}
+    for module, options in MODULES:
+        listed = option(options, "members")
+        names = listed or (all_of(importlib.import_module(module)) - option(options, "exclude-members"))
+        found.setdefault(module, set()).update(names)
+    return found
+
+
+def all_of(module):
+    """What the page shows of a module: its `__all__`, else what it defines and documents without an underscore."""
+    if hasattr(module, "__all__"):
+        return set(module.__all__)
+    own = {n for n, value in vars(module).items() if getattr(value, "__module__", None) == module.__name__}
+    documented = {n for n in own if inspect.getdoc(getattr(module, n))} | constants(module)
+    return {n for n in documented if not n.startswith("_")}
+
+
+@cache
+def constants(module):
+    """Names that a module assigns at its top with a docstring below."""
+    body = ast.parse(inspect.getsource(module)).body
+    found = set()
+    for node, following in pairwise(body):
+        if isinstance(following, ast.Expr) and isinstance(following.value, ast.Constant):
+            targets = getattr(node, "targets", [getattr(node, "target", None)])
+            found |= {target.id for target in targets if isinstance(target, ast.Name)}
+    return found
+
+
+def homes(module, name):
+    """The module, and where it has a name from."""
+    body = ast.parse(inspect.getsource(module)).body
+    froms = [n.module for n in body if isinstance(n, ast.ImportFrom) and name in {alias.name for alias in n.names}]
+    listed = getattr(module, "_PUBLIC", {}).get(name)
+    return [module, *map(importlib.import_module, [*froms, *([listed] if listed else [])])]
+
+
+def imports(text):
+    """(module, name) of everything of skillframe that a text imports, and a name for whole modules."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "skillframe":
+            yield from ((node.module, alias.name) for alias in node.names)
+        elif isinstance(node, ast.Import):
+            yield from (("", alias.name) for alias in node.names if alias.name.split(".")[0] == "skillframe")
+
+
+def is_public(module, name):
+    """Is it on the page: a name of a module, or a module itself?"""
+    whole = f"{module}.{name}".lstrip(".")
+    return name in public().get(module, ()) or whole in public() or whole.startswith(PENDING)
+
+
+def wrong_in(text):
+    return [f"{module}.{name}" for module, name in imports(text) if not is_public(module, name)]
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda p: p.relative_to(ROOT).as_posix())
+def test_a_page_imports_what_the_api_page_lists(path):
+    blocks = re.findall(r"^```python\n(.*?)^```", path.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    assert not [wrong for block in blocks for wrong in wrong_in(block)]
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: p.relative_to(ROOT).as_posix())
+def test_examples_and_first_party_plugins_import_what_the_api_page_lists(path):
+    assert not wrong_in(path.read_text(encoding="utf-8"))
+
+
+def test_every_name_that_the_page_lists_exists_and_is_documented():
+    lacking = []
+    for module, names in public().items():
+        home = importlib.import_module(module)
+        for name in names - {"__version__"}:
+            value = getattr(home, name)
+            routine = inspect.isroutine(value) or inspect.isclass(value)
+            if not (inspect.getdoc(value) if routine else any(name in constants(m) for m in homes(home, name))):
+                lacking.append(f"{module}.{name}")
+    assert not lacking
+
+
+def test_no_module_stands_on_the_page_twice():
+    names = [module for module, _ in MODULES]
+    assert len(names) == len(set(names))
+
+
+def test_an_import_that_the_page_does_not_list_is_noticed():
+    assert wrong_in("from skillframe.run.recorder import Recorder") == ["skillframe.run.recorder.Recorder"]
+    assert wrong_in("import skillframe.run.recorder") == [".skillframe.run.recorder"]
+    assert wrong_in("from skillframe.run.executor import Loop") == ["skillframe.run.executor.Loop"]
+    assert wrong_in("from skillframe import run\nfrom skillframe.skill import Skill\nimport skillframe.frames") == []
