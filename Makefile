@@ -11,7 +11,11 @@ PYTEST := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q --
 SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist worksteal
 PROJECTS := pyproject.toml plugins/all.txt $(wildcard plugins/*/pyproject.toml)
 
-.PHONY: demo install wheels test test-core test-rest test-beside test-slow figures bench docs lint clean
+EXAMPLES := $(wildcard examples/*.py)
+GALLERY := docs/gallery/pictures
+PICTURES := $(EXAMPLES:examples/%.py=$(GALLERY)/%.png)
+
+.PHONY: demo install wheels test test-core test-rest test-beside test-slow figures bench docs gallery lint clean
 
 demo: install
 	$(BIN)/skillframe quickstart --out $(OUT)
@@ -65,9 +69,19 @@ figures: $(VENV)/.test
 bench: $(VENV)/.test
 	$(BIN)/python tests/benchmarks/run.py
 
-docs: $(VENV)/.dev
+docs: $(VENV)/.dev $(PICTURES)
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
 	@echo "docs/_build/html/index.html"
+
+# The gallery's pictures, small where they are missing; `make gallery` makes all of them in full.
+$(GALLERY)/%.png: examples/%.py | $(VENV)/.dev
+	@mkdir -p $(GALLERY)
+	MPLBACKEND=Agg $(BIN)/python $< --quick --out $(GALLERY) > $(GALLERY)/$*.txt
+
+gallery: $(VENV)/.dev
+	@mkdir -p $(GALLERY)
+	@for script in $(EXAMPLES); do echo $$script; MPLBACKEND=Agg $(BIN)/python $$script --out $(GALLERY) \
+	  > $(GALLERY)/$$(basename $$script .py).txt || exit 1; done
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
@@ -75,4 +89,4 @@ lint: $(VENV)/.dev
 	$(BIN)/mypy
 
 clean:
-	rm -rf $(VENV) build dist docs/_build
+	rm -rf $(VENV) build dist docs/_build docs/gallery

@@ -22,6 +22,7 @@ extensions = [
     "sphinx-mathjax-offline",
     "docstring_maths",
     "command_help",
+    "gallery",
 ]
 exclude_patterns = ["_build", "_extensions", "_static"]
 myst_enable_extensions = ["dollarmath", "deflist"]

@@ -32,6 +32,17 @@ def kept(skill: Skill, observation: Observation) -> Pose:
 seconds: float = length(read_demonstration(Path("a.npz")))
 settings: Settings = Settings()
 """
+TEN_LINES = """
+from skillframe import Campaign, CampaignResults, LearnedSkill, SingleRun, learn, record, report, run
+
+demonstrations = record("peg_in_hole", "panda", count=2, seed=1)
+skill: LearnedSkill = learn(demonstrations, stiffness_n_m=800.0).save("peg.skill.json")
+done: SingleRun = run(skill, "peg_in_hole", robot="panda", coc="tip", set={"fixture.tilt_y": "4deg"})
+success: bool = done.success
+tilted = {"fixture.tilt_y": {"uniform": [-0.1, 0.1]}}
+results: CampaignResults = Campaign(world="peg_in_hole", skills=skill, vary=tilted, trials=40).run(workers=2)
+report([results, done, "run.npz"], "peg.html")
+"""
 MISUSE = "\nwrong: str = length(read_demonstration(Path('a.npz')))\n"
 
 pytestmark = [pytest.mark.slow, pytest.mark.needs_plugins]
@@ -78,6 +89,14 @@ def test_there_is_a_wheel_of_every_distribution_and_it_says_that_it_is_typed(whe
 def test_a_script_that_uses_the_installed_package_passes_a_strict_type_check(installed, tmp_path):
     code, said = checked(installed, tmp_path, SCRIPT)
     assert code == 0, said
+
+
+def test_ten_lines_of_the_api_pass_a_strict_type_check_and_a_slip_in_them_does_not(installed, tmp_path):
+    code, said = checked(installed, tmp_path, TEN_LINES)
+    assert code == 0, said
+    code, said = checked(installed, tmp_path, TEN_LINES + "run(skill, 3)\nreport(results, outt='x')\n")
+    assert code == 1
+    assert len(re.findall(r"error: ", said)) == 2, said
 
 
 def test_the_type_check_of_a_user_sees_the_types_of_the_package(installed, tmp_path):
