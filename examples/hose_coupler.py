@@ -29,7 +29,7 @@ def main(out: Path, quick: bool) -> None:
     figure, axes = plt.subplots(1, 2, figsize=(9.6, 4.2), sharey=True, layout="constrained")
     for ax, point in zip(axes, COLOURS, strict=True):
         reached = []
-        for start in (-8, 8) if quick else (-12, -8, -4, 4, 8, 12):
+        for start in (-12, 12) if quick else (-12, -8, -4, 4, 8, 12):
             done = run(skill, "hose_coupler", "free_tool", coc=point, set={"start.tilt_y": f"{start}deg"})
             reached.append(done.success)
             ax.plot(done.trace.time, tilt(done), color=COLOURS[point], alpha=0.8)

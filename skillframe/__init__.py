@@ -7,7 +7,8 @@
     print(skill)
     print(run(skill, "peg_in_hole", "panda", coc="tip", set={"fixture.tilt_y": "4deg"}))
     tilted = {"fixture.tilt_y": {"uniform": [-0.1, 0.1]}}
-    results = Campaign(world="peg_in_hole", skills=skill, coc="tip", vary=tilted, trials=40).run()
+    campaign = Campaign(world="peg_in_hole", skills=skill, coc="tip", vary=tilted)
+    results = campaign.run(workers=2)
     print(results)
     report(results, "peg.html")
 

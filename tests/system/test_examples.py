@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import skillframe
+
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPTS = sorted((ROOT / "examples").glob("*.py"))
 SAYS = {
@@ -51,6 +53,29 @@ def test_there_are_ten_examples_of_30_to_80_lines_with_a_title_and_a_word_of_exp
     lengths = {script.name: len(script.read_text().splitlines()) for script in SCRIPTS}
     assert not {name: count for name, count in lengths.items() if not 30 <= count <= 80}
     assert all(len(each.title) < 100 and len(each.text) > 100 for each in gallery().examples(ROOT / "examples"))
+
+
+TEN_LINES = re.search(r"```python\n(.*?)```", (ROOT / "docs" / "reference" / "api.md").read_text(), re.DOTALL)[1]
+
+
+def test_the_ten_lines_of_the_api_page_are_those_of_the_package_s_docstring():
+    indented = [line for line in skillframe.__doc__.splitlines() if line.startswith("    ") or not line]
+    assert "".join(f"{line[4:]}\n" for line in indented).strip() == TEN_LINES.strip()
+    assert len(TEN_LINES.split("\n\n")[1].splitlines()) <= 10
+
+
+@pytest.mark.slow
+@pytest.mark.needs_plugins
+def test_the_ten_lines_of_the_api_page_run_as_a_script(tmp_path):
+    few = TEN_LINES.replace("vary=tilted", "vary=tilted, trials=2, duration_s=4.0")
+    (tmp_path / "ten.py").write_text(few)
+    command = [sys.executable, "-W", "ignore::UserWarning", "ten.py"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=600, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "push along -z" in done.stdout
+    assert "SingleRun(peg by panda in peg_in_hole: success" in done.stdout
+    assert "peg.skill.json: " in done.stdout
+    assert (tmp_path / "peg.html").stat().st_size > 100_000
 
 
 def gallery():
