@@ -20,7 +20,6 @@ from skillframe.api.inputs import File, Robot
 from skillframe.api.learning import LearnedSkill, Skills, skill_of
 from skillframe.api.running import SingleRun
 from skillframe.campaign import evaluate
-from skillframe.campaign.entries import parse_entry
 from skillframe.campaign.folder import campaign_hash, load, prepare
 from skillframe.campaign.replay import pick_label
 from skillframe.campaign.rows import columns
@@ -30,6 +29,7 @@ from skillframe.campaign.store import ordered, read_content
 from skillframe.campaign.summary import read_summary
 from skillframe.config import read_toml
 from skillframe.document.file import save
+from skillframe.document.source import parse_source
 from skillframe.errors import InputError
 from skillframe.extend.registry import registry
 from skillframe.robot.model import RobotModel
@@ -275,7 +275,7 @@ def _table(plan: File | Mapping[str, Any] | None) -> dict[str, Any]:
 
 
 def _absolute(entry: str, folder: Path) -> str:
-    return parse_entry(entry).moved(lambda file: str(folder / file)).text
+    return parse_source(entry, folder).moved(lambda file: str(folder / file)).text
 
 
 def _robot_entry(robot: object) -> object:

@@ -47,7 +47,7 @@ class LearnedSkill:
         if isinstance(skill, str):
             name, document = source.load_skill(text)
         else:
-            name, document = source.skill_name(skill.name if isinstance(skill, Path) else text), file.load(Path(text))
+            name, document = source.SkillSource("", (text,)).name, file.load(Path(text))
         return cls(document=document, name=name, source=text)
 
     @property
@@ -80,7 +80,9 @@ class LearnedSkill:
             InputError: the file cannot be written.
         """
         file.save(self.document, Path(path))
-        return LearnedSkill(document=self.document, name=source.skill_name(os.fspath(path)), source=os.fspath(path))
+        return LearnedSkill(
+            document=self.document, name=source.SkillSource("", (os.fspath(path),)).name, source=os.fspath(path)
+        )
 
     def explain(self, out: File) -> int:
         """Write words and pictures as one HTML page (.html); gives the number of pictures.

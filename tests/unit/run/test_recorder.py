@@ -1,6 +1,5 @@
 import numpy as np
 
-from skillframe.run import executor
 from skillframe.run import recorder as recorder_module
 from skillframe.run.recorder import Recorder
 from tests.laws.pushing import Push, impedance
