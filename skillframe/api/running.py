@@ -228,10 +228,9 @@ def once(
     trace = result.traces[0]
     name = type(skill).__name__ if learned is None else learned.name
     trace.meta.update({"skill": name, "seed": seed, "draws": draws})
-    if learned is not None and (
-        command := _command(learned, world, robot, coc, set, seed, duration_s, rate_hz, scores)
-    ):
-        trace.meta["command"] = command
+    typed = "" if learned is None else _command(learned, world, robot, coc, set, seed, duration_s, rate_hz, scores)
+    if typed:
+        trace.meta["command"] = typed
     if not result.success[0] and (guess := guess_note(model.spec)):
         trace.meta["notes"] = [*trace.meta.get("notes", []), guess]
     arms = result.arm_traces[0] if isinstance(result, ArmsResult) and result.arm_traces else {}
