@@ -39,7 +39,8 @@ def _loads(robot: RobotType) -> Iterator[str]:
     try:
         spec = load_robot(folder)
         spec.require_simulated()
-        require_figures(spec)
+        if spec.hydraulic:
+            require_figures(spec)
         load_model(spec)
     except SkillframeError as error:
         yield f"{error}"
