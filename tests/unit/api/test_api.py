@@ -166,12 +166,21 @@ def test_a_run_draws_itself(skill, tmp_path, monkeypatch):
         bare.picture(tmp_path / "none.png")
 
 
-def test_ctrl_c_ends_a_run_in_python_and_leaves_what_was_recorded_on_the_command_line(skill, tmp_path):
+def test_ctrl_c_ends_a_run_in_python_and_leaves_what_was_recorded_on_the_command_line(skill, tmp_path, monkeypatch):
     def interrupt(now, longest):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         run(skill, *FREE, progress=interrupt)
+    monkeypatch.setattr("skillframe.cli.output._tenths", lambda *args: interrupt)
+    saved, out = skill.save(tmp_path / "slide.skill.json"), tmp_path / "run.npz"
+    words = ["run", saved.source, "--world", "free", "--robot", "free_tool", "--out", str(out)]
+    assert command(words) not in (0, 1)
+    assert SingleRun.load(out).reason == "interrupted"
+
+
+def test_a_recording_has_the_rate_that_was_asked_for():
+    assert record(*VALLEY, seed=1, rate_hz=250.0)[0].rate == pytest.approx(250.0)
 
 
 def test_progress_is_simulated_seconds_of_the_longest(skill):
