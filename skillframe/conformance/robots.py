@@ -45,8 +45,9 @@ def _loads(robot: RobotType) -> Iterator[str]:
     except SkillframeError as error:
         yield f"{error}"
         return
-    if not spec.urdf.is_relative_to(folder.resolve()):
-        yield f"its URDF {spec.urdf.name} lies outside its folder; campaigns copy the folder, so put it inside"
+    beside = spec.urdf.parent.parent == folder.resolve().parent and (spec.urdf.parent / "robot.toml").is_file()
+    if not (beside or spec.urdf.is_relative_to(folder.resolve())):
+        yield f"its URDF {spec.urdf.name} lies outside its folder and those of robots beside it; campaigns copy these only"
 
 
 def _dynamics(robot: RobotType) -> Iterator[str]:

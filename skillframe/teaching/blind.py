@@ -8,7 +8,7 @@ How they moved was not published, so **every figure here is our assumption**, no
     between them: minimum jerk, s = 10 u^3 - 15 u^4 + 6 u^5, lasting length / speed + 0.15 s, then a dwell
     push: force + Ornstein-Uhlenbeck noise; in 15 of 100 segments a tap, the part just lifted for most of the way
     hand: 1000 N/m across the push, none along it; it leans on until the part is where he means it, within 0.2 s,
-        because he feels where the part is (or friction alone would hold it 2 mm behind)
+    because he feels where the part is (or friction alone would hold it 2 mm behind)
 
 The teacher ends when the part falls in (he feels it) or when his time is up. It is a skill, run by the one executor in
 the same world with the same sensors as any run. Rotation about the push is searched too if its belief is not zero.
