@@ -13,12 +13,10 @@
     report(results, "peg.html")
 
 The method in seven files: `skillframe.demonstration.record`, the LMC plug-in's learner and runtime,
-`skillframe.skill`, `skillframe.control.controller`, `skillframe.world.scene`, `skillframe.run.executor`. Importing the
-package loads none of the scientific libraries.
+`skillframe.skill`, `skillframe.control.controller`, `skillframe.world.scene`, `skillframe.execution.executor`. Importing
+the package loads none of the scientific libraries.
 """
 
-import sys
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from skillframe import doors, paths
@@ -77,18 +75,6 @@ if TYPE_CHECKING:
     from skillframe.teaching.sessions import Recording as Recording
 
 
-class _Package(ModuleType):
-    """`skillframe` itself, whose functions `run` and `report` have the names of two rooms.
-
-    Python binds a submodule in its package when it is imported. Here the function keeps its name: `from skillframe
-    import run` is the function, `from skillframe.run.trace import Trace` the room.
-    """
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if not (name in _PUBLIC and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
-
-
 def __getattr__(name: str) -> Any:
     """Load a public name on first use, so that `import skillframe` stays instant."""
     if name not in _PUBLIC:
@@ -113,6 +99,5 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *_PUBLIC})
 
 
-sys.modules[__name__].__class__ = _Package
 doors.install()
 paths.OFFERS["robots"] = _robots_of_plugins

@@ -33,10 +33,10 @@ from skillframe.conformance.segmenters import check_segmenter
 from skillframe.conformance.skills import check_skill, example_document
 from skillframe.conformance.worlds import check_world
 from skillframe.demonstration.record import Demonstration
+from skillframe.execution.trace import Trace
 from skillframe.extend.records import Document, SkillType
 from skillframe.extend.registry import registry
 from skillframe.frames import Float, Pose
-from skillframe.run.trace import Trace
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 
 __all__ = [

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.run.executor import Result, simulate
-from skillframe.run.prepare import load_robot_model, load_world, prepare
+from skillframe.execution.executor import Result, simulate
+from skillframe.execution.prepare import load_robot_model, load_world, prepare
 
 SKILL = Path(__file__).resolve().parents[1] / "docs" / "how-to" / "corner.skill.json"
 STARTS = ((-0.2, -0.15), (0.0, 0.0), (0.2, 0.15))

@@ -15,11 +15,11 @@ from skillframe_papers.rows.crane_taught import LEARN
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.document.source import learned
+from skillframe.execution.prepare import load_robot_model, load_world
+from skillframe.execution.trace import Trace
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import norm
-from skillframe.run.prepare import load_robot_model, load_world
-from skillframe.run.trace import Trace
 from skillframe.teaching.machine_sessions import aimed, demonstration_of_machine, operate
 from skillframe.teaching.teleoperation import OperatorSettings
 

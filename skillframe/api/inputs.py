@@ -11,10 +11,10 @@ from typing import Any
 from skillframe.api.settings import doubts
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError, SkillframeWarning
+from skillframe.execution.prepare import load_robot_model, load_world, split_settings
 from skillframe.extend.reading import read_demonstration
 from skillframe.robot.model import RobotModel
 from skillframe.robot.spec import RobotSpec
-from skillframe.run.prepare import load_robot_model, load_world, split_settings
 from skillframe.world.scene import Scene
 
 File = str | os.PathLike[str]
@@ -55,7 +55,7 @@ def robot_of(given: Robot) -> RobotModel:
     """A robot that is ready to be simulated.
 
     Raises:
-        SkillframeError: as `skillframe.run.prepare.load_robot_model`.
+        SkillframeError: as `skillframe.execution.prepare.load_robot_model`.
     """
     if isinstance(given, RobotModel):
         return given

@@ -14,10 +14,10 @@ from skillframe.conditioning.audit import audit, compared
 from skillframe.demonstration.record import Demonstration
 from skillframe.document import file, source
 from skillframe.errors import InputError, SkillframeWarning
+from skillframe.execution.prepare import prepare
 from skillframe.extend.records import Document, Illustration, LearnOptions, SkillType
 from skillframe.extend.registry import registry
 from skillframe.files import write_whole
-from skillframe.run.prepare import prepare
 from skillframe.skill import Skill
 
 
@@ -90,7 +90,7 @@ class LearnedSkill:
         Raises:
             InputError: the file cannot be written.
         """
-        from skillframe.report.explained import page
+        from skillframe.reports.explained import page
 
         pictures = self.pictures
         title = self.name if self.source is None else Path(self.source).name

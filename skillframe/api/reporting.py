@@ -11,8 +11,8 @@ from skillframe.api.campaigns import CampaignResults
 from skillframe.api.inputs import File
 from skillframe.api.running import SingleRun
 from skillframe.errors import InputError
-from skillframe.report.page import write_report
-from skillframe.run.trace import Trace
+from skillframe.execution.trace import Trace
+from skillframe.reports.page import write_report
 
 Results = CampaignResults | SingleRun | Trace | File
 

@@ -15,14 +15,14 @@ from skillframe.api.inputs import File, Robot, Settings, World, robot_of, scene_
 from skillframe.api.learning import LearnedSkill, Skills, skill_of
 from skillframe.demonstration.record import resolve_point
 from skillframe.errors import InputError, SkillframeError
+from skillframe.execution.arms import ArmsResult
+from skillframe.execution.executor import Setup, simulate
+from skillframe.execution.prepare import prepare
+from skillframe.execution.scores import ScoreFailed, about, score_notes, scores_of
+from skillframe.execution.trace import Trace
 from skillframe.files import write_whole
 from skillframe.robot.guesses import guess_note
 from skillframe.robot.model import RobotModel
-from skillframe.run.arms import ArmsResult
-from skillframe.run.executor import Setup, simulate
-from skillframe.run.prepare import prepare
-from skillframe.run.scores import ScoreFailed, about, score_notes, scores_of
-from skillframe.run.trace import Trace
 from skillframe.skill import Skill
 from skillframe.world.scene import Scene
 
@@ -116,7 +116,7 @@ class SingleRun:
         Raises:
             InputError: the file cannot be written.
         """
-        from skillframe.report.page import write_report
+        from skillframe.reports.page import write_report
 
         with TemporaryDirectory() as folder:
             file = Path(folder) / f"{Path(out).stem}.npz"
@@ -134,7 +134,7 @@ class SingleRun:
         Raises:
             InputError: the file's name is not one of a video, or it cannot be written.
         """
-        from skillframe.report.video import write_film
+        from skillframe.reports.video import write_film
 
         write_film(self.trace, Path(out), progress or (lambda done, total: None))
         return Path(out)
@@ -150,9 +150,9 @@ class SingleRun:
         Raises:
             InputError: the trace holds no geometry, or the file cannot be written.
         """
-        from skillframe.report.raster import over_paper, png
-        from skillframe.report.runs import still
-        from skillframe.report.stage import stage_of
+        from skillframe.reports.raster import over_paper, png
+        from skillframe.reports.runs import still
+        from skillframe.reports.stage import stage_of
 
         stage = stage_of(self.trace)
         if stage is None:

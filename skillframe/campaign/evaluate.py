@@ -22,13 +22,13 @@ from skillframe.campaign.sampling import draws, trial_rngs
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.trouble import needed
 from skillframe.document.source import load_skill
+from skillframe.execution.executor import QUANTITIES, simulate
+from skillframe.execution.prepare import load_robot_model, load_world, prepare
+from skillframe.execution.scores import ScoreFailed, score_notes, scores_of
+from skillframe.execution.trace import Trace
 from skillframe.extend.registry import registry
 from skillframe.robot.model import RobotModel
 from skillframe.robot.payload import with_payload
-from skillframe.run.executor import QUANTITIES, simulate
-from skillframe.run.prepare import load_robot_model, load_world, prepare
-from skillframe.run.scores import ScoreFailed, score_notes, scores_of
-from skillframe.run.trace import Trace
 from skillframe.world.drawing import geom_json
 from skillframe.world.placement import check_quantities
 from skillframe.world.scene import Scene

@@ -16,9 +16,9 @@ from skillframe.campaign.statistics import correction, holm
 from skillframe.campaign.store import FORMAT, VERSION
 from skillframe.campaign.validity import Basis, Validity, unbroken, validity_of
 from skillframe.errors import InputError
+from skillframe.execution.scores import about
 from skillframe.files import write_whole
 from skillframe.files.documents import read_json
-from skillframe.run.scores import about
 
 SUMMARY = "summary.json"
 PEAKS = ("peak_force_n", "peak_force_10ms_n", "peak_force_filtered_n", "peak_torque_share", "peak_speed_share")

@@ -30,8 +30,8 @@ from typing import NamedTuple
 from skillframe.campaign.rows import ChunkJob, Row
 from skillframe.campaign.work import WorkT
 from skillframe.errors import InputError, MissingDependency, SkillframeError, UnknownName, missing_extra
+from skillframe.execution.scores import ScoreFailed
 from skillframe.extend.registry import BadPlugin, PluginConflict
-from skillframe.run.scores import ScoreFailed
 
 Evaluate = Callable[[ChunkJob], list[Row]]
 FILES = frozenset(f"skillframe.fmu.{name}" for name in ("allow", "build", "extract", "foreign", "library"))

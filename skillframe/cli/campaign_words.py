@@ -58,7 +58,7 @@ def _p_value(pair: dict[str, Any]) -> str:
 
 def show_rates(skills: dict[str, dict[str, Any]]) -> None:
     """Rates with their intervals, and the commonest causes of failure."""
-    from skillframe.report.results import cause_of
+    from skillframe.reports.results import cause_of
 
     rows = [
         [

@@ -29,8 +29,8 @@ def command(inputs: tuple[Path, ...], out: Path, as_json: bool) -> None:
       skillframe report run1.npz run2.npz --out runs.html
     """
     from skillframe.cli.output import emit_json
-    from skillframe.report.page import write_chapters
-    from skillframe.report.sources import read_chapters, scenes
+    from skillframe.reports.page import write_chapters
+    from skillframe.reports.sources import read_chapters, scenes
 
     chapters = read_chapters(inputs)
     size, seen = write_chapters(chapters, out), [scenes(chapter) for chapter in chapters]

@@ -70,7 +70,7 @@ def command(
     from skillframe.config import parse_setting
 
     if video is not None:
-        from skillframe.report.video import check_film
+        from skillframe.reports.video import check_film
 
         check_film(video)
     with progress("s simulated", QUIET_S) as show, warned():

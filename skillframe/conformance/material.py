@@ -16,9 +16,9 @@ import numpy as np
 
 from skillframe.campaign.rows import JUDGED, OUTCOME, cell
 from skillframe.conformance.examples import DOWN, FRICTION, NORMAL_FORCE, SPEED
+from skillframe.execution.trace import Trace
 from skillframe.extend.records import MovingImpedance
 from skillframe.frames import Float
-from skillframe.run.trace import Trace
 
 RATE_HZ, APPROACH_S = 100.0, 0.4
 LONGEST_S = 20.0

@@ -47,7 +47,8 @@ def _loads(robot: RobotType) -> Iterator[str]:
         return
     beside = spec.urdf.parent.parent == folder.resolve().parent and (spec.urdf.parent / "robot.toml").is_file()
     if not (beside or spec.urdf.is_relative_to(folder.resolve())):
-        yield f"its URDF {spec.urdf.name} lies outside its folder and those of robots beside it; campaigns copy these only"
+        where = "outside its folder and those of robots beside it"
+        yield f"its URDF {spec.urdf.name} lies {where}; campaigns copy these only"
 
 
 def _dynamics(robot: RobotType) -> Iterator[str]:
@@ -62,8 +63,8 @@ def _dynamics(robot: RobotType) -> Iterator[str]:
 
 def _stands(robot: RobotType) -> Iterator[str]:
     """In empty space it holds its start for a tenth of a second; a machine with actuators is not tried."""
-    from skillframe.run.executor import Setup, simulate
-    from skillframe.run.prepare import load_robot_model, load_world
+    from skillframe.execution.executor import Setup, simulate
+    from skillframe.execution.prepare import load_robot_model, load_world
 
     model = load_robot_model(str(robot.folder))
     if model.spec.actuation:

@@ -11,9 +11,9 @@ from collections.abc import Iterator, Sequence
 from skillframe.conformance.material import LONGEST_S, example_trace
 from skillframe.conformance.problems import attempt
 from skillframe.conformance.watch import left_behind, watched
+from skillframe.execution.scores import ScoreFailed, read_only, score_of
+from skillframe.execution.trace import Trace
 from skillframe.extend.records import ScoreType
-from skillframe.run.scores import ScoreFailed, read_only, score_of
-from skillframe.run.trace import Trace
 
 SLOWEST_S = 0.5
 """Processor time for a run of 20 s (ours): a campaign of 1,000 trials then spends eight minutes on it."""

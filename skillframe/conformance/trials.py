@@ -82,8 +82,8 @@ def compiles(scene: Scene) -> Iterator[str]:
 
 def _robots(scene: Scene) -> Iterator[tuple[str, RobotModel, Float]]:
     """Robots that reach the start, each with its configuration there."""
+    from skillframe.execution.prepare import load_robot_model
     from skillframe.robot.kinematics import UnreachablePose
-    from skillframe.run.prepare import load_robot_model
     from skillframe.world.placement import start_configurations
 
     for name in ROBOTS:
@@ -154,7 +154,7 @@ class Push(Skill):
 
 def runs(scene: Scene) -> Iterator[str]:
     """Holding and pushing for 100 ms stays finite and within the robot's limits."""
-    from skillframe.run.executor import Setup, simulate
+    from skillframe.execution.executor import Setup, simulate
 
     for name, robot, _ in _robots(scene):
         what = f"holding the tool at the start and pushing it 10 mm, {1e3 * SHORT_S:g} ms with {name},"

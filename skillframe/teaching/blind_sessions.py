@@ -13,9 +13,9 @@ import numpy as np
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError, SkillframeError
+from skillframe.execution.executor import Result, Setup, simulate
 from skillframe.robot.guesses import guess_note
 from skillframe.robot.model import RobotModel
-from skillframe.run.executor import Result, Setup, simulate
 from skillframe.skill import Status
 from skillframe.teaching.blind import LEVER, BlindSettings, BlindTeacher
 from skillframe.teaching.sessions import MOST_ATTEMPTS, Recording, Watch, beginning, demonstration_from, told_of

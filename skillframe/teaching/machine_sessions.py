@@ -18,12 +18,12 @@ from skillframe.demonstration.convention import STANDARD
 from skillframe.demonstration.record import Demonstration
 from skillframe.demonstration.suspicions import UNMEASURED
 from skillframe.errors import InputError
+from skillframe.execution.executor import Result, Setup, simulate
+from skillframe.execution.trace import Trace
 from skillframe.frames import Float
 from skillframe.machine.law.hydraulic import plane_axes
 from skillframe.robot.chain import ClosedChain
 from skillframe.robot.model import RobotModel
-from skillframe.run.executor import Result, Setup, simulate
-from skillframe.run.trace import Trace
 from skillframe.skill import Status
 from skillframe.teaching.sessions import Recording, Watch, collect, demonstration_from, start_columns, told_of
 from skillframe.teaching.teleoperation import Operator, OperatorSettings, require_stable_loop

@@ -16,12 +16,12 @@ import numpy as np
 from skillframe.demonstration.convention import STANDARD
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import SkillframeError
+from skillframe.execution.executor import Result, Setup, simulate
+from skillframe.execution.trace import Trace
 from skillframe.extend.reading import write_demonstration
 from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, rotate
 from skillframe.robot.guesses import guess_note
 from skillframe.robot.model import RobotModel
-from skillframe.run.executor import Result, Setup, simulate
-from skillframe.run.trace import Trace
 from skillframe.teaching.blind import BlindSettings
 from skillframe.teaching.staged import teacher_for
 from skillframe.teaching.teacher import TeacherSettings

@@ -22,8 +22,8 @@ COUNT, SECONDS, WINDOW_MS = 32, 4.0, 250
 def setting():
     from skillframe_papers.rows import crane_runs
 
-    from skillframe.run.executor import Setup
-    from skillframe.run.prepare import load_robot_model
+    from skillframe.execution.executor import Setup
+    from skillframe.execution.prepare import load_robot_model
 
     start = np.array([crane_runs.FIXTURE[0], 0.0, 0.7])
     scene = crane_runs.scene(start, plate=True)
@@ -32,7 +32,7 @@ def setting():
 
 def loop(count):
     """A loop after its calibration in the air."""
-    from skillframe.run.executor import begin
+    from skillframe.execution.executor import begin
     from tests.laws.pushing import Push
 
     stiffness, damping = np.diag([1e5] * 3 + [0.0] * 3), np.diag([5e4] * 3 + [1.0] * 3)

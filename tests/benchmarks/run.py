@@ -94,10 +94,10 @@ def single(name, bound):
 def two_arms():
     """A batch of 32 insertions with two arms in contact, each trial against real time."""
     from skillframe.errors import UnknownName
+    from skillframe.execution.arms import simulate_arms
+    from skillframe.execution.executor import Setup
+    from skillframe.execution.prepare import load_robot_model, load_world
     from skillframe.extend.registry import registry
-    from skillframe.run.arms import simulate_arms
-    from skillframe.run.executor import Setup
-    from skillframe.run.prepare import load_robot_model, load_world
     from tests.laws.runs import generators
 
     try:
@@ -159,7 +159,7 @@ def memory_of_long_run():
     def note(now):
         marks[round(now)] = status("VmRSS")
 
-    from skillframe.run.executor import simulate
+    from skillframe.execution.executor import simulate
     from tests.laws.runs import generators
 
     skill = Push(DOWN, stiffness, speed=speed, stall=False)

@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 
-from skillframe.run.executor import simulate
+from skillframe.execution.executor import simulate
 from skillframe.world.convert import build_spec
 from skillframe.world.layout import Layout
 from skillframe.world.plant import Plant

@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from skillframe.cosim import CosimSettings, Master
+from skillframe.execution.drives.coupled import CoupledPlant
 from skillframe.fmu.actuator import ActuatorSpec
 from skillframe.fmu.opening import open_actuators
 from skillframe.machine.law import vdc_actuator as act
 from skillframe.machine.law.hydraulic import Measured, Reference
 from skillframe.robot.chain import ClosedChain
-from skillframe.run.drives.coupled import CoupledPlant
 from skillframe.world.placement import fixture_poses
 from skillframe.world.plant import Plant
 from tests.crane_press import ENCODER, PRESSURE, SENSOR_CORNER, Filter

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from skillframe.demonstration.record import Demonstration
+from skillframe.execution.prepare import load_robot_model, load_world
 from skillframe.frames import Float, matrix_from_quaternion, rotation_vector
-from skillframe.run.prepare import load_robot_model, load_world
 from skillframe.teaching.sessions import record
 from skillframe.teaching.teacher import TeacherSettings
 

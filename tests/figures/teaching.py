@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from skillframe.demonstration.record import Demonstration
+from skillframe.execution.prepare import load_robot_model, load_world
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import Float
-from skillframe.run.prepare import load_robot_model, load_world
 from skillframe.teaching.sessions import record
 from skillframe.teaching.teacher import TeacherSettings
 from skillframe.world.sensors import SensorSettings

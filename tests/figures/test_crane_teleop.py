@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from skillframe.errors import InputError
-from skillframe.run.prepare import load_robot_model, load_world
+from skillframe.execution.prepare import load_robot_model, load_world
 from skillframe.teaching import teleoperation
 from skillframe.teaching.machine_sessions import aimed, operate
 from skillframe.teaching.teleoperation import OperatorSettings, loop_gain

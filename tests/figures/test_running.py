@@ -7,10 +7,10 @@ import pytest
 from scipy.stats import binomtest
 
 from skillframe.document.source import learned
+from skillframe.execution.executor import Result, simulate
+from skillframe.execution.prepare import load_robot_model, load_world, prepare
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.extend.registry import registry
-from skillframe.run.executor import Result, simulate
-from skillframe.run.prepare import load_robot_model, load_world, prepare
 from tests.figures.teaching import SEED, row, taught
 
 pytestmark = [pytest.mark.figures, pytest.mark.needs_plugins]

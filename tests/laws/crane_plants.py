@@ -7,13 +7,13 @@ from functools import cache
 import numpy as np
 
 from skillframe.cosim import CosimSettings, Master, Motion
+from skillframe.execution.drives.coupled import CoupledPlant
 from skillframe.extend.worlds import make_scene, world_types
 from skillframe.fmu.actuator import ActuatorSpec
 from skillframe.fmu.opening import open_actuators
 from skillframe.robot.chain import ClosedChain
 from skillframe.robot.model import attach_payload, load_model
 from skillframe.robot.spec import load_robot
-from skillframe.run.drives.coupled import CoupledPlant
 from skillframe.world.placement import fixture_poses
 from skillframe.world.plant import Plant
 

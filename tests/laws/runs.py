@@ -5,10 +5,10 @@ from functools import cache
 
 import numpy as np
 
+from skillframe.execution.executor import Setup, simulate
 from skillframe.extend.worlds import make_scene, world_types
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import Limits, load_robot
-from skillframe.run.executor import Setup, simulate
 from skillframe.world.sensors import SensorSettings
 
 SILENT = SensorSettings(

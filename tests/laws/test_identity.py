@@ -6,8 +6,8 @@ It is what makes the replay of one trial of a campaign the very row of its table
 import numpy as np
 import pytest
 
-from skillframe.run.executor import simulate
-from skillframe.run.trace import Trace
+from skillframe.execution.executor import simulate
+from skillframe.execution.trace import Trace
 from skillframe.world.sensors import SensorSettings
 from tests.laws.pushing import Push, impedance
 from tests.laws.runs import setup

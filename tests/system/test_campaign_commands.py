@@ -7,7 +7,7 @@ import math
 import pytest
 
 from skillframe.cli.main import run
-from skillframe.run.trace import Trace
+from skillframe.execution.trace import Trace
 
 pytestmark = pytest.mark.needs_plugins
 

@@ -5,8 +5,8 @@ import re
 import pytest
 
 from skillframe.cli.main import run
+from skillframe.execution.trace import Trace
 from skillframe.fmu.toolchain import find_compiler
-from skillframe.run.trace import Trace
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.system.crane_fakes import MISCHIEF, crane, driven_by, fake_cylinder, skill
 from tests.unit.fmu.fmu_fakes import repacked

@@ -8,9 +8,9 @@ import pytest
 from skillframe_papers.rows.crane_runs import MOVING, Follow, diamond
 
 from skillframe.cli.main import run
+from skillframe.execution.executor import Setup, begin
+from skillframe.execution.prepare import load_robot_model, load_world
 from skillframe.fmu.toolchain import find_compiler
-from skillframe.run.executor import Setup, begin
-from skillframe.run.prepare import load_robot_model, load_world
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.system.worn_cylinder import campaign
 

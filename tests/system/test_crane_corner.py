@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from skillframe.cli.main import run
-from skillframe.run.executor import simulate
-from skillframe.run.prepare import load_robot_model, load_world, prepare
-from skillframe.run.trace import Trace
+from skillframe.execution.executor import simulate
+from skillframe.execution.prepare import load_robot_model, load_world, prepare
+from skillframe.execution.trace import Trace
 from tests.crane_corner import PEAK, SKILL, into_the_corner
 
 pytestmark = [pytest.mark.slow, pytest.mark.needs_plugins]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from skillframe_papers.rows.crane_runs import MOVING, Follow
 
-from skillframe.run.executor import Setup, begin
-from skillframe.run.prepare import load_robot_model, load_world
+from skillframe.execution.executor import Setup, begin
+from skillframe.execution.prepare import load_robot_model, load_world
 
 pytestmark = pytest.mark.slow
 WORN = {

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from skillframe.cli.main import run
-from skillframe.run.trace import Trace
+from skillframe.execution.trace import Trace
 
 pytestmark = pytest.mark.needs_plugins
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "how-to" / "dual-arm.md").read_text(encoding="utf-8")

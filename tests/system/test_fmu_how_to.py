@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from skillframe.cli.main import run
+from skillframe.execution.executor import simulate
+from skillframe.execution.prepare import load_robot_model
 from skillframe.fmu.toolchain import find_compiler
-from skillframe.run.executor import simulate
-from skillframe.run.prepare import load_robot_model
 from skillframe.testing import ScriptedSkill
 from tests.laws.runs import generators, setup
 

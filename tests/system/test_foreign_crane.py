@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from skillframe.execution.executor import Setup, simulate
 from skillframe.fmu.library import find_fmu
 from skillframe.fmu.toolchain import find_compiler
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import Limits, load_robot
-from skillframe.run.executor import Setup, simulate
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.laws.pushing import Push, impedance
 from tests.laws.runs import generators, scene

@@ -14,13 +14,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from skillframe.execution.trace import Trace
 from skillframe.fmu.actuator import ActuatorSpec
 from skillframe.fmu.build import build_fmu
 from skillframe.fmu.child import Child, SandboxLimits
 from skillframe.fmu.inspection import inspect_fmu
 from skillframe.fmu.sandbox import SandboxBank
 from skillframe.fmu.toolchain import find_compiler
-from skillframe.run.trace import Trace
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.oracle import fmus
 from tests.oracle.attacks import ATTACKS, SECRET, processes, written

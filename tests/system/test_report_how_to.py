@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from skillframe.cli.main import run
-from tests.unit.report.report_fakes import campaign, trace
+from tests.unit.reports.report_fakes import campaign, trace
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "how-to" / "report.md").read_text(encoding="utf-8")
 

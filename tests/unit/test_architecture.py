@@ -23,9 +23,9 @@ FLOORS = [
     {"machine"},
     {"extend"},
     {"document"},
-    {"run"},
+    {"execution"},
     {"teaching", "campaign"},
-    {"report", "conformance"},
+    {"reports", "conformance"},
     {"api"},
     {"testing"},
     {"cli"},
@@ -45,7 +45,7 @@ LOOP = {
     "signals",
     "either",
     "cosim",
-    "run",
+    "execution",
     "machine",
 }
 SET_UP = {  # finds, builds and unpacks FMUs before a run, simulates one alone, holds a foreign one in its own process
@@ -64,7 +64,9 @@ SET_UP = {  # finds, builds and unpacks FMUs before a run, simulates one alone, 
         "toolchain",
         "worker",
     )
-} | {f"skillframe/run/{name}.py" for name in ("prepare", "scores", "trace", "tracemeta")}  # before a run, and after it
+} | {
+    f"skillframe/execution/{name}.py" for name in ("prepare", "scores", "trace", "tracemeta")
+}  # before a run, and after it
 SET_UP |= {f"skillframe/teaching/{name}.py" for name in ("sessions", "blind_sessions", "machine_sessions")}
 
 
@@ -213,9 +215,9 @@ def test_reports_are_made_from_files_and_never_from_a_world():
     found = [
         f"{relative(p)}:{line} {m}"
         for p in core_files()
-        if top(p) == "report"
+        if top(p) == "reports"
         for line, m in imports(p)
-        if own(m) in above or (own(m) == "run" and not m.startswith("skillframe.run.trace"))
+        if own(m) in above or (own(m) == "execution" and not m.startswith("skillframe.execution.trace"))
     ]
     assert not found
 

@@ -117,7 +117,7 @@ def test_no_module_stands_on_the_page_twice():
 
 
 def test_an_import_that_the_page_does_not_list_is_noticed():
-    assert wrong_in("from skillframe.run.recorder import Recorder") == ["skillframe.run.recorder.Recorder"]
-    assert wrong_in("import skillframe.run.recorder") == [".skillframe.run.recorder"]
-    assert wrong_in("from skillframe.run.executor import Loop") == ["skillframe.run.executor.Loop"]
+    assert wrong_in("from skillframe.execution.recorder import Recorder") == ["skillframe.execution.recorder.Recorder"]
+    assert wrong_in("import skillframe.execution.recorder") == [".skillframe.execution.recorder"]
+    assert wrong_in("from skillframe.execution.executor import Loop") == ["skillframe.execution.executor.Loop"]
     assert wrong_in("from skillframe import run\nfrom skillframe.skill import Skill\nimport skillframe.frames") == []

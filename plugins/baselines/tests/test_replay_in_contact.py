@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from skillframe.document.source import learned
+from skillframe.execution.executor import simulate
+from skillframe.execution.prepare import load_robot_model, load_world, prepare
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
-from skillframe.run.executor import simulate
-from skillframe.run.prepare import load_robot_model, load_world, prepare
 from skillframe.teaching.sessions import record
 from skillframe.teaching.teacher import TeacherSettings
 

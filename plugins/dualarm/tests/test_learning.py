@@ -10,10 +10,10 @@ from skillframe_dualarm.learner import learn
 
 from skillframe.document.file import load, new_document, save
 from skillframe.errors import InputError, UnknownName
+from skillframe.execution.executor import simulate
+from skillframe.execution.prepare import load_robot_model, prepare
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
-from skillframe.run.executor import simulate
-from skillframe.run.prepare import load_robot_model, prepare
 from skillframe.teaching.sessions import record
 from skillframe.teaching.teacher import TeacherSettings
 

@@ -10,7 +10,7 @@ from skillframe_papers.rows.insertion import PUBLISHED, insert, largest, posed
 from skillframe_papers.rows.two_arms import phase_of
 
 from skillframe.errors import UnknownName
-from skillframe.run.prepare import load_robot_model
+from skillframe.execution.prepare import load_robot_model
 
 SCENE = build(DualPegParams())
 

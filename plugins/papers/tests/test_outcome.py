@@ -3,7 +3,7 @@
 import numpy as np
 from skillframe_papers.rows.outcome import classify
 
-from skillframe.run.arms import ArmsResult
+from skillframe.execution.arms import ArmsResult
 from skillframe.skill import no_reasons
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from skillframe_search import trials
 from skillframe_search.trials import FOUND_M, Task, starts
 
-from skillframe.run.prepare import load_robot_model
+from skillframe.execution.prepare import load_robot_model
 
 __all__ = ["FOUND_M", "PARAMS", "PEG", "demonstrations", "document", "goals", "robot", "scene", "search", "starts"]
 FILLET_M = 0.0008  # of the peg; its size sets how hard the search is

@@ -12,9 +12,9 @@ import pytest
 import recovery
 from search_runs import PEG, demonstrations, document, goals, robot, search, shares, starts, wilson
 
+from skillframe.execution.executor import Setup, simulate
+from skillframe.execution.prepare import load_world
 from skillframe.frames import norm
-from skillframe.run.executor import Setup, simulate
-from skillframe.run.prepare import load_world
 
 pytestmark = [pytest.mark.figures, pytest.mark.needs_plugins]
 COUNT = 60

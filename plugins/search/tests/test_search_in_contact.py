@@ -8,8 +8,8 @@ from search_runs import PARAMS, document, goals, robot, scene, search
 from skillframe_search.example import example
 
 from skillframe.errors import InputError
-from skillframe.run.executor import simulate
-from skillframe.run.prepare import load_world, prepare
+from skillframe.execution.executor import simulate
+from skillframe.execution.prepare import load_world, prepare
 from skillframe.skill import Status
 from skillframe.teaching.blind import BlindSettings
 from skillframe.teaching.blind_sessions import record_blind

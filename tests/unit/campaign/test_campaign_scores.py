@@ -11,8 +11,8 @@ from skillframe.campaign.spec import CampaignSpec
 from skillframe.cli.main import run
 from skillframe.conformance.examples import example_demonstrations
 from skillframe.errors import InputError, UnknownName
+from skillframe.execution.trace import Trace
 from skillframe.extend.reading import write_demonstration
-from skillframe.run.trace import Trace
 
 PLUGIN = """
 import numpy as np
@@ -166,7 +166,7 @@ def test_a_run_tells_its_scores_as_json_in_words_and_in_its_trace(campaign, tmp_
 
 
 def test_a_score_is_no_quantity_that_varied_where_campaign_toml_is_missing(campaign):
-    from skillframe.report.results import read_results
+    from skillframe.reports.results import read_results
 
     assert read_results(campaign(["way", "last"]) / "results.csv").varied == ("start.offset_x",)
 

@@ -13,7 +13,7 @@ from skillframe.campaign.lock import FolderLock, holder
 from skillframe.campaign.rows import MEASURES, decode, differences, encode
 from skillframe.campaign.store import RowLog, read_content, repair_tail
 from skillframe.errors import InputError
-from skillframe.report.results import read_results
+from skillframe.reports.results import read_results
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from skillframe import files
 from skillframe.campaign.replay import replay_trial
 from skillframe.campaign.status import status_of
 from skillframe.errors import InputError
-from skillframe.report.sources import read_folder
+from skillframe.reports.sources import read_folder
 
 
 @pytest.fixture

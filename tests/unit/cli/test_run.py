@@ -7,10 +7,10 @@ import pytest
 
 from skillframe.cli.main import run
 from skillframe.conformance.examples import example_demonstrations
+from skillframe.execution.trace import Trace
 from skillframe.extend.reading import write_demonstration
-from skillframe.report.provenance import commands
-from skillframe.report.sources import read_traces
-from skillframe.run.trace import Trace
+from skillframe.reports.provenance import commands
+from skillframe.reports.sources import read_traces
 
 pytestmark = pytest.mark.needs_plugins
 FREE = ["--world", "free", "--robot", "free_tool"]

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from skillframe.config import build, parse_setting
 from skillframe.config.units import UNITS, doubt, parse, si, unit_of
 from skillframe.errors import InputError
-from skillframe.run.prepare import split_settings
+from skillframe.execution.prepare import split_settings
 from skillframe.world.worlds.peg_in_hole import PegParams
 
 

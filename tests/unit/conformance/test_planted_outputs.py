@@ -12,6 +12,7 @@ import pytest
 
 from skillframe.conformance import check_drive, check_exporter, check_robot, check_score, check_section
 from skillframe.errors import InputError
+from skillframe.execution.trace import Trace
 from skillframe.extend.records import (
     DriveType,
     ExporterType,
@@ -24,7 +25,6 @@ from skillframe.extend.records import (
 )  # fmt: skip
 from skillframe.extend.registry import registry
 from skillframe.robot import load_robot
-from skillframe.run.trace import Trace
 
 # -- exporters
 

@@ -71,7 +71,7 @@ def test_topics_of_different_rates_are_joined_on_time(tmp_path: Path, ending: st
 def test_joint_states_become_tool_poses_by_the_robots_kinematics(tmp_path: Path) -> None:
     import pinocchio as pin
 
-    from skillframe.run.prepare import load_robot_model
+    from skillframe.execution.prepare import load_robot_model
 
     robot = load_robot_model("panda")
     names = [str(n) for n in robot.model.names[1:]]

@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 
 from skillframe.cli.main import run
 from skillframe.errors import InputError
+from skillframe.execution.trace import COLUMNS, Trace
 from skillframe.extend.reading import read_demonstration, write_demonstration
-from skillframe.run.trace import COLUMNS, Trace
 from tests.unit.demonstration.conftest import make
 
 Said = Callable[..., str]

@@ -11,6 +11,7 @@ import pytest
 
 from skillframe.cli.main import run
 from skillframe.errors import InputError
+from skillframe.execution.prepare import load_robot_model
 from skillframe.machine.checks.audit import audit
 from skillframe.machine.checks.figures import BELOW, NEEDED, NOT_NEGATIVE, POSITIVE, unfit_figures
 from skillframe.machine.cylinder import bank
@@ -20,7 +21,6 @@ from skillframe.robot.describe import as_json, describe
 from skillframe.robot.driven import Actuation
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot, robot_names
-from skillframe.run.prepare import load_robot_model
 
 
 @pytest.fixture

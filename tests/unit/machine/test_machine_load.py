@@ -7,17 +7,17 @@ import pytest
 from skillframe_papers.rows.crane_runs import MOVING, Follow
 
 from skillframe.errors import InputError
+from skillframe.execution.executor import begin, simulate
+from skillframe.execution.prepare import load_robot_model
 from skillframe.machine.law.hydraulic import Measured
 from skillframe.machine.law.vdc_actuator import cylinders
 from skillframe.robot.chain import ClosedChain
 from skillframe.robot.model import load_model
 from skillframe.robot.payload import with_payload
 from skillframe.robot.spec import load_robot
-from skillframe.run.executor import begin, simulate
-from skillframe.run.prepare import load_robot_model
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.oracle.hydraulic_law import terms
-from tests.unit.run.test_machine import rngs, setup, standing
+from tests.unit.execution.test_machine import rngs, setup, standing
 
 START = np.array([0.785, -1.571, 0.5])
 CARRIER = 2  # lift, tilt, extension: the boom's last part holds the grip

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from skillframe.errors import InputError
+from skillframe.execution.prepare import load_robot_model, load_world
 from skillframe.frames import Pose, norm, rotation_matrix
-from skillframe.run.prepare import load_robot_model, load_world
 from skillframe.skill import Observation, Status
 from skillframe.teaching.blind import CUT, LEVER, BlindSettings, BlindTeacher, _script
 from skillframe.teaching.blind_sessions import record_blind

@@ -6,9 +6,9 @@ import pytest
 
 from skillframe.conditioning.audit import audit
 from skillframe.errors import InputError
+from skillframe.execution.prepare import load_robot_model, load_world
+from skillframe.execution.trace import Trace
 from skillframe.extend.reading import read_demonstration, write_demonstration
-from skillframe.run.prepare import load_robot_model, load_world
-from skillframe.run.trace import Trace
 from skillframe.teaching.machine_sessions import aimed, demonstration_of_machine, operate, record_operated
 from skillframe.teaching.teleoperation import OperatorSettings
 

@@ -6,9 +6,9 @@ import struct
 import numpy as np
 import pytest
 
+from skillframe.execution.executor import simulate
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot
-from skillframe.run.executor import simulate
 from skillframe.world.placement import fixture_poses, start_configurations
 from skillframe.world.plant import Plant
 from skillframe.world.scene import Geom, Sprung
@@ -261,7 +261,7 @@ def at_start(model, task, more, configuration):
 
 def ball_at(robot, joint):
     """The scene of two arms, with a ball of 50 mm of the held fixture at a joint of one arm, clear of both tools."""
-    from skillframe.run.prepare import load_world
+    from skillframe.execution.prepare import load_world
 
     model, task = robot("dual_panda"), load_world("dual_peg", {})
     plant = Plant(model, task, 1, fixture_poses(model, {}, 1), {})

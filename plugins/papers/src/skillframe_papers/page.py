@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Any
 
-from skillframe.report.markup import Markup, data_uri, figure, join, note, table, tag
-from skillframe.report.page import POLICY
+from skillframe.reports.markup import Markup, data_uri, figure, join, note, table, tag
+from skillframe.reports.page import POLICY
 from skillframe_papers.document import origin, threshold
 
 BADGES = {"pass": "badge won", "fail": "badge lost", "reported": "badge"}
@@ -61,7 +61,7 @@ def _links(entries: Sequence[Mapping[str, Any]]) -> list[Markup]:
 
 
 def _style() -> Markup:
-    shared = files("skillframe.report").joinpath("assets", "page.css").read_text(encoding="utf-8")
+    shared = files("skillframe.reports").joinpath("assets", "page.css").read_text(encoding="utf-8")
     return Markup(shared + STYLE)
 
 

@@ -14,13 +14,13 @@ import numpy as np
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.document.source import learned
+from skillframe.execution.executor import simulate
+from skillframe.execution.prepare import load_robot_model, load_world, prepare
+from skillframe.execution.result import Result
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import Float
 from skillframe.robot.model import RobotModel
-from skillframe.run.executor import simulate
-from skillframe.run.prepare import load_robot_model, load_world, prepare
-from skillframe.run.result import Result
 from skillframe.teaching.blind import CUT, BlindSettings
 from skillframe.teaching.blind_sessions import record_blind
 from skillframe.world.scene import Scene

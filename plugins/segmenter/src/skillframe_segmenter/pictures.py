@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
-from skillframe.report.drawing import svg
+from skillframe.reports.drawing import svg
 
 COLOURS = ("#2e6fba", "#c98a1b", "#3a9d6e", "#d1495b", "#7a52a8", "#4f8f9d", "#8a7a5b", "#b0457b")
 BAR, MARGIN = 0.34, 0.9

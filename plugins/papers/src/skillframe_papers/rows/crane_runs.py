@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from skillframe.execution.executor import Result, Setup, simulate
+from skillframe.execution.prepare import load_robot_model
 from skillframe.frames import Float, Pose
 from skillframe.robot.model import RobotModel
-from skillframe.run.executor import Result, Setup, simulate
-from skillframe.run.prepare import load_robot_model
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 from skillframe.world.scene import Geom, Scene, Task, Tool
 from skillframe.world.worlds.common import anywhere, no_error

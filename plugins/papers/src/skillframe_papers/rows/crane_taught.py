@@ -18,11 +18,11 @@ import numpy as np
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.document.source import learned
+from skillframe.execution.executor import Result, simulate
+from skillframe.execution.prepare import load_robot_model, load_world, prepare
 from skillframe.extend.records import Document, Illustration, LearnOptions, RowResult, RowRun
 from skillframe.extend.registry import registry
 from skillframe.frames import Float
-from skillframe.run.executor import Result, simulate
-from skillframe.run.prepare import load_robot_model, load_world, prepare
 from skillframe.teaching.machine_sessions import aimed, record_operated
 from skillframe.teaching.teleoperation import OperatorSettings
 from skillframe.world.placement import nominal_fixture
@@ -149,7 +149,7 @@ def _picture(job: RowRun, skill: Taught, results: list[Result]) -> Illustration:
     """Ways of the tool, taught and run, in the crane's plane; where stack and stop would touch it."""
     from matplotlib.figure import Figure
 
-    from skillframe.report.drawing import BLUE, GREY, INK, RED, svg
+    from skillframe.reports.drawing import BLUE, GREY, INK, RED, svg
 
     figure = Figure(figsize=(8.6, 4.2))
     taught_on, run_on = figure.subplots(1, 2, sharex=True, sharey=True)

@@ -17,10 +17,10 @@ from skillframe_dualarm.document import Phase
 from skillframe_dualarm.runtime import DualArm
 
 from skillframe.errors import UnknownName
+from skillframe.execution.arms import ArmsResult, simulate_arms
+from skillframe.execution.executor import Setup
 from skillframe.frames import rotate
 from skillframe.robot.model import RobotModel
-from skillframe.run.arms import ArmsResult, simulate_arms
-from skillframe.run.executor import Setup
 from skillframe.world.placement import nominal_fixture
 from skillframe.world.scene import Scene
 from skillframe_papers.rows.outcome import classify

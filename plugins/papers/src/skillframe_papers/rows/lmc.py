@@ -16,11 +16,11 @@ from skillframe.demonstration.record import Demonstration
 from skillframe.document.file import new_document
 from skillframe.document.frame import frame_at
 from skillframe.document.source import learned
+from skillframe.execution.executor import simulate
+from skillframe.execution.prepare import load_robot_model, load_world, prepare
 from skillframe.extend.records import Document, Illustration, LearnOptions, RowResult, RowRun
 from skillframe.extend.registry import registry
 from skillframe.frames import Float
-from skillframe.run.executor import simulate
-from skillframe.run.prepare import load_robot_model, load_world, prepare
 from skillframe.teaching.sessions import record
 from skillframe.teaching.teacher import TeacherSettings
 from skillframe_papers.bars import reached

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from skillframe.execution.arms import ArmsResult
 from skillframe.frames import Float
-from skillframe.run.arms import ArmsResult
 
 COMMON_RAD = np.radians(5.0)
 AWAY_RAD = np.radians(3.0)

@@ -18,10 +18,10 @@ from skillframe_segmenter.model import from_document
 from skillframe_segmenter.observer import follow
 
 from skillframe.demonstration.record import Demonstration
+from skillframe.execution.prepare import load_robot_model, load_world
 from skillframe.extend.records import Document, Illustration, LearnOptions, RowResult, RowRun
 from skillframe.extend.registry import registry
 from skillframe.frames import Float, matrix_from_quaternion, rotation_vector
-from skillframe.run.prepare import load_robot_model, load_world
 from skillframe.teaching.sessions import record
 from skillframe.teaching.teacher import TeacherSettings
 from skillframe_papers.bars import judged, reached, undecided
@@ -260,7 +260,7 @@ def _picture(job: RowRun, name: str) -> Illustration:
     """Figure 17b: phases of two demonstrations over time, and where they truly change."""
     from matplotlib.figure import Figure
 
-    from skillframe.report.drawing import BLUE, GREEN, INK, RED, svg
+    from skillframe.reports.drawing import BLUE, GREEN, INK, RED, svg
 
     key, groups = _key(job), _groups(job)
     taught = _taught(key, 2000 + job.seed, groups * EACH, name)

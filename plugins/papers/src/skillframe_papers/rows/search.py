@@ -156,7 +156,7 @@ def _curves(tried: dict[tuple[str, str], Tried]) -> Illustration:
     import numpy as np
     from matplotlib.figure import Figure
 
-    from skillframe.report.drawing import BLUE, GREEN, GREY, RED, svg
+    from skillframe.reports.drawing import BLUE, GREEN, GREY, RED, svg
 
     figure = Figure(figsize=(7.4, 3.4))
     colours = {"random walk": GREY, "samples, tour": BLUE, "ergodic": RED, "spiral": GREEN}

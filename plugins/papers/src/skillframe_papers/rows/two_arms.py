@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from skillframe_dualarm.document import Arm, Phase, configured, relative
 
+from skillframe.execution.prepare import load_robot_model, load_world
 from skillframe.extend.records import Illustration, RowResult, RowRun
-from skillframe.run.prepare import load_robot_model, load_world
 from skillframe_papers.rows.insertion import POSTURES, PUBLISHED, Row, insert, largest
 
 NAMES = ("A", "B", "C", "D", "E", "E*")
@@ -230,7 +230,7 @@ def _picture(sweep: Sweep) -> Illustration:
     """Table I as bars: published, and ours with and without joint friction."""
     from matplotlib.figure import Figure
 
-    from skillframe.report.drawing import BLUE, GREY, INK, RED, svg
+    from skillframe.reports.drawing import BLUE, GREY, INK, RED, svg
 
     figure = Figure(figsize=(7.0, 3.8))
     canvas = figure.add_subplot()

@@ -1,0 +1,1 @@
+"""What ships of `skillframe.execution.drive.Drive`, and which one a run takes."""

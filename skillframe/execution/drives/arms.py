@@ -1,0 +1,271 @@
+"""Several arms: each has its own sensors, filter, impedance law, limits and trace, and knows nothing of the others.
+
+Between them stands the coordinator alone, which sees (N, arms, ...) and answers with a command for every arm. Inside
+there is a row per trial and arm (row = trial * arms + arm), so an arm is controlled exactly as it would be alone.
+The first arm holds the scene's tool, the second its fixture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.control.endings import Broken
+from skillframe.errors import SkillframeError
+from skillframe.execution.drive import Shares, Trials
+from skillframe.execution.drives.plants import varied_plants
+from skillframe.execution.drives.torque import Gauge, TorqueDrive
+from skillframe.execution.recorder import Recorder
+from skillframe.execution.result import ArmsResult, Result
+from skillframe.execution.setup import Setup
+from skillframe.execution.trace import Trace
+from skillframe.frames import Float, Pose, norm, rotation_vector
+from skillframe.skill import Command, Impedance, Observation
+from skillframe.world.plant import Draws, Kinematics
+from skillframe.world.sensors import Sensors
+
+__all__ = ["ArmsDrive", "SeveralArms"]
+
+
+class SeveralArms:
+    """The arms of N robots as rows of one limb: a `skillframe.execution.drives.torque.Limb`.
+
+    Args:
+        setup: robot, scene and settings; a centre of compliance for all arms, or one for each.
+        draws: quantities per trial.
+        rngs: one generator per trial, for the sensors.
+
+    Attributes:
+        arms: their number; views: the plant as each arm sees it; points: (arms, 3) centres of compliance.
+        path: (N, arms, joints) way that each joint went.
+    """
+
+    def __init__(self, setup: Setup, draws: Draws, rngs: Sequence[np.random.Generator]) -> None:
+        self.count = len(rngs)
+        self.plant, self.nominal = varied_plants(setup, draws, self.count)
+        self.views = self.plant.arms()
+        self.nominal_views = self.nominal.arms() if self.nominal is not self.plant else self.views
+        self.dofs: Sequence[NDArray[np.int64]] | None = [view.dofs for view in self.views]
+        self.arms = len(self.views)
+        if len({len(view.dofs) for view in self.views}) > 1:
+            raise SkillframeError(f"robot {setup.robot.spec.name}: its arms differ in their number of joints")
+        self.points = np.broadcast_to(np.asarray(setup.center_of_compliance, dtype=float), (self.arms, 3))
+        self.point, self.rows = np.tile(self.points, (self.count, 1)), self.count * self.arms
+        self.dt = 1.0 / setup.robot.spec.control.rate_hz
+        self.path = np.zeros((self.count, self.arms, len(self.views[0].dofs)))
+        self.sensors: Gauge = _ArmSensors(self, setup, rngs, draws)
+
+    def by_arm(self, parts: Sequence[Float]) -> Float:
+        """(N, arms, ...) out of one (N, ...) per arm; in C order, or rounding would depend on N."""
+        result = np.empty((self.count, self.arms, *parts[0].shape[1:]))
+        for arm, part in enumerate(parts):
+            result[:, arm] = part
+        return result
+
+    def as_rows(self, parts: Sequence[Float]) -> Float:
+        """(N arms, ...) out of one (N, ...) per arm."""
+        stacked = self.by_arm(parts)
+        return stacked.reshape(self.rows, *stacked.shape[2:])
+
+    def kinematics(self, active: Trials) -> Kinematics:
+        """Rows of the nominal robots where the plant's are now; each with its own arm's joints."""
+        views = self.views
+        if self.nominal is not self.plant:
+            qpos, qvel = self.plant.state
+            self.nominal.set_state(qpos, qvel, active)
+            views = self.nominal_views
+        found = [view.kinematics(point) for view, point in zip(views, self.points, strict=True)]
+        return Kinematics(
+            Pose(self.as_rows([k.pose.position for k in found]), self.as_rows([k.pose.rotation for k in found])),
+            self.as_rows([k.jacobian[..., v.dofs] for k, v in zip(found, views, strict=True)]),
+            self.as_rows([k.bias[:, v.dofs] for k, v in zip(found, views, strict=True)]),
+            self.as_rows([k.velocity[:, v.dofs] for k, v in zip(found, views, strict=True)]),
+        )
+
+    def mass_matrix(self) -> Float:
+        """(rows, joints, joints) of the nominal robots."""
+        whole = self.nominal.mass_matrix()
+        return self.as_rows([whole[:, view.dofs][:, :, view.dofs] for view in self.views])
+
+    def joint_positions(self) -> Float:
+        """(rows, joints)."""
+        positions = self.plant.joint_positions
+        return self.as_rows([positions[:, view.dofs] for view in self.views])
+
+    def push(self, torque: Float, active: Trials) -> list[Broken]:
+        """Move the plant by a tick under joint torques (rows, joints); nothing fails."""
+        whole = np.zeros((self.count, self.plant.model.nv))
+        _, velocity = self.plant.state
+        for arm, view in enumerate(self.views):
+            whole[:, view.dofs] = torque[arm :: self.arms]
+            self.path[active, arm] += np.abs(velocity[:, view.dofs])[active] * self.dt
+        self.plant.step(whole, active)
+        return []
+
+    def turns(self) -> Float:
+        """(N, arms, 3, 3) attitudes of the tools, base axes."""
+        return self.by_arm([view.tool_pose().rotation for view in self.views])
+
+
+class ArmsDrive:
+    """Arms under an impedance law each; observations, commands and wrenches are (N, arms, ...).
+
+    Args:
+        setup, draws, rngs: as of `SeveralArms`.
+    """
+
+    actuators: tuple[str, ...] = ()
+
+    def __init__(self, setup: Setup, draws: Draws, rngs: Sequence[np.random.Generator]) -> None:
+        self.limb = SeveralArms(setup, draws, rngs)
+        self.rows = TorqueDrive(setup, self.limb)
+        self.plant, self.dt = self.limb.plant, self.rows.dt
+        self.shape = (self.limb.count, self.limb.arms)
+        self.names = tuple(arm.name for arm in setup.robot.spec.arm)[: self.limb.arms]
+        self.turned = np.zeros((*self.shape, 3))
+        self.start_rotation = self.limb.turns()
+        self._recording: _ArmRecording | None = None
+
+    def prepare(self) -> list[Broken]:
+        """Both arms hold still and tare their sensors."""
+        return self.rows.prepare()
+
+    def sense(self, tick: int, active: Trials) -> Observation:
+        """What the arms' sensors say, (N, arms, ...)."""
+        seen = self.rows.sense(tick, active)
+        return Observation(
+            seen.time.reshape(self.shape), seen.dt,
+            Pose(seen.pose.position.reshape(*self.shape, 3), seen.pose.rotation.reshape(*self.shape, 3, 3)),
+            seen.twist.reshape(*self.shape, 6), seen.wrench.reshape(*self.shape, 6),
+        )  # fmt: skip
+
+    def act(self, command: Command, ramp: float) -> Float:
+        """Each arm's command to its law; the laws' wrenches (N, arms, 6)."""
+        law = self.rows.act(
+            command._replace(
+                pose=Pose(command.pose.position.reshape(-1, 3), command.pose.rotation.reshape(-1, 3, 3)),
+                twist=command.twist.reshape(-1, 6), feedforward=command.feedforward.reshape(-1, 6),
+                impedance=self._impedance_rows(command.impedance),
+            ),
+            ramp,
+        )  # fmt: skip
+        return law.reshape(*self.shape, 6)
+
+    def _impedance_rows(self, impedance: Impedance) -> Impedance:
+        def rows(gain: Float) -> Float:
+            return np.broadcast_to(gain, (*self.shape, 6, 6)).reshape(-1, 6, 6)
+
+        return Impedance(rows(impedance.stiffness), None if impedance.damping is None else rows(impedance.damping))
+
+    def violations(self, tick: int, active: Trials) -> list[Broken]:
+        """Trials of which an arm broke a limit, with the arm's name."""
+        arms = self.limb.arms
+        found = self.rows.violations(tick, (active[:, None] * arms + np.arange(arms)).ravel())
+        return [Broken(row // arms, code, f"arm {self.names[row % arms]!r}: {why}") for row, code, why in found]
+
+    def advance(self, active: Trials) -> list[Broken]:
+        """The plant moves under the arms' torques."""
+        return self.rows.advance(active)
+
+    def end(self, rows: Trials) -> None:
+        """Keep how far each tool has turned."""
+        now = self.limb.turns()
+        self.turned[rows] = rotation_vector(now @ np.swapaxes(self.start_rotation, -1, -2))[rows]
+
+    def contact_torque(self) -> Float:
+        """(N,) largest of the arms' [Nm]."""
+        parts = zip(self.limb.views, self.limb.points, strict=True)
+        largest: Float = np.max([norm(view.contact_wrench(point)[:, 3:]) for view, point in parts], axis=0)
+        return largest
+
+    def shares(self) -> Shares:
+        """Energy of all arms, shares of the worst joint of any arm."""
+        energy, torque, speed = (part.reshape(self.shape) for part in self.rows.shares())
+        return Shares(energy.sum(-1), torque.max(-1), speed.max(-1))
+
+    def notes(self, i: int) -> list[str]:
+        """Whose motors count as unlimited."""
+        return self.rows.notes(i)
+
+    def recording(self, every: int) -> _ArmRecording:
+        """A recorder per arm."""
+        parts = zip(self.limb.views, self.limb.points, strict=True)
+        recorders = [Recorder(view, every, point) for view, point in parts]
+        self._recording = _ArmRecording(recorders, self.names, self.limb.points)
+        return self._recording
+
+    def outcome(self, result: Result) -> ArmsResult:
+        """With what each arm did."""
+        plain = {f.name: getattr(result, f.name) for f in fields(Result)}
+        traces = None if self._recording is None else self._recording.by_arm
+        return ArmsResult(
+            **plain, arms=self.names, joint_path_rad=self.limb.path, turned_rad=self.turned, arm_traces=traces
+        )
+
+
+class _ArmSensors:
+    """One set of sensors per arm, read as rows; each arm draws from a generator of its own."""
+
+    def __init__(self, limb: SeveralArms, setup: Setup, rngs: Sequence[np.random.Generator], draws: Draws) -> None:
+        self._limb, self._arms = limb, limb.arms
+        children = [rng.spawn(limb.arms) for rng in rngs]
+        self._sensors = [
+            Sensors(setup.sensors, view, [trial[arm] for trial in children], draws)
+            for arm, view in enumerate(limb.views)
+        ]
+
+    def sample(self, pose: Pose) -> tuple[Pose, Float]:
+        """As `Sensors.sample`, for rows."""
+        read = [
+            sensors.sample(Pose(pose.position[arm :: self._arms], pose.rotation[arm :: self._arms]))
+            for arm, sensors in enumerate(self._sensors)
+        ]
+        rows = self._limb.as_rows
+        measured = Pose(rows([p.position for p, _ in read]), rows([p.rotation for p, _ in read]))
+        return measured, rows([wrench for _, wrench in read])
+
+    def set_tare(self, mean: Float, rotation: Float) -> None:
+        """As `Sensors.set_tare`, for rows."""
+        for arm, sensors in enumerate(self._sensors):
+            sensors.set_tare(mean[arm :: self._arms], rotation[arm :: self._arms])
+
+
+class _ArmRecording:
+    """One recorder per arm.
+
+    Attributes:
+        by_arm: the traces of the trials asked for so far, by the arm's name.
+    """
+
+    def __init__(self, recorders: Sequence[Recorder], names: Sequence[str], points: Float) -> None:
+        self._recorders, self._names, self._points = recorders, names, points
+        self.by_arm: list[dict[str, Trace]] = []
+
+    def record(self, tick: int, time: float, observation: Observation, command: Command, law: Float) -> None:
+        """As `Recorder.record`, for (N, arms, ...)."""
+        for arm, recorder in enumerate(self._recorders):
+            seen = Observation(
+                observation.time[:, arm], observation.dt,
+                Pose(observation.pose.position[:, arm], observation.pose.rotation[:, arm]),
+                observation.twist[:, arm], observation.wrench[:, arm],
+            )  # fmt: skip
+            pose = Pose(command.pose.position[:, arm], command.pose.rotation[:, arm])
+            recorder.record(tick, time, seen, command._replace(pose=pose), law[:, arm])
+
+    def close(self, rows: Trials) -> None:
+        """As `Recorder.close`, for trials."""
+        for recorder in self._recorders:
+            recorder.close(rows)
+
+    def trace(self, i: int, meta: dict[str, Any]) -> Trace:
+        """The first arm's trace of trial i; those of all arms are kept in `by_arm`, trial by trial."""
+        parts = zip(self._names, self._recorders, self._points, strict=True)
+        self.by_arm.append({
+            name: recorder.trace(i, {**meta, "arm": name, "center_of_compliance": point.tolist()})
+            for name, recorder, point in parts
+        })  # fmt: skip
+        return self.by_arm[-1][self._names[0]]

@@ -1,0 +1,308 @@
+"""Hydraulic machines: cylinders as co-simulated FMUs between command and plant.
+
+    encoders, pressures -> filters -> force estimate -> Observation -> skill.step -> Command
+        -> hydraulic law -> valve commands -> FMUs and plant, coupled by `cosim`
+
+Before the skill starts the machine swings in the air for some seconds, an explicit step in which friction and payload
+are identified; from then on they are held. There is no force sensor: what the skill sees as wrench is the estimate from
+chamber pressures, and the pose is that of the filtered encoders. The machine moves its tool in a plane; the attitude of
+the tool follows from its joints and is not commanded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from skillframe.control.endings import Broken, Ended
+from skillframe.control.limits import LimitGuard
+from skillframe.errors import InputError
+from skillframe.execution.drive import Shares, Trials
+from skillframe.execution.drives.actuated import Actuated
+from skillframe.execution.drives.machine_reference import LEAST_DAMPING, plane_reference
+from skillframe.execution.drives.machine_start import closed_configurations, holding_force
+from skillframe.execution.drives.recording import WithColumns
+from skillframe.execution.recorder import Recorder
+from skillframe.execution.result import Result
+from skillframe.execution.setup import Setup
+from skillframe.fmu.unmapped import unmapped
+from skillframe.frames import Float, Pose, norm
+from skillframe.machine.checks.figures import CYLINDER
+from skillframe.machine.checks.holding import require_held
+from skillframe.machine.columns import EnergyBill, columns, supply_pressures
+from skillframe.machine.cylinder.bank import banks, foreign_specs, instance_parameters
+from skillframe.machine.force.calibration import CALIBRATION_S, SETTLE_S, hold_what_was_found, swing
+from skillframe.machine.force.compiled import CompiledEstimator
+from skillframe.machine.force.findings import findings
+from skillframe.machine.force.load import BelievedLoad
+from skillframe.machine.force.momentum import Estimate, ForceSettings
+from skillframe.machine.force.residual_noise import residual_noise
+from skillframe.machine.force.valve import ValveIdentification, ValveSettings
+from skillframe.machine.law.hydraulic import Demand, HydraulicGains, Measured, Reference, plane_task
+from skillframe.machine.law.hydraulic_compiled import CompiledLaw
+from skillframe.machine.law.vdc_actuator import cylinders
+from skillframe.machine.sensors import MachineSensors
+from skillframe.robot.chain import ClosedChain
+from skillframe.robot.driven import fast_filters
+from skillframe.signals.delay import CommandDelay
+from skillframe.skill import Command, Observation
+from skillframe.world.placement import fixture_poses
+from skillframe.world.plant import Draws, Plant
+
+__all__ = ["MachineDrive"]
+
+VALVES_S = 0.5
+"""So often the swing's rows are fitted again for overlap and supply pressure of the valves (ours)."""
+AT_STOP, WILD = 0.99, 0.5
+"""Opening of a valve at its stop, and the share of the swing for which one may be (ours; at 150 bar and with friction
+by a third too large it is 0.18, of a sound crane 0, and of one whose gains are ten times too large 0.97)."""
+
+
+class MachineDrive:
+    """N hydraulic machines in lock-step.
+
+    Args:
+        setup: robot, scene and settings.
+        draws: quantities per trial.
+        rngs: one generator per trial, for the sensors.
+
+    Raises:
+        InputError: the machine cannot stand at a start.
+        StepTooLarge: the control rate is too low for the load on a cylinder.
+        UnknownName, SkillframeError: as `skillframe.execution.executor.simulate`.
+    """
+
+    def __init__(self, setup: Setup, draws: Draws, rngs: Sequence[np.random.Generator]) -> None:
+        self.setup, self.count, self.dt = setup, len(rngs), 1.0 / setup.robot.spec.control.rate_hz
+        robot, spec = setup.robot, setup.robot.spec
+        self.chain = ClosedChain(robot)
+        self.actuators = tuple(self.chain.actuated)
+        self.task = plane_task(self.chain)
+        first, second = self.task.axes
+        self._plane = slice(first, second + 1, second - first)
+        fixture = fixture_poses(robot, draws, self.count)
+        self.plant = Plant(robot, setup.scene, self.count, fixture, draws, timestep=self.dt)
+        self.plant.reset(closed_configurations(self.chain, self.task, setup.scene, draws, self.count))
+        n, k = len(self.chain.independent), len(self.chain.actuated)
+        self.gauges = MachineSensors(spec.sensors, rngs, n, k, self.dt)
+        self.guard = LimitGuard(setup.limits, self.count, self.dt)
+        self.active = np.arange(self.count)
+        known = cylinders(spec.actuation, spec.folder / "robot.toml")
+        corner, estimate = spec.sensors.corner_hz, ForceSettings()
+        noise = residual_noise(self.chain, known, spec.sensors, estimate.corner, self.dt)
+        estimate = replace(estimate, sensor_corner=corner, row_noise=tuple(noise.tolist()))
+        self.law = CompiledLaw(self.chain, known, HydraulicGains.of(spec), self.count, self.dt)
+        self.estimator = CompiledEstimator(self.chain, known, self.count, self.dt, estimate)
+        self.valves = ValveIdentification(known, self.count, self.dt, ValveSettings(corner=corner))
+        self.bank = banks(spec, self.count)
+        self.actuated = Actuated(self.plant, self.chain.actuated, self.bank, self.dt)
+        self._pressures = [self.bank.outputs.index(f"pressure_{side}") for side in "ab"]
+        self._z = [int(self.plant.model.joint(name).qposadr[0]) for name in self.chain.independent]
+        late = np.asarray(draws.get("actuator.delay", np.zeros(self.count)))
+        self._delay = CommandDelay(np.round(late / self.dt).astype(np.int64), len(known.area_a))
+        self.findings: list[list[str]] = [[] for _ in rngs]
+        meant = [a.unused for a in spec.actuation if a.fmu != CYLINDER]
+        rows = unmapped(foreign_specs(spec), meant, spec.folder)
+        self._unmapped = [text for row in rows for text in row._replace(outputs=()).sentences]
+        self._begin(draws)
+
+    def _begin(self, draws: Draws) -> None:
+        """FMUs in equilibrium with the load, the step judged against it, sensors and law at rest."""
+        z = self._true_z()
+        hold = holding_force(self.chain, z, draws)
+        own = instance_parameters(self.setup.robot.spec, draws, hold)
+        supply = supply_pressures(own, self.law.cylinders.supply_pressure, self.count)
+        require_held(self.setup.robot.spec.actuation, hold, supply, f"robot {self.setup.robot.spec.name}")
+        self.actuated.master.start(0.0, 0.0, own)
+        self._require_pressures()
+        self.bill = EnergyBill(self.bank, supply, self.dt)
+        self.actuated.require_stable()
+        spec = self.setup.robot.spec
+        for problem, fix in fast_filters(spec.sensors, spec.gains, spec.control.rate_hz):
+            raise InputError(f"robot {spec.name}", problem, fix)
+        self.gauges.start(z, *self._true_pressures())
+        self.law.start()
+        self.load = BelievedLoad(self.law, draws, self.count)
+        self.home = self.plant.tool_pose().position[:, self.task.axes].copy()
+        self.joint = z[:, 2:].copy()
+        nothing = np.zeros((self.count, 2))
+        self.estimate = Estimate(nothing, nothing, np.zeros(self.count, dtype=bool), nothing, nothing)
+        self.demand = Demand(*(np.zeros((self.count, len(self.chain.actuated))) for _ in range(3)))
+        self.estimator.start(self._measured())
+
+    def _true_z(self) -> Float:
+        z: Float = self.plant.state[0].take(self._z, axis=1)
+        return z
+
+    def _true_pressures(self) -> tuple[Float, Float]:
+        a, b = (self.bank.y[:, column].reshape(self.count, -1) for column in self._pressures)
+        return a, b
+
+    def _require_pressures(self) -> None:
+        for side, pressure in zip("ab", self._true_pressures(), strict=True):
+            running = self.bank.active.reshape(pressure.shape).astype(bool)
+            for trial, k in np.argwhere(running & ~np.isfinite(pressure))[:1]:
+                where = f"robot {self.setup.robot.spec.name}, {self.chain.actuated[k]}"
+                text = f"its FMU gives no pressure_{side}, from which the force is estimated (trial {trial})"
+                raise InputError(where, text, "map it under outputs of its [[actuation]]")
+
+    def _measured(self) -> Measured:
+        gauges = self.gauges
+        return Measured(gauges.z, gauges.rate, *gauges.pressures, self.estimate.answered, self.estimate.sigma)
+
+    def prepare(self) -> list[Broken]:
+        """Swing in the air and identify friction and payload, then hold what was found."""
+        broken = self.actuated.failed(self.active)
+        self._leave(broken)
+        self.estimator.calibrate(True)
+        stopped = np.zeros(self.count)
+        for tick in range(round((CALIBRATION_S + SETTLE_S) / self.dt)):
+            position, velocity, joint, joint_rate = swing(tick * self.dt)
+            stiff = LEAST_DAMPING * np.broadcast_to(np.eye(2), (self.count, 2, 2))
+            zero = np.zeros((self.count, 2))
+            self._sample()
+            if tick == 0:
+                self._weigh()
+            self._estimate(force_counts=False)
+            self._look_at_valves(tick)
+            self._valve(
+                Reference(
+                    self.home + position, zero + velocity, 6.0 * stiff, stiff, zero, self.joint + joint,
+                    np.zeros_like(self.joint) + joint_rate,
+                )
+            )  # fmt: skip
+            if failed := self.advance(self.active):
+                broken += failed
+                self._leave(failed)
+            stopped += np.abs(self.demand.valve).max(axis=1) > AT_STOP
+            if not len(self.active):
+                break
+        broken += self._wild(stopped / (tick + 1))
+        self.estimator.calibrate(False)
+        hold_what_was_found(self.law, self.estimator.identification)
+        self.findings = findings(self.law, self.load, self.estimator.identification, self.valves)
+        self.bill.start()
+        return broken
+
+    def _leave(self, broken: Sequence[Broken]) -> None:
+        """Trials that failed before the start are not stepped any more."""
+        if broken:
+            rows = np.array([one.row for one in broken])
+            self.active = np.setdiff1d(self.active, rows)
+            self.end(rows)
+
+    def _wild(self, share: Float) -> list[Broken]:
+        """The trials whose valves were at their stops for such shares (N,) of the swing: nothing was identified."""
+        text = "it swings by itself in the air, its valves at their stops for {:.0%} of the time"
+        cure = "lower gains.body, velocity_gain or force_gain in robot.toml"
+        wild = self.active[share[self.active] > WILD]
+        return [Broken(int(i), Ended.MACHINE, f"{text.format(share[i])}; {cure}") for i in wild]
+
+    def _look_at_valves(self, tick: int) -> None:
+        """Identify them, and let the law go by what is known so far: what it learns of inertias depends on it."""
+        self.valves.step(self.demand.valve, self._seen, self.terms)
+        if tick and tick % round(VALVES_S / self.dt) == 0:
+            self.valves.solve()
+            self.law.deadband[:], self.law.supply[:] = self.valves.compensated, self.valves.supply
+
+    def _sample(self) -> None:
+        """Read the sensors, and the model's terms where the machine then is."""
+        self.gauges.sample(self._true_z(), *self._true_pressures())
+        self._seen = self._measured()
+        self.terms = self.law.terms(self._seen)
+
+    def _weigh(self) -> None:
+        """At rest, before the swing: go by the load that the pressures hold if it cannot be what was told."""
+        if self.load.weigh(self._seen, self.terms):
+            self.terms = self.law.terms(self._seen)
+
+    def _estimate(self, force_counts: bool = True) -> None:
+        """The force from what was sampled; in the air it is known to be zero."""
+        estimate = self.estimator.step(self._seen, self.terms)
+        nothing = np.zeros_like(estimate.force)
+        self.estimate = (
+            estimate if force_counts else estimate._replace(sigma=nothing, feedback=nothing, answered=nothing)
+        )
+
+    def _valve(self, reference: Reference) -> None:
+        measured = self._seen._replace(z=self.gauges.now, force=self.estimate.answered, sigma=self.estimate.sigma)
+        self.demand = self.law.step(measured, reference, self.active)
+
+    def sense(self, tick: int, active: Trials) -> Observation:
+        """Pose and twist as the encoders say, wrench as the pressures say."""
+        self.active = active
+        self._sample()
+        self._estimate()
+        self._seen_tool = self._observe(tick * self.dt)
+        return self._seen_tool
+
+    def act(self, command: Command, ramp: float) -> Float:
+        """Valve commands of the law, and equation (1)'s wrench (N, 6) for limits and trace, returned."""
+        reference, self._wrench = plane_reference(command, self._seen_tool, ramp, self._plane, self.joint)
+        self._valve(reference)
+        return self._wrench
+
+    def violations(self, tick: int, active: Trials) -> list[Broken]:
+        """The robot's limits, held to the estimate, and the energy that the coupling makes."""
+        seen = self._seen_tool
+        broken = self.guard.violations(seen.pose.position, seen.twist, seen.wrench, self._wrench, active)
+        return [*broken, *self.actuated.violations(tick, active)]
+
+    def _observe(self, time: float) -> Observation:
+        """Pose and twist as the encoders say, wrench as the pressures say."""
+        tool, plane = self.plant.tool_pose(), self._plane
+        position = tool.position.copy()
+        position[:, plane] = self.terms.tip + self.gauges.lag * self.terms.tip_rate
+        twist, wrench = np.zeros((self.count, 6)), np.zeros((self.count, 6))
+        twist[:, plane], wrench[:, plane] = self.terms.tip_rate, self.estimate.feedback
+        return Observation(np.full(self.count, time), self.dt, Pose(position, tool.rotation.copy()), twist, wrench)
+
+    def _read(self, observation: Observation) -> Observation:
+        """The same with the force as it is now, for the record; a skill that answers the force sees it late."""
+        wrench = observation.wrench.copy()
+        wrench[:, self.task.axes] = self.estimate.force
+        return observation._replace(wrench=wrench)
+
+    def advance(self, active: Trials) -> list[Broken]:
+        """One coupled step under the valve commands; trials whose FMU failed, each with its sentence."""
+        self.bill.step(self.actuated.plant.velocity)
+        return self.actuated.step(self._delay.step(self.demand.valve), active)
+
+    def end(self, rows: Trials) -> None:
+        """Their FMUs are not stepped any more."""
+        self.actuated.end(rows)
+
+    def contact_torque(self) -> Float:
+        """(N,) at the tool frame's origin [Nm]."""
+        return norm(self.plant.contact_wrench(self.setup.center_of_compliance)[:, 3:])
+
+    def shares(self) -> Shares:
+        """Cylinders have no motors whose shares would be known."""
+        unknown = np.full(self.count, np.nan)
+        return Shares(self.guard.energy, unknown, unknown)
+
+    def notes(self, i: int) -> list[str]:
+        """What law, FMUs and identification have to say."""
+        return [*self.law.notes, *self.bank.notes, *self._unmapped, *self.findings[i]]
+
+    def recording(self, every: int) -> WithColumns:
+        """A recorder with the machine's columns, and the force as it is now."""
+        point = np.asarray(self.setup.center_of_compliance, dtype=float)
+        recorder = Recorder(self.plant, every, point, machine=columns(len(self.actuators)))
+        return WithColumns(recorder, self._columns, self._read)
+
+    def outcome(self, result: Result) -> Result:
+        """As it is."""
+        return result
+
+    def _columns(self) -> dict[str, Float]:
+        pressure_a, pressure_b = self.gauges.pressures
+        return {
+            "pressure_a": pressure_a, "pressure_b": pressure_b, "valve": self.demand.valve,
+            "piston_force": self.demand.present - self.estimator.friction(self.terms),
+            "piston_force_true": self.actuated.force, "force_sigma": self.estimate.sigma,
+            "force_valid": self.estimate.valid.astype(float),
+            "energy_supply": self.bill.supply, "energy_pistons": self.bill.pistons,
+        }  # fmt: skip

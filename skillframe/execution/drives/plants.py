@@ -1,0 +1,22 @@
+"""The plants of a batch: the truth, and the nominal one that a controller knows."""
+
+from __future__ import annotations
+
+from skillframe.execution.setup import Setup
+from skillframe.world.placement import fixture_poses, start_configurations
+from skillframe.world.plant import Draws, Plant
+
+
+def varied_plants(setup: Setup, draws: Draws, count: int) -> tuple[Plant, Plant]:
+    """The plant at its starts, and the controller's nominal one: the same object where nothing of the robot differs.
+
+    Raises:
+        UnreachablePose: the robot cannot reach a start.
+    """
+    robot, scene, dt = setup.robot, setup.scene, 1.0 / setup.robot.spec.control.rate_hz
+    fixture = fixture_poses(robot, draws, count)
+    plant = Plant(robot, scene, count, fixture, draws, timestep=dt)
+    differs = any(key.startswith("grasp.") or key in ("robot.mass_scale", "robot.payload") for key in draws)
+    nominal = Plant(robot, scene, count, fixture, {}, timestep=dt) if differs else plant
+    plant.reset(start_configurations(robot, scene, draws, count))
+    return plant, nominal

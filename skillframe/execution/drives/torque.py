@@ -1,0 +1,214 @@
+"""Ideal joint torques: sensors, filter, impedance law, motors and limits of arms, and a plant that takes their torques.
+
+    encoders, force sensor -> filter -> Observation -> skill -> Command -> impedance -> motors -> torque -> plant
+
+The law knows the nominal robot only: where masses or the grasp differ from trial to trial, its kinematics and dynamics
+come from a second, nominal batch. What it steers is a `Limb`: one arm, or the rows of several.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.control.controller import ImpedanceController, Reading
+from skillframe.control.endings import Broken
+from skillframe.control.limits import LimitGuard
+from skillframe.control.motors import Motors, joint_limits
+from skillframe.execution.drive import Shares, Trials
+from skillframe.execution.drives.plants import varied_plants
+from skillframe.execution.recorder import Recorder
+from skillframe.execution.result import Result
+from skillframe.execution.setup import Setup
+from skillframe.frames import Float, Pose, norm
+from skillframe.signals.kalman import WrenchFilter
+from skillframe.skill import Command, Impedance, Observation, no_reasons
+from skillframe.world.plant import Draws, Kinematics, Plant
+from skillframe.world.sensors import TARE_TICKS, Sensors, at_point
+
+HOLD = Impedance(np.diag([2000.0] * 3 + [100.0] * 3))
+
+
+class Gauge(Protocol):
+    """Pose and force-torque sensor of a limb, as `skillframe.world.sensors.Sensors`."""
+
+    def sample(self, pose: Pose) -> tuple[Pose, Float]:
+        """Measured pose, and the wrench (rows, 6) without weight and tare."""
+
+    def set_tare(self, mean: Float, rotation: Float) -> None:
+        """Take the mean wrench (rows, 6) of a still moment as the bias."""
+
+
+class Limb(Protocol):
+    """What a torque law senses and moves.
+
+    Attributes:
+        plant: the simulated robots.
+        rows: number of rows: a trial's, or a trial's and arm's.
+        point: centre of compliance in the tool frame, (3,) or (rows, 3).
+        sensors: of the tool.
+        dofs: generalised velocities of each arm's rows; None where a row has them all.
+    """
+
+    plant: Plant
+    rows: int
+    point: Float
+    sensors: Gauge
+    dofs: Sequence[NDArray[np.int64]] | None
+
+    def kinematics(self, active: Trials) -> Kinematics:
+        """Of the nominal robots where the plant's are now."""
+
+    def mass_matrix(self) -> Float:
+        """(rows, nv, nv) of the nominal robots."""
+
+    def joint_positions(self) -> Float:
+        """(rows, nv)."""
+
+    def push(self, torque: Float, active: Trials) -> list[Broken]:
+        """Move the plant by a tick under joint torques (rows, nv); trials whose actuators failed."""
+
+
+class TorqueDrive:
+    """A limb under an impedance law; its observations, commands and wrenches have the limb's rows.
+
+    Args:
+        setup: robot, scene and settings.
+        limb: what is steered.
+    """
+
+    actuators: tuple[str, ...] = ()
+
+    def __init__(self, setup: Setup, limb: Limb) -> None:
+        self.limb, self.plant, self.rows = limb, limb.plant, limb.rows
+        self.dt = 1.0 / setup.robot.spec.control.rate_hz
+        self.filter = WrenchFilter(dt=self.dt).steady() if setup.filter_wrench else None
+        self.controller = ImpedanceController(self.rows)
+        limits = joint_limits(setup.robot, self.plant.model, limb.dofs)
+        rate = setup.limits.torque_rate_nm_s
+        self.motors = Motors(limits, rate, self.rows, self.dt) if limits else None
+        self.guard = LimitGuard(setup.limits, self.rows, self.dt, self.motors)
+
+    def prepare(self) -> list[Broken]:
+        """Hold still, let the readings settle, and take their mean as the sensor's bias."""
+        active = np.arange(self.plant.count)
+        kinematics = self.limb.kinematics(active)
+        hold = Pose(kinematics.pose.position.copy(), kinematics.pose.rotation.copy()).at(self.limb.point)
+        still = np.zeros((self.rows, 6))
+        command = Command(hold, still, HOLD, still, np.zeros(self.rows, dtype=np.int64), no_reasons(self.rows))
+        total = still.copy()
+        broken: list[Broken] = []
+        for _ in range(TARE_TICKS):
+            kinematics = self.limb.kinematics(active)
+            pose, wrench = self.limb.sensors.sample(kinematics.pose)
+            total += wrench
+            self._reading = self._read(kinematics, pose.at(self.limb.point))
+            self.act(command, 1.0)
+            broken += self.limb.push(self._torque, active)
+            active = np.setdiff1d(active, [one.row for one in broken]) if broken else active
+        self.limb.sensors.set_tare(total / TARE_TICKS, self.limb.kinematics(active).pose.rotation)
+        return broken
+
+    def sense(self, tick: int, active: Trials) -> Observation:
+        """Pose and twist of the centre of compliance, and the filtered wrench there."""
+        kinematics = self.limb.kinematics(active)
+        tool, raw = self.limb.sensors.sample(kinematics.pose)
+        self._position = tool.position
+        self._wrench = at_point(self._filtered(raw, tick), tool.rotation, self.limb.point)
+        self._reading = self._read(kinematics, tool.at(self.limb.point))
+        time = np.full(self.rows, tick * self.dt)
+        return Observation(time, self.dt, self._reading.pose, self._reading.twist, self._wrench)
+
+    def act(self, command: Command, ramp: float) -> Float:
+        """Joint torques that the motors give, and the law's wrench (rows, 6), returned."""
+        self._torque, self._law = self.controller.torque(command, self._reading, ramp)
+        if self.motors is not None:
+            self._torque = self.motors.held(self._torque, self._reading.velocity, self.limb.joint_positions())
+        return self._law
+
+    def violations(self, tick: int, active: Trials) -> list[Broken]:
+        """Rows among `active` that broke one of the robot's limits."""
+        return self.guard.violations(self._position, self._reading.twist, self._wrench, self._law, active)
+
+    def advance(self, active: Trials) -> list[Broken]:
+        """The plant moves under the torques; ideal motors do not fail."""
+        return self.limb.push(self._torque, active)
+
+    def end(self, rows: Trials) -> None:
+        """Nothing is kept of how a trial ends."""
+
+    def contact_torque(self) -> Float:
+        """(N,) [Nm]."""
+        return norm(self.plant.contact_wrench(self.limb.point)[:, 3:])
+
+    def shares(self) -> Shares:
+        """(rows,) each."""
+        unknown = np.full(self.rows, np.nan)
+        torque, speed = (unknown, unknown) if self.motors is None else self.motors.shares()
+        return Shares(self.guard.energy, torque, speed)
+
+    def notes(self, i: int) -> list[str]:
+        """Whose motors count as unlimited."""
+        silent = "" if self.motors is None else self.motors.silent()
+        return [silent] if silent else []
+
+    def recording(self, every: int) -> Recorder:
+        """A plain recorder."""
+        return Recorder(self.plant, every, self.limb.point)
+
+    def outcome(self, result: Result) -> Result:
+        """As it is."""
+        return result
+
+    def _filtered(self, raw: Float, tick: int) -> Float:
+        if self.filter is None:
+            return raw
+        if tick == 0:
+            self.filter.start(raw * 0.0)
+        return self.filter.step(raw)
+
+    def _read(self, kinematics: Kinematics, measured: Pose) -> Reading:
+        twist = (kinematics.jacobian @ kinematics.velocity[..., None])[..., 0]
+        velocity = kinematics.velocity
+        return Reading(measured, twist, kinematics.jacobian, kinematics.bias, velocity, self.limb.mass_matrix)
+
+
+class OneArm:
+    """A robot's own arm, or a free-flying tool, whose joints take any torque at once: a `Limb`.
+
+    Args:
+        setup: robot, scene and settings.
+        draws: quantities per trial.
+        rngs: one generator per trial, for the sensors.
+    """
+
+    dofs: Sequence[NDArray[np.int64]] | None = None
+
+    def __init__(self, setup: Setup, draws: Draws, rngs: Sequence[np.random.Generator]) -> None:
+        self.rows = len(rngs)
+        self.plant, self.nominal = varied_plants(setup, draws, self.rows)
+        self.point = np.asarray(setup.center_of_compliance, dtype=float)
+        self.sensors: Gauge = Sensors(setup.sensors, self.plant, rngs, draws)
+
+    def kinematics(self, active: Trials) -> Kinematics:
+        """Of the nominal robots where the plant's are now."""
+        if self.nominal is not self.plant:
+            qpos, qvel = self.plant.state
+            self.nominal.set_state(qpos, qvel, active)
+        return self.nominal.kinematics(self.point)
+
+    def mass_matrix(self) -> Float:
+        """(N, nv, nv) of the nominal robots."""
+        return self.nominal.mass_matrix()
+
+    def joint_positions(self) -> Float:
+        """(N, nv)."""
+        return self.plant.joint_positions
+
+    def push(self, torque: Float, active: Trials) -> list[Broken]:
+        """Move the plant by a tick under generalised forces (N, nv); nothing fails."""
+        self.plant.step(torque, active)
+        return []

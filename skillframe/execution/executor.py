@@ -1,0 +1,269 @@
+"""The only loop: N trials of one skill in lock-step, from observation to plant, a thousand times a second.
+
+    drive.sense -> Observation -> skill.step -> Command -> drive.act -> limits -> drive.advance
+
+One run is N = 1, a campaign's chunk is N = 32 ... 256, and a trial's result does not depend, to the last bit, on which
+others run beside it. What stands between a command and the plant is a `skillframe.execution.drive.Drive`: joint
+torques, several arms, electric servos, a hydraulic machine. The loop knows none of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.control.contact import TrueContact, over
+from skillframe.control.endings import Broken, Ended
+from skillframe.execution.drive import Drive
+from skillframe.execution.drives.choose import chosen_drive
+from skillframe.execution.result import Result
+from skillframe.execution.setup import Setup
+from skillframe.frames import Float
+from skillframe.handover import SLOW_TICKS, CommandCheck, Fault, asked, shown, unknown_end
+from skillframe.skill import Command, Observation, Skill, Status, no_reasons
+from skillframe.world.intrusion import LinkIntrusion
+from skillframe.world.quantities import QUANTITIES
+from skillframe.world.rates import ratio
+
+__all__ = ["QUANTITIES", "Loop", "Result", "Setup", "begin", "simulate"]
+
+RAMP_S = 0.05
+
+
+def simulate(
+    skill: Skill,
+    setup: Setup,
+    draws: Mapping[str, Float],
+    rngs: Sequence[np.random.Generator],
+    *,
+    duration_s: float = 20.0,
+    trace_hz: float | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Result:
+    """Run a skill on len(rngs) trials until each has ended.
+
+    What drives the robot follows from its robot.toml and the scene (`skillframe.execution.drives.choose`). Where a second
+    arm holds the scene's fixture, a coordinator runs both arms, and a skill runs the first while the second stands still.
+
+    Args:
+        skill: what to run; `start` is called once.
+        setup: robot, scene and settings.
+        draws: quantities of `QUANTITIES` per trial, each (N,); absent ones are nominal.
+        rngs: one generator per trial; sensors and skill draw from children of it.
+        duration_s: simulated seconds after which a trial is stopped.
+        trace_hz: rate of the traces; None keeps none.
+        progress: called every 10 ms of simulated time with the seconds simulated.
+
+    Raises:
+        UnknownName: a quantity that nothing reads.
+        UnreachablePose: the robot cannot reach a start.
+        SkillframeError: rates that do not divide.
+    """
+    with np.errstate(invalid="ignore", over="ignore"):  # a diverging trial is the limits' business, not a warning
+        loop = begin(skill, setup, draws, rngs, trace_hz)
+        loop.prepare()
+        loop.run(duration_s, progress)
+        return loop.result()
+
+
+def begin(
+    skill: Skill, setup: Setup, draws: Mapping[str, Float], rngs: Sequence[np.random.Generator],
+    trace_hz: float | None = None,
+) -> Loop:  # fmt: skip
+    """The loop of len(rngs) trials at their starts, before its drive is prepared; arguments as `simulate`."""
+    children = [rng.spawn(2) for rng in rngs]
+    skill, drive = chosen_drive(skill, setup, draws, [pair[0] for pair in children])
+    return Loop(skill, setup, drive, [pair[1] for pair in children], trace_hz)
+
+
+class Loop:
+    """The state of one batch while it runs.
+
+    Args:
+        skill: what runs, with a row per trial, or per trial and arm, as the drive senses.
+        setup: robot, scene and settings.
+        drive: at the trials' starts.
+        rngs: one generator per trial, for the skill.
+        trace_hz: rate of the traces; None keeps none.
+    """
+
+    def __init__(
+        self, skill: Skill, setup: Setup, drive: Drive, rngs: Sequence[np.random.Generator], trace_hz: float | None
+    ) -> None:
+        count = len(rngs)
+        self.skill, self.setup, self.drive, self.count, self.skill_rngs = skill, setup, drive, count, rngs
+        self.plant, self.dt = drive.plant, drive.dt
+        self.intrusion = LinkIntrusion(self.plant)
+        self.contact = TrueContact(setup.robot.spec.limits, count, self.dt)
+        self.faults: list[Fault] = []
+        self.active = np.arange(count)
+        self.reason, self.status = no_reasons(count), np.zeros(count, dtype=np.int64)
+        self.limited = np.zeros(count, dtype=bool)
+        self.duration, self.ended_by = np.zeros(count), no_reasons(count)
+        self.filtered, self.torque_share, self.speed_share, self.way = (np.full(count, np.nan) for _ in range(4))
+        self.goal, self.errors, self.energy = np.zeros(count, dtype=bool), np.zeros((count, 2)), np.zeros(count)
+        rate = setup.robot.spec.control.rate_hz
+        self.recorder = None if trace_hz is None else drive.recording(ratio(rate, trace_hz, "control", "the trace"))
+        self.interrupted = False
+
+    def prepare(self) -> None:
+        """Tare, or identify; trials that cannot run end before their start."""
+        self._end_failed(self.drive.prepare(), 0.0)
+
+    def run(self, duration_s: float, progress: Callable[[float], None] | None) -> None:
+        """Tick until every trial has ended or the time is up."""
+        ticks = round(duration_s / self.dt)
+        tick = 0
+        try:
+            for tick in range(ticks):
+                self._tick(tick)
+                if not len(self.active):
+                    return
+                if progress is not None and tick % SLOW_TICKS == 0:
+                    progress(tick * self.dt)
+        except KeyboardInterrupt:
+            self.interrupted = True
+            self._end(self.active, tick * self.dt, "interrupted", True, Ended.INTERRUPTED)
+        if len(self.active):
+            self._end_broken(self.contact.look(self.active), ticks * self.dt)
+            text = f"time limit: {duration_s:g} s of simulated time are over"
+            self._end(self.active, ticks * self.dt, text, False, Ended.TIME)
+
+    def _tick(self, tick: int) -> None:
+        time = tick * self.dt
+        observation = self.drive.sense(tick, self.active)
+        command = self._ask(tick, observation)
+        law = self.drive.act(command, min(1.0, time / RAMP_S))
+        self._feel(observation.wrench)
+        if self.recorder is not None:
+            self.recorder.record(tick, time, observation, command, law)
+        self._stop_where_due(tick, time, command)
+        if len(self.active):
+            self._end_failed(self.drive.advance(self.active), time)
+
+    def _ask(self, tick: int, observation: Observation) -> Command:
+        seen = shown(observation)
+        if tick == 0:
+            self.check = CommandCheck(self.skill, observation.time.shape)
+            asked(self.skill, self.skill.start, seen, self.skill_rngs)
+        command = asked(self.skill, self.skill.step, seen)
+        self.faults = self.check.faults(command, tick)
+        return command
+
+    def _feel(self, wrench: Float) -> None:
+        """Take in the true contact of a tick, and the filtered wrench (N, ..., 6) beside it."""
+        torque = self.drive.contact_torque() if self.contact.wants_torque else None
+        self.contact.step(self.plant.contact_force(), wrench.reshape(-1, 6), torque)
+
+    def _stop_where_due(self, tick: int, time: float, command: Command) -> None:
+        slow, ending = tick % SLOW_TICKS == 0, np.count_nonzero(command.status)
+        self._end_broken([Broken(row, Ended.COMMAND, cause) for row, cause in self.faults], time)
+        broken = self.drive.violations(tick, self.active)
+        if broken or slow or ending:
+            self._end_broken([*broken, *self.contact.look(self.active)], time)
+        if slow and len(self.active):
+            touched = self.intrusion.causes(self.plant, self.active)
+            self._end_broken([Broken(row, Ended.COLLISION, cause) for row, cause in touched], time)
+        if ending:
+            for i in self.active[command.status[self.active] != Status.RUNNING]:
+                self._end_told(int(i), time, int(command.status[i]), command.reason[i])
+        if self.setup.stop_when is not None and slow and len(self.active):
+            done = self.setup.stop_when(self.plant.tip_state())
+            rows = self.active[done[self.active]]
+            self.status[rows] = Status.SUCCESS
+            self._end(rows, time, "done", False, Ended.GOAL)
+
+    def _end_broken(self, broken: Sequence[Broken], time: float) -> None:
+        """End the trials that broke something, each for the first thing that is named."""
+        for row, code, cause in broken:
+            if row in self.active:
+                self._end(np.array([row]), time, f"{cause} (at {time:.3f} s)", True, code)
+
+    def _end_told(self, i: int, time: float, status: int, reason: object) -> None:
+        """End trial i as its skill says."""
+        if wrong := unknown_end(status, reason):
+            self._end_broken([Broken(i, Ended.COMMAND, wrong)], time)
+            return
+        self.status[i] = status
+        self._end(np.array([i]), time, str(reason) or "the skill ended", False, Ended.SKILL)
+
+    def _end_failed(self, failed: Sequence[Broken], time: float) -> None:
+        """End the trials that their actuators leave, in the sentences of these."""
+        for row, code, cause in failed:
+            if row in self.active:
+                self._end(np.array([row]), time, cause, True, code)
+
+    def _end(self, rows: NDArray[np.int64], time: float, reason: str, limit: bool, code: Ended) -> None:
+        """Close trials: judge them by the scene's goal as they stand now, and stop stepping them."""
+        if not len(rows):
+            return
+        state = self.plant.tip_state()
+        self.goal[rows] = self.setup.scene.goal(state)[rows]
+        self.errors[rows] = np.stack(self.setup.scene.goal_error(state), axis=-1)[rows]
+        if self.setup.scene.way is not None:
+            self.way[rows] = self.setup.scene.way.reached(state)[rows]
+        self.duration[rows], self.limited[rows] = time, limit
+        shares = self.drive.shares()
+        self.energy[rows] = shares.energy[rows]
+        self.torque_share[rows], self.speed_share[rows] = shares.torque[rows], shares.speed[rows]
+        self.filtered[rows] = self.contact.estimate[rows]
+        if limit:
+            self.status[rows] = Status.FAILURE
+        for i in rows:
+            self.reason[i], self.ended_by[i] = reason, code.value
+        self.active = np.setdiff1d(self.active, rows)
+        self.drive.end(rows)
+        if self.recorder is not None:
+            self.recorder.close(rows)
+
+    def result(self) -> Result:
+        """The outcome of every trial."""
+        success = self.goal & ~self.limited & (self.status != Status.FAILURE)
+        failure = no_reasons(self.count)
+        for i in np.flatnonzero(~success):
+            failure[i] = self.reason[i] if self.limited[i] else f"goal not reached: {self.reason[i]}"
+        traces = None
+        if self.recorder is not None:
+            traces = [
+                self.recorder.trace(i, self._meta(i, bool(success[i]), str(failure[i]))) for i in range(self.count)
+            ]
+        result = Result(
+            success=success, failure=failure, status=self.status, reason=self.reason, duration_s=self.duration,
+            peak_force_n=self.contact.peak, final_error_m=self.errors[:, 0], final_error_rad=self.errors[:, 1],
+            energy_j=self.energy, peak_force_filtered_n=self.filtered, peak_force_10ms_n=self.contact.mean,
+            peak_torque_share=self.torque_share, peak_speed_share=self.speed_share, ended_by=self.ended_by,
+            traces=traces, interrupted=self.interrupted,
+        )  # fmt: skip
+        return self.drive.outcome(result)
+
+    def _notes(self, i: int, success: bool) -> list[str]:
+        """Sentences about what a result holds and leaves out."""
+        mark = over(float(self.contact.peak[i]), self.setup.robot.spec.limits.force_n) if success else ""
+        return [*([mark] if mark else []), *self.drive.notes(i)]
+
+    def _meta(self, i: int, success: bool, failure: str) -> dict[str, Any]:
+        scene, actuators = self.setup.scene, list(self.drive.actuators)
+        return {
+            "robot": self.setup.robot.spec.name, "world": scene.name, "params": scene.params,
+            "center_of_compliance": np.asarray(self.setup.center_of_compliance, dtype=float).tolist(),
+            "frames": {k: list(v) for k, v in scene.tool.frames.items()},
+            "hand": scene.tool.hand, "success": success, "failure": failure, "reason": str(self.reason[i]),
+            "status": Status(int(self.status[i])).name, "duration_s": float(self.duration[i]),
+            "peak_force_n": float(self.contact.peak[i]), "peak_force_filtered_n": float(self.filtered[i]),
+            "peak_force_10ms_n": float(self.contact.mean[i]), "peak_torque_share": _known(self.torque_share[i]),
+            "peak_speed_share": _known(self.speed_share[i]), "ended_by": self.ended_by[i],
+            "notes": self._notes(i, success), "final_error_m": float(self.errors[i, 0]),
+            "final_error_rad": float(self.errors[i, 1]), "analytic": scene.analytic,
+            "progress": None if scene.way is None else scene.way.told(_known(self.way[i])),
+            "events": [[time, text] for time, text in self.skill.journal(i)],
+            "limits": asdict(self.setup.limits), **({"actuators": actuators} if actuators else {}),
+        }  # fmt: skip
+
+
+def _known(figure: float) -> float | None:
+    """A figure for a file; None where there is none."""
+    return None if np.isnan(figure) else float(figure)

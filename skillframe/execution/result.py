@@ -1,0 +1,73 @@
+"""`Result`: what became of the trials of a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.execution.trace import Trace
+from skillframe.frames import Float
+from skillframe.skill import Reasons, no_reasons
+
+
+def _none() -> Float:
+    return np.zeros(0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Result:
+    """What became of N trials; every array has N rows.
+
+    Attributes:
+        success: the scene's goal was reached and no limit was broken.
+        failure: why not, in words; "" for a success.
+        status: of the skill at its end (`Status`).
+        reason: why the trial ended, in words.
+        duration_s: simulated seconds.
+        peak_force_n: largest true contact force.
+        final_error_m, final_error_rad: distance to the goal at the end.
+        energy_j: work of the controller on the tool.
+        peak_force_filtered_n: largest force that the controller's estimate read.
+        peak_force_10ms_n: largest mean of the true contact force over 10 ms, which is held to the limit.
+        peak_torque_share: largest torque that the law asked a joint for, over its effort; NaN where none is given.
+        peak_speed_share: largest speed of a joint over its velocity limit; NaN where none is given.
+        ended_by: code of what ended the trial (`Ended`).
+        traces: one per trial if asked for.
+        interrupted: Ctrl-C came before the end; what was running is closed as it stood.
+    """
+
+    success: NDArray[np.bool_]
+    failure: Reasons
+    status: NDArray[np.int64]
+    reason: Reasons
+    duration_s: Float
+    peak_force_n: Float
+    final_error_m: Float
+    final_error_rad: Float
+    energy_j: Float
+    peak_force_filtered_n: Float = field(default_factory=_none)
+    peak_force_10ms_n: Float = field(default_factory=_none)
+    peak_torque_share: Float = field(default_factory=_none)
+    peak_speed_share: Float = field(default_factory=_none)
+    ended_by: Reasons = field(default_factory=lambda: no_reasons(0))
+    traces: list[Trace] | None = None
+    interrupted: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArmsResult(Result):
+    """What became of N trials of several arms; `traces` of the base class are the first arm's.
+
+    Attributes:
+        arms: their names.
+        joint_path_rad: (N, arms, joints) way each joint went.
+        turned_rad: (N, arms, 3) rotation vector of each tool since the start, base axes.
+        arm_traces: per trial a trace for every arm, by name, if asked for.
+    """
+
+    arms: tuple[str, ...]
+    joint_path_rad: Float
+    turned_rad: Float
+    arm_traces: list[dict[str, Trace]] | None = None

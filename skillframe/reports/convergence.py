@@ -1,0 +1,164 @@
+"""Where a skill works: success over what varied, as a map of two quantities and as curves of one.
+
+Cells and points hold counts and the kind of 95 % interval that the whole campaign has, each by itself, or none where
+the campaign has none (`campaign.validity`). Quantities are ranked by the mutual information between their quintile and
+success, the largest over skills (our choice: it sees "too far to either side" as well as "too much"). Theory's region
+(`theory`) is drawn over both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from skillframe.frames import Float
+from skillframe.reports.markup import Markup, figure, join, tag
+from skillframe.reports.quantities import ShownQuantity, quantity
+from skillframe.reports.results import Rate, ResultRow, Results
+from skillframe.reports.svg import Axes, padded, picture, text
+from skillframe.reports.theory import Region, boundary, mark
+
+FEW_VALUES, MOST_CELLS, TRIALS_PER_CELL = 8, 7, 5
+MOST_CURVES, CURVE_BINS = 4, 8
+FAILS, BETWEEN, WORKS = np.array([224, 132, 80]), np.array([244, 240, 232]), np.array([98, 162, 216])
+
+
+def influence(results: Results) -> list[str]:
+    """Varied quantities, the most telling first; without those that have fewer than two known values in the table."""
+    known = {name: values_of(results.rows, quantity(name)) for name in results.varied}
+    drawn = [name for name, values in known.items() if len(np.unique(values[np.isfinite(values)])) > 1]
+    scores = {name: max(_information(results.of(s), name) for s in results.skills) for name in drawn}
+    return sorted(drawn, key=lambda name: (-round(scores[name], 9), drawn.index(name)))
+
+
+def _information(rows: Sequence[ResultRow], name: str) -> float:
+    """Mutual information [nat] between success and the quintile of a quantity."""
+    values = np.array([row.values.get(name, math.nan) for row in rows])
+    wins = np.array([row.success for row in rows])[np.isfinite(values)]
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return 0.0
+    bins = np.searchsorted(np.unique(np.quantile(values, [0.2, 0.4, 0.6, 0.8])), values, side="left")
+    total = 0.0
+    for b in np.unique(bins):
+        for outcome in (False, True):
+            joint = float(np.mean((bins == b) & (wins == outcome)))
+            apart = float(np.mean(bins == b) * np.mean(wins == outcome))
+            total += joint * math.log(joint / apart) if joint > 0.0 else 0.0
+    return total
+
+
+def edges_of(values: Float, trials: int) -> Float:
+    """Borders of cells (K + 1,) over values: one cell per value where there are few, else equal widths."""
+    unique = np.unique(values[np.isfinite(values)])
+    if len(unique) <= FEW_VALUES:
+        steps = np.diff(unique)
+        return np.concatenate([[unique[0] - steps[0] / 2], unique[:-1] + steps / 2, [unique[-1] + steps[-1] / 2]])
+    count = (
+        2 * int(np.clip(math.sqrt(trials / TRIALS_PER_CELL) / 2, 1, MOST_CELLS // 2)) + 1
+    )  # odd: a cell in the middle
+    return np.linspace(unique[0], unique[-1], count + 1)
+
+
+def values_of(rows: Sequence[ResultRow], name: ShownQuantity) -> Float:
+    """A quantity's values (n,) in units for people."""
+    return name.factor * np.array([row.values.get(name.name, math.nan) for row in rows])
+
+
+def cell_map(results: Results, skill: str, names: Sequence[str], limits: Sequence[Region]) -> Markup:
+    """The map of one skill over two quantities."""
+    across, up = quantity(names[0]), quantity(names[1])
+    everything, rows = list(results.rows), results.of(skill)
+    xs, ys = edges_of(values_of(everything, across), len(rows)), edges_of(values_of(everything, up), len(rows))
+    axes = Axes(width=460, height=400, x=(xs[0], xs[-1]), y=(ys[0], ys[-1]), x_label=across.axis, y_label=up.axis)
+    rate = results.rate(skill)
+    cells = [_cell(axes, results, rows, (across, up), x, y) for x in pairwise(xs) for y in pairwise(ys)]
+    dots = [_dot(axes, x, y, r) for x, y, r in zip(values_of(rows, across), values_of(rows, up), rows, strict=True)]
+    lines = [axes.frame(), *(boundary(axes, (across, up), limit) for limit in limits)]
+    parts = [*(cell for cell, _ in cells), *lines, *dots, *(words for _, words in cells)]
+    svg = picture(axes, f"Success of {skill} over {across.label} and {up.label}", *parts, class_="map")
+    return figure(skill, f"{rate.successes} of {rate.trials} trials succeeded.", svg, class_="plot")
+
+
+def _cell(
+    axes: Axes, results: Results, rows: Sequence[ResultRow], names: tuple[ShownQuantity, ShownQuantity],
+    x: tuple[float, float], y: tuple[float, float],
+) -> tuple[Markup, Markup]:  # fmt: skip
+    """A cell and, to be drawn above everything else, its figures."""
+    inside = [r for r in rows if _within(r, names[0], x, axes.x) and _within(r, names[1], y, axes.y)]
+    left, right, low, high = axes.across(x[0]), axes.across(x[1]), axes.up(y[0]), axes.up(y[1])
+    box = {"x": f"{left:.1f}", "y": f"{high:.1f}", "width": f"{right - left:.1f}", "height": f"{low - high:.1f}"}
+    if not inside:
+        return tag("rect", tag("title", "no trials"), **box, class_="cell empty"), Markup("")
+    rate, middle = results.rate_of(inside), (0.5 * (left + right), 0.5 * (low + high))
+    color = shade(rate.share)
+    words = [text(middle[0], middle[1], f"{rate.successes}/{rate.trials}", "count", "middle")]
+    if rate.interval is not None:
+        span = f"{100 * rate.interval.low:.0f}–{100 * rate.interval.high:.0f} %"
+        words.append(text(middle[0], middle[1] + 11, span, "span", "middle"))
+    tip = f"{rate.successes} of {rate.trials}, {results.said(rate)}"
+    return tag("rect", tag("title", tip), **box, class_="cell", fill=color), tag(
+        "g", *words, stroke=color, class_="halo"
+    )
+
+
+def _within(row: ResultRow, name: ShownQuantity, cell: tuple[float, float], whole: tuple[float, float]) -> bool:
+    value = name.factor * row.values.get(name.name, math.nan)
+    return bool(cell[0] <= value < cell[1] or (value == whole[1] == cell[1]))
+
+
+def shade(share: float) -> str:
+    """Colour of a success share: orange fails, blue works, told apart by colour-blind eyes and in grey."""
+    low, high, t = (FAILS, BETWEEN, 2 * share) if share < 0.5 else (BETWEEN, WORKS, 2 * share - 1)
+    r, g, b = (round(float(v)) for v in low + t * (high - low))
+    return f"#{r:02x}{g:02x}{b:02x}"
+
+
+def _dot(axes: Axes, x: float, y: float, row: ResultRow) -> Markup:
+    if not (math.isfinite(x) and math.isfinite(y)):
+        return Markup("")
+    px, py = float(axes.across(x)), float(axes.up(y))
+    title = tag("title", f"trial {row.trial}: {'success' if row.success else row.failure or 'failure'}")
+    if row.success:
+        return tag("circle", title, cx=f"{px:.1f}", cy=f"{py:.1f}", r=2.2, class_="won")
+    return tag("path", title, d=f"M{px - 2.6:.1f} {py - 2.6:.1f}l5.2 5.2m0 -5.2l-5.2 5.2", class_="lost")
+
+
+def rate_curves(results: Results, name: str, limits: Sequence[Region]) -> Markup:
+    """Success over one quantity, all skills on the same axes, a point with its interval per bin."""
+    across = quantity(name)
+    values = values_of(list(results.rows), across)
+    borders = edges_of(values, TRIALS_PER_CELL * CURVE_BINS**2)
+    axes = Axes(x=padded(borders[0], borders[-1], 0.02), y=(-4.0, 104.0), x_label=across.axis, y_label="success [%]")
+    parts = [axes.frame(y_ticks=[0, 25, 50, 75, 100])]
+    parts += [mark(axes, across, limit) for limit in limits if limit.name == name]
+    parts += [_curve(axes, results, skill, across, borders, i) for i, skill in enumerate(results.skills)]
+    svg = picture(axes, f"Success over {across.label}", *parts)
+    return figure(f"Over {across.label}", "", svg, class_="plot")
+
+
+def _curve(axes: Axes, results: Results, skill: str, name: ShownQuantity, borders: Float, index: int) -> Markup:
+    stroke, points, bars = f"s{index % 4 + 1}", [], []
+    shift = (index - 0.5) * 0.06 * (borders[1] - borders[0])
+    rows = results.of(skill)
+    for x in pairwise(borders):
+        inside = [r for r in rows if _within(r, name, x, (borders[0], borders[-1]))]
+        if inside:
+            rate, middle = results.rate_of(inside), 0.5 * (x[0] + x[1]) + shift
+            points.append((middle, 100 * rate.share))
+            bars.append(_bar(axes, middle, rate, stroke))
+    xs, ys = np.array([p[0] for p in points]), np.array([p[1] for p in points])
+    return join([axes.line(xs, ys, f"line {stroke}"), *bars]) if points else Markup("")
+
+
+def _bar(axes: Axes, x: float, rate: Rate, stroke: str) -> Markup:
+    px, middle = round(float(axes.across(x)), 1), round(float(axes.up(100 * rate.share)), 1)
+    tip = tag("title", f"{rate.successes} of {rate.trials}, {rate.span or 'no interval'}")
+    line = Markup("")
+    if rate.interval is not None:
+        low, high = (round(float(axes.up(100 * v)), 1) for v in rate.interval)
+        line = tag("line", x1=px, x2=px, y1=low, y2=high, class_=f"bar {stroke}")
+    return join([line, tag("circle", tip, cx=px, cy=middle, r=3.4, class_=f"point {stroke}")])

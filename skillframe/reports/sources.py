@@ -1,0 +1,292 @@
+"""What a report is made from: campaign folders and trace files, read once, each file's hash kept.
+
+A folder may hold any of `campaign.toml`, `results.csv`, `summary.json`, `scene.json`, `skills/`, `traces/`,
+`demonstrations/`; a folder of such folders gives a chapter for each. What is absent is said on the page; what is there
+and cannot be read is refused, except a trace or demonstration inside a folder, which is named and left out.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from skillframe.campaign.axes import parse_axis
+from skillframe.campaign.spec import flatten, name_of
+from skillframe.campaign.validity import Plan, plan_of
+from skillframe.campaign.verify import edited_results
+from skillframe.config import read_toml
+from skillframe.demonstration.record import Demonstration
+from skillframe.errors import InputError, SkillframeError
+from skillframe.execution.trace import Trace
+from skillframe.extend.records import ReportFiles
+from skillframe.files.documents import read_json, read_text
+from skillframe.reports.results import Results, read_results
+from skillframe.reports.sections import MadeSection, files_of, has_sections, made_sections
+
+CAMPAIGN = ("campaign.toml", "results.csv", "summary.json")
+PARTS = (*CAMPAIGN, "skills", "traces", "demonstrations")
+TABLES, SHOWN = ("hashes", "versions", "params", "analytic", "analytic_over"), ("summary.json", "scene.json")
+REMOVE = "correct or remove it"
+MOST_RUNS, MOST_DEMONSTRATIONS = 4, 4
+
+
+class Run(NamedTuple):
+    """One trace and what it is called."""
+
+    name: str
+    trace: Trace
+
+
+@dataclass(kw_only=True)
+class Chapter:
+    """One campaign, or the traces given by themselves.
+
+    Attributes:
+        name: for people.
+        folder: what the user called it; empty for loose traces.
+        spec, spec_text: campaign.toml as values and as text.
+        results: the table, or None.
+        summary, scene: JSON files, empty if absent.
+        skills: skill documents by file name.
+        runs: the traces that are shown; traces: how many there are.
+        demonstrations: by file name.
+        force_limit: of the robot as run [N], or None.
+        sections: what plug-ins have to say.
+        notes: sentences about what is missing or was left out.
+        hashes: (file, sha256) of everything read.
+    """
+
+    name: str
+    folder: str = ""
+    spec: dict[str, Any] = field(default_factory=dict)
+    spec_text: str = ""
+    results: Results | None = None
+    summary: dict[str, Any] = field(default_factory=dict)
+    scene: dict[str, Any] = field(default_factory=dict)
+    skills: dict[str, dict[str, Any]] = field(default_factory=dict)
+    runs: list[Run] = field(default_factory=list)
+    traces: int = 0
+    demonstrations: dict[str, Demonstration] = field(default_factory=dict)
+    force_limit: float | None = None
+    sections: list[MadeSection] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    hashes: list[tuple[str, str]] = field(default_factory=list)
+
+
+def scenes(chapter: Chapter) -> list[tuple[str, str]]:
+    """(robot, world) of what a chapter shows, each pair once; without what its files do not say."""
+    found = [(chapter.spec or chapter.summary)] + [run.trace.meta for run in chapter.runs]
+    pairs = [(str(f.get("robot") or ""), str(f.get("world") or "")) for f in found]
+    named = [(name_of(robot), world) for robot, world in pairs]
+    return list(dict.fromkeys(pair for pair in named if all(pair)))
+
+
+def read_chapters(inputs: Sequence[Path]) -> list[Chapter]:
+    """Chapters in the order of the arguments; loose traces are gathered in one of their own at the end.
+
+    Raises:
+        InputError: a path that is missing, a folder without results, a file that is no trace.
+    """
+    chapters, loose = [], []
+    for path in inputs:
+        if path.is_dir():
+            chapters += [read_folder(folder) for folder in _folders(path)]
+        else:
+            loose.append(path)
+    return [*chapters, read_traces(loose)] if loose else chapters
+
+
+def _folders(path: Path) -> list[Path]:
+    """A campaign's folder itself; else the campaigns in it, which may share demonstrations; else what has any part."""
+    inner = sorted(f for f in path.iterdir() if f.is_dir())
+    for parts in (CAMPAIGN, PARTS):
+        if _holds(path, parts):
+            return [path]
+        if found := [folder for folder in inner if _holds(folder, parts)]:
+            return found
+    raise InputError(path, "holds no results", f"give a campaign's folder (with {', '.join(PARTS)}) or trace files")
+
+
+def _holds(folder: Path, parts: Sequence[str]) -> bool:
+    return any((folder / part).exists() for part in parts)
+
+
+def read_traces(paths: Sequence[Path]) -> Chapter:
+    """A chapter of trace files; every one of them must be readable."""
+    chapter = Chapter(name="Single runs", traces=len(paths))
+    for path in paths:
+        chapter.runs.append(Run(path.name, load_trace(path)))
+        _remember(chapter, path, path.name)
+    if len(paths) == 1:
+        chapter.name = f"A run of {chapter.runs[0].trace.meta.get('skill') or paths[0].name}"
+    names = [path.name for path in paths]
+    _add_sections(chapter, lambda: {p.name if names.count(p.name) == 1 else str(p): p for p in paths})
+    return chapter
+
+
+def _add_sections(chapter: Chapter, named: Callable[[], Mapping[str, Path]]) -> None:
+    """What plug-ins make of the files; what they used counts as what the page was made from."""
+    if not has_sections():
+        return
+    files = named()
+    given = ReportFiles(title=chapter.name, files=files)
+    chapter.sections = made_sections(given)
+    known = {name for name, _ in chapter.hashes}
+    for name in sorted(set(given.used) - known):
+        _remember(chapter, files[name], name)
+
+
+def read_folder(folder: Path) -> Chapter:
+    """A chapter from a campaign's folder."""
+    chapter = Chapter(name=folder.resolve().name, folder=folder.name or folder.resolve().name)
+    if (folder / "campaign.toml").is_file():
+        chapter.spec = read_toml(folder / "campaign.toml")
+        chapter.spec_text = read_text(folder / "campaign.toml")
+        chapter.name = str(chapter.spec.get("name") or chapter.name)
+        _remember(chapter, folder / "campaign.toml", "campaign.toml")
+    if (folder / "results.csv").is_file():
+        chapter.results = read_results(folder / "results.csv", *_declared(chapter.spec))
+        chapter.notes += chapter.results.notes
+        _remember(chapter, folder / "results.csv", "results.csv")
+    chapter.summary = _json_if_there(chapter, folder / "summary.json")
+    chapter.notes += [text for text in [edited_results(folder, chapter.summary)] if text]
+    chapter.scene = _json_if_there(chapter, folder / "scene.json")
+    for path in sorted({*folder.glob("*.skill.json"), *folder.glob("skills/*.json")}):
+        chapter.skills[path.name] = _json_if_there(chapter, path)
+    chapter.force_limit = _force_limit(folder)
+    _read_folder_traces(chapter, folder)
+    _read_demonstrations(chapter, folder)
+    _add_sections(chapter, lambda: files_of(folder))
+    return chapter
+
+
+def _force_limit(folder: Path) -> float | None:
+    for path in sorted(folder.glob("robots/*/robot.toml")):
+        limit = (read_toml(path).get("limits") or {}).get("force_n")
+        if isinstance(limit, int | float):
+            return float(limit)
+    return None
+
+
+def _declared(spec: dict[str, Any]) -> tuple[list[str], Plan | None]:
+    """Varied quantities, and what was fixed before the first trial; None if the file does not tell."""
+    vary, stop, trials, skills = (spec.get(key) for key in ("vary", "stop", "trials", "skills"))
+    vary = vary if isinstance(vary, dict) else {}
+    may_stop = isinstance(stop, dict) and stop.get("interval_width") is not None
+    try:
+        given = flatten(vary, "vary")
+        axes = {name: parse_axis(value, name) for name, value in given.items()}
+    except InputError:
+        return list(vary), None
+    if not isinstance(trials, int) or not isinstance(skills, list):
+        return list(given), None
+    return list(given), plan_of(axes, trials=trials, skills=len(skills), may_stop=may_stop)
+
+
+def load_trace(path: Path) -> Trace:
+    """A trace whose arrays fit together.
+
+    Raises:
+        InputError: not a trace, a missing array, arrays of different length, or no samples.
+    """
+    try:
+        trace = Trace.load(path)
+    except TypeError as error:
+        raise InputError(
+            path, f"lacks an array of a trace ({error})", "give a .npz written by skillframe run"
+        ) from None
+    lengths = {
+        name: len(getattr(trace, name)) for name in ("time", "position", "quaternion", "wrench", "desired_position")
+    }
+    if len(set(lengths.values())) != 1 or not lengths["time"]:
+        raise InputError(path, f"has arrays of length {lengths}", "give a whole trace")
+    return trace
+
+
+def _json_if_there(chapter: Chapter, path: Path) -> dict[str, Any]:
+    if not path.is_file():
+        return {}
+    values = read_json(path, REMOVE)
+    if not isinstance(values, dict):
+        raise InputError(path, "holds no JSON object", REMOVE)
+    for key in TABLES:
+        if values.get(key) is not None and not isinstance(values[key], dict) and path.name in SHOWN:
+            raise InputError(f"{path}: {key}", f"is {values[key]!r:.60}, not an object", REMOVE)
+    _remember(chapter, path, path.name)
+    return values
+
+
+def _read_folder_traces(chapter: Chapter, folder: Path) -> None:
+    """The first success and the first failure of each skill, then others, up to four runs."""
+    found = []
+    for path in sorted((folder / "traces").glob("*.npz")):
+        trace = _readable(chapter, path, load_trace)
+        if trace is not None:
+            found.append((path, trace))
+    chapter.traces = len(found)
+    order = list(chapter.results.skills) if chapter.results else []
+    for path, trace in sorted(_telling(found), key=lambda pair: _rank(pair[1], order)):
+        chapter.runs.append(Run(path.name, trace))
+        _remember(chapter, path, f"traces/{path.name}")
+
+
+def _telling(found: list[tuple[Path, Trace]]) -> list[tuple[Path, Trace]]:
+    first: dict[tuple[str, bool], tuple[Path, Trace]] = {}
+    for path, trace in found:
+        first.setdefault((str(trace.meta.get("skill", "")), bool(trace.meta.get("success"))), (path, trace))
+    chosen = list(first.values())[:MOST_RUNS]
+    names = {path for path, _ in chosen}
+    rest = [pair for pair in found if pair[0] not in names]
+    return chosen if len(chosen) > 1 else [*chosen, *rest][: min(2, MOST_RUNS)]
+
+
+def _rank(trace: Trace, order: list[str]) -> tuple[int, bool]:
+    """Skills in the table's order, successes first."""
+    skill = str(trace.meta.get("skill", ""))
+    return (order.index(skill) if skill in order else len(order)), not trace.meta.get("success")
+
+
+def _read_demonstrations(chapter: Chapter, folder: Path) -> None:
+    places = [*sorted((folder / "demonstrations").glob("*")), *sorted((folder / "skills").glob("*"))]
+    paths = sorted({_digest(p): p for p in reversed(places) if p.suffix in (".npz", ".csv")}.values())
+    for path in paths[:MOST_DEMONSTRATIONS]:
+        demonstration = _readable(chapter, path, read_demonstration)
+        if demonstration is not None:
+            chapter.demonstrations[path.name] = demonstration
+            _remember(chapter, path, f"{path.parent.name}/{path.name}")
+    if len(paths) > MOST_DEMONSTRATIONS:
+        chapter.notes.append(f"{len(paths) - MOST_DEMONSTRATIONS} more demonstrations are not drawn.")
+
+
+def read_demonstration(path: Path) -> Demonstration:
+    """A demonstration by whichever reader is registered for its file name.
+
+    Raises:
+        InputError: no reader, or the reader refuses it.
+    """
+    from skillframe.extend.registry import registry
+
+    for record in registry().records("reader"):
+        if path.name.endswith(tuple(record.suffixes)):
+            demonstration: Demonstration = record.read(path, {})
+            return demonstration
+    raise InputError(path, "has no reader", "see skillframe plugins list")
+
+
+def _readable(chapter: Chapter, path: Path, read: Callable[[Path], Any]) -> Any:
+    try:
+        return read(path)
+    except SkillframeError as error:
+        chapter.notes.append(f"{path.name} is left out: {str(error).removeprefix(str(path)).lstrip(': ')}.")
+        return None
+
+
+def _remember(chapter: Chapter, path: Path, name: str) -> None:
+    chapter.hashes.append((name, _digest(path)))
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

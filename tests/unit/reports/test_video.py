@@ -1,0 +1,52 @@
+from dataclasses import fields, replace
+
+import av
+import numpy as np
+import pytest
+from report_fakes import trace
+
+from skillframe.errors import InputError
+from skillframe.reports.stage import stage_of
+from skillframe.reports.video import FRAME_RATE, film_samples, write_film
+
+
+def frames(path):
+    with av.open(str(path)) as film:
+        return [f.to_ndarray(format="rgb24") for f in film.decode(video=0)]
+
+
+def shortened(run, count):
+    arrays = {f.name: getattr(run, f.name)[:count] for f in fields(run) if f.name not in ("machine", "meta")}
+    return replace(run, **arrays)
+
+
+def test_a_second_of_a_run_lasts_a_second_and_the_last_sample_is_shown():
+    time = np.arange(0.0, 2.0005, 0.01)
+    samples = film_samples(time)
+    assert len(samples) == 2 * FRAME_RATE + 1
+    assert np.abs(time[samples] - np.arange(len(samples)) / FRAME_RATE).max() < 0.01
+    assert samples[-1] == len(time) - 1
+
+
+def test_a_film_moves_and_ends_with_what_was_drawn_last(tmp_path):
+    run = shortened(trace(samples=101), 6)  # of 25 samples a second
+    told = []
+    count = write_film(run, tmp_path / "run.mp4", lambda done, total: told.append((done, total)))
+    shown = frames(tmp_path / "run.mp4")
+    assert len(shown) == count == len(told)
+    assert told[-1] == (count, count)
+    assert shown[0].shape[:2] == (560, 960)
+    # the encoder changes a flat colour by a few of 255 levels; a tool that has moved changes it by a hundred
+    assert np.abs(shown[0].astype(int) - shown[-1]).max() > 100
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["run.mp4"]
+
+
+def test_a_name_that_is_no_film_and_a_trace_without_geometry_are_refused(tmp_path):
+    with pytest.raises(InputError, match="not a name of a film"):
+        write_film(trace(), tmp_path / "run.gif")
+    bare = trace()
+    bare.meta["bodies"] = []
+    assert stage_of(bare) is None
+    with pytest.raises(InputError, match="no geometry"):
+        write_film(bare, tmp_path / "run.mp4")
+    assert list(tmp_path.iterdir()) == []
