@@ -13,8 +13,8 @@
     report(results, "peg.html")
 
 The method in seven files: `skillframe.demonstration.record`, the LMC plug-in's learner and runtime,
-`skillframe.skill`, `skillframe.control.controller`, `skillframe.world.scene`, `skillframe.execution.executor`. Importing
-the package loads none of the scientific libraries.
+`skillframe.skill`, `skillframe.control.controller`, `skillframe.world.scene`, `skillframe.execution.executor`.
+Importing the package loads none of the scientific libraries.
 """
 
 from typing import TYPE_CHECKING, Any

@@ -46,8 +46,9 @@ def simulate(
 ) -> Result:
     """Run a skill on len(rngs) trials until each has ended.
 
-    What drives the robot follows from its robot.toml and the scene (`skillframe.execution.drives.choose`). Where a second
-    arm holds the scene's fixture, a coordinator runs both arms, and a skill runs the first while the second stands still.
+    What drives the robot follows from its robot.toml and the scene (`skillframe.execution.drives.choose`). Where a
+    second arm holds the scene's fixture, a coordinator runs both arms, and a skill runs the first while the second
+    stands still.
 
     Args:
         skill: what to run; `start` is called once.

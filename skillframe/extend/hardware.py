@@ -35,8 +35,8 @@ class DriveType:
         name: of the drive.
         summary: one line for listings.
         contract: see `records.SkillType`.
-        make: `make(setup, draws, rngs)` gives the `skillframe.execution.drive.Drive` of len(rngs) trials at their starts: the
-            run's set-up, its quantities per trial, each (N,), and a generator per trial for the sensors.
+        make: `make(setup, draws, rngs)` gives the `skillframe.execution.drive.Drive` of len(rngs) trials at their
+            starts: the run's set-up, its quantities per trial, each (N,), and a generator per trial for the sensors.
     """
 
     name: str

@@ -76,8 +76,8 @@ class ScoreType:
         contract: see `records.SkillType`.
         unit: of the figure, SI: "s", "N", "1".
         compute: the figure from a trial's `skillframe.execution.trace.Trace`, sampled at 100 Hz in a campaign and at
-            `--rate` in `skillframe run`. A number, or NaN for a trial that has no such figure. The same trace gives the same
-            figure, whatever was computed before.
+            `--rate` in `skillframe run`. A number, or NaN for a trial that has no such figure. The same trace gives the
+            same figure, whatever was computed before.
     """
 
     name: str

@@ -2,9 +2,9 @@
 
     impedance -> joint torque -> motors' limits -> torque or target -> FMU -> spring torque -> plant
 
-The law is that of ideal torques (`skillframe.execution.drives.torque`). It reads joint positions at the joints and, where
-the FMUs give it, velocities at the motors: damping that acts before the spring is stable where damping behind it is not.
-Joints without an FMU are driven ideally.
+The law is that of ideal torques (`skillframe.execution.drives.torque`). It reads joint positions at the joints and,
+where the FMUs give it, velocities at the motors: damping that acts before the spring is stable where damping behind it
+is not. Joints without an FMU are driven ideally.
 """
 
 from __future__ import annotations

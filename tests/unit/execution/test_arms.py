@@ -10,7 +10,7 @@ from skillframe.errors import SkillframeError, UnknownName
 from skillframe.execution.arms import FirstArm, simulate_arms
 from skillframe.execution.executor import Setup, simulate
 from skillframe.execution.prepare import load_robot_model
-from skillframe.frames import norm
+from skillframe.frames import Pose, matrix_from_quaternion, norm, rotation_matrix, rotation_vector
 from skillframe.robot.kinematics import at
 from skillframe.skill import Command, Impedance, Skill, Status, no_reasons
 from skillframe.testing import HoldSkill, ScriptedSkill
@@ -202,3 +202,21 @@ def test_a_robot_with_one_arm_finds_the_fixture_standing_still():
     found = [simulate(HoldSkill(duration=0.1), s, {}, rngs(1), trace_hz=100).traces[0] for s in (alone, plain)]
     assert np.array_equal(found[0].q, found[1].q)
     assert np.array_equal(found[0].wrench, found[1].wrench)
+
+
+def test_how_far_each_tool_has_turned_since_the_start_is_in_the_result():
+    """As the first and the last sample of its trace say; a millisecond of 0.5 rad/s lies between."""
+
+    class Turn(Approach):
+        def step(self, observation):
+            command = super().step(observation)
+            angle = np.zeros((*observation.time.shape, 3))
+            angle[:, 0, 2] = 0.5 * observation.time[:, 0]
+            return command._replace(pose=Pose(self.home.position, rotation_matrix(angle) @ self.home.rotation))
+
+    result = simulate_arms(Turn(), setup(), {}, rngs(2), duration_s=0.3, trace_hz=1000)
+    for i, by_arm in enumerate(result.arm_traces):
+        for arm, name in enumerate(result.arms):
+            first, last = matrix_from_quaternion(by_arm[name].quaternion[[0, -1]])
+            np.testing.assert_allclose(result.turned_rad[i, arm], rotation_vector(last @ first.T), atol=2e-3)
+    assert (result.turned_rad[:, 0, 2] > 0.02).all()  # behind the 0.15 rad asked for by the lag of a soft law

@@ -95,14 +95,23 @@ def test_what_a_servo_is_told_and_gives_is_in_the_trace(runs, tmp_path):
 
 
 def test_a_position_turns_back_into_the_torque_that_it_stands_for():
-    """At rest: K_p (target - theta) = tau_s = k (theta - q)."""
-    own = servos(load_robot("panda_position"))
+    """With theta = q + tau/k, at rest and moving: K_p (target - theta) - K_v w = tau."""
+    spec = load_robot("panda_position")
+    own = servos(spec)
     torque, q = np.array([[5.0, -20.0, 1.0, 18.0, 0.5, 2.0, -0.1]]), np.full((1, 7), 0.3)
-    target = own.command(torque, q, np.zeros((1, 7)))
-    for k, actuation in enumerate(load_robot("panda_position").actuation):
-        gain, stiffness = actuation.parameters["position_gain"], actuation.parameters["stiffness"]
-        theta = (gain * target[0, k] + stiffness * q[0, k]) / (gain + stiffness)
-        assert stiffness * (theta - q[0, k]) == pytest.approx(torque[0, k], rel=1e-9)
+    for speed in (0.0, 0.7):
+        target = own.command(torque, q, np.full((1, 7), speed))[0]
+        for k, actuation in enumerate(spec.actuation):
+            p, tau = actuation.parameters, torque[0, k]
+            error = target[k] - (0.3 + tau / p["stiffness"])
+            assert p["position_gain"] * error - p["velocity_gain"] * speed == pytest.approx(tau, rel=1e-9)
+
+
+def test_the_servos_of_a_trial_that_has_ended_are_not_stepped():
+    loop = begin(HoldSkill(), setup("panda_servo"), {}, generators(2))
+    loop.prepare()
+    loop.drive.end(np.array([1]))
+    assert loop.drive.limb.bank.active.tolist() == [1] * 7 + [0] * 7
 
 
 @pytest.mark.parametrize("name", KINDS)
