@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -10,6 +13,12 @@ from skillframe.cli import names
 from skillframe.cli.endings import SKILL
 from skillframe.cli.output import emit_json, warned
 from skillframe.cli.words import tell
+
+if TYPE_CHECKING:
+    from skillframe.demonstration.record import Demonstration
+
+OF_ONE_PHASE = "lmc"
+"""The kind of skill that is one motion; those that play a motion back can hold a whole task."""
 
 
 @click.command()
@@ -46,16 +55,38 @@ def command(
       skillframe learn left.csv right.csv --at wrist --out peg.skill.json
       skillframe learn demo.npz --axes phase_start --set moving_m=0.002 --out snap.skill.json
     """
+    from skillframe.api.inputs import demonstrations_of
     from skillframe.api.learning import learn_with
     from skillframe.config import parse_setting
     from skillframe.extend.records import LearnOptions
 
     options = LearnOptions(at=at, hand=hand, axes=axes, settings=dict(parse_setting(text) for text in settings))
+    demonstrations = demonstrations_of(files)
     with warned():
-        learned = learn_with(files, skill, options)
+        learned = learn_with(demonstrations, skill, options)
     learned.save(out)
+    if skill == OF_ONE_PHASE:
+        _point_to_segment(demonstrations)
     made = f"{out}: {learned.type} from {len(files)} demonstration{'s' * (len(files) != 1)}"
     tell([made, *learned.words], err=as_json)
     if as_json:
         emit_json(learned.document)
     return 0
+
+
+def _point_to_segment(demonstrations: Sequence[Demonstration]) -> None:
+    """One note where most demonstrations look like several phases: one motion would have to explain all of them."""
+    from skillframe.conditioning.audit import audit
+    from skillframe.conditioning.contact import Contact
+    from skillframe.conditioning.phases import several_phases
+
+    said = [several_phases(d, [Contact(*c) for c in audit(d).contacts]) for d in demonstrations]
+    odd = [(d.source, text) for d, text in zip(demonstrations, said, strict=True) if text]
+    if 2 * len(odd) > len(said):
+        files = shlex.join(d.source for d in demonstrations)
+        others = f" (and {len(odd) - 1} more)" if len(odd) > 1 else ""
+        click.echo(
+            f"note: {odd[0][0]}{others} looks like several phases: {odd[0][1]}; to learn each by itself, type: "
+            f"skillframe segment {files} --out NAME.policy.json",
+            err=True,
+        )

@@ -164,3 +164,37 @@ def test_show_says_who_made_a_skill(demos: list[str], tmp_path: Path, capsys: py
     by = load(out)["created_by"]
     made = f"made by skillframe-lmc {by['plugin_version']} with skillframe {by['skillframe']}"
     assert made in capsys.readouterr().out
+
+
+def two_phases(path: Path) -> str:
+    """A slide, then another way down: the examples' first demonstration, and it again half a turn about z."""
+    one = example_demonstrations()[0]
+    turn = np.diag([-1.0, -1.0, 1.0])
+    slide = one.time >= 0.5
+    after = (one.position[slide] - one.position[slide][0]) @ turn.T + one.position[-1]
+    wrench = np.concatenate([one.wrench[slide, :3] @ turn.T, one.wrench[slide, 3:]], axis=1)
+    both = replace(
+        one, time=np.arange(len(one) + slide.sum()) / one.rate, position=np.concatenate([one.position, after]),
+        quaternion=np.concatenate([one.quaternion, one.quaternion[slide]]),
+        wrench=np.concatenate([one.wrench, wrench]),
+    )  # fmt: skip
+    write_demonstration(both, path)
+    return str(path)
+
+
+def test_a_demonstration_of_several_phases_is_told_with_the_command_that_cuts_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = [two_phases(tmp_path / "a b.npz"), two_phases(tmp_path / "c.npz")]
+    assert run(["learn", *files, "--out", str(tmp_path / "s.json"), "--json"]) == 0
+    (said,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("note: ") and "phases" in line]
+    assert said.startswith(f"note: {files[0]} (and 1 more) looks like several phases: in contact it moves by ")
+    assert said.endswith(f"type: skillframe segment '{files[0]}' {files[1]} --out NAME.policy.json")
+
+
+def test_demonstrations_of_one_phase_and_skills_that_play_a_motion_back_hear_nothing_of_phases(
+    demos: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["learn", *demos, "--out", str(tmp_path / "s.json")]) == 0
+    assert run(["learn", two_phases(tmp_path / "a.npz"), "--skill", "replay", "--out", str(tmp_path / "r.json")]) == 0
+    assert "phases" not in capsys.readouterr().err
