@@ -72,6 +72,7 @@ def examine() -> Iterator[Check]:
     yield from _libraries()
     yield from _extras("skillframe")
     yield _compiler()
+    yield _renderer()
     yield _browser()
     yield _recordings()
     yield from _plugins()
@@ -147,6 +148,15 @@ def _compiler() -> Check:
         path = "ziglang"
     fix = "" if path else "sudo apt install build-essential (or: pip install ziglang)"
     return Check(name="C compiler", found=path, needed_for="building FMUs", fix=fix)
+
+
+def _renderer() -> Check:
+    """What draws videos: found out by drawing."""
+    from skillframe.reports.opengl import backend
+
+    found = backend()
+    fix = "" if found else "sudo apt install libosmesa6 (videos are drawn by skillframe's own renderer until then)"
+    return Check(name="OpenGL", found=found or "", needed_for="run --video with MuJoCo's renderer", fix=fix)
 
 
 def _browser() -> Check:

@@ -70,7 +70,7 @@ def command(
     from skillframe.config import parse_setting
 
     if video is not None:
-        from skillframe.reports.video import check_film
+        from skillframe.reports.video import check_film, write_film
 
         check_film(video)
     with progress("s simulated", QUIET_S) as show, warned():
@@ -85,7 +85,8 @@ def command(
         done.replay(replay)
     if video is not None:
         with progress("frames") as show:
-            done.video(video, show)
+            film = write_film(done.trace, video, show)
+        note(f"note: the video was drawn by {film.renderer}")
     if done.unscored is not None:  # the run is kept
         raise done.unscored
     _tell(done.trace.meta, {"trace": out, "replay": replay, "video": video}, as_json)

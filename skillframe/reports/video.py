@@ -1,7 +1,8 @@
 """A trace as an MP4 film: the whole scene, the tool's tip close and cut open, and the contact force over time.
 
-Frames are drawn by `skillframe.reports.raster`, so that no graphics library is needed; what stands still is drawn once
-and kept. Played back, a second is a second. H.264 in 4:2:0, which browsers and office programs play.
+Frames are drawn by MuJoCo's renderer where OpenGL works (`opengl`), else by `skillframe.reports.raster`, which needs no
+graphics library; there what stands still is drawn once and kept. Played back, a second is a second. H.264 in 4:2:0,
+which browsers and office programs play.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from skillframe.errors import InputError, need
 from skillframe.execution.trace import Trace
 from skillframe.files import writing_whole
 from skillframe.frames import Float, norm
+from skillframe.reports import opengl
 from skillframe.reports.raster import PAPER, Canvas, Image, blank, over_paper, paint, picture
 from skillframe.reports.shapes import Mesh
 from skillframe.reports.stage import Camera, Stage, stage_of
@@ -27,14 +29,22 @@ QUALITY = "20"  # libx264's constant rate factor: hardly told from the original
 SUFFIXES = (".mp4", ".m4v", ".mov")
 INK, FAINT, FORCE = (38, 46, 56), (176, 184, 194), (204, 60, 46)
 LEFT = 16  # of the force curve [pixels]
+OWN = "skillframe's own renderer, because OpenGL draws nothing here (skillframe doctor)"
+STOPPED = "skillframe's own renderer, because OpenGL stopped drawing"
+
+
+class Film(NamedTuple):
+    """What was written: the number of frames, and in words what drew them."""
+
+    frames: int
+    renderer: str
 
 
 class _Pane(NamedTuple):
-    """One view: its background with what stands still, and where it lies in the frame."""
+    """One view and its background: what stands still."""
 
     camera: Camera
     background: Canvas
-    column: int
 
 
 def check_film(path: Path) -> None:
@@ -50,7 +60,7 @@ def check_film(path: Path) -> None:
         need(library)
 
 
-def write_film(trace: Trace, path: Path, tell: Callable[[int, int], None] = lambda done, total: None) -> int:
+def write_film(trace: Trace, path: Path, tell: Callable[[int, int], None] = lambda done, total: None) -> Film:
     """Write a film of a run, whole or not at all.
 
     Args:
@@ -59,7 +69,7 @@ def write_film(trace: Trace, path: Path, tell: Callable[[int, int], None] = lamb
         tell: is told after each frame how many of how many are done.
 
     Returns:
-        number of frames.
+        how many frames, and what drew them.
 
     Raises:
         InputError: the trace holds no geometry, or the file cannot be written.
@@ -69,9 +79,17 @@ def write_film(trace: Trace, path: Path, tell: Callable[[int, int], None] = lamb
     if stage is None:
         raise InputError(path, "cannot be drawn: the trace holds no geometry", "write the trace again")
     samples = film_samples(np.asarray(trace.time, dtype=float))
+    backend, renderer = opengl.backend(), OWN
+    if backend is not None:
+        try:
+            with writing_whole(path) as temporary:
+                _encode(_composed(trace, samples, _by_opengl(stage, samples, backend), tell), temporary)
+            return Film(len(samples), f"MuJoCo's renderer (OpenGL by {backend})")
+        except opengl.NoPicture:
+            renderer = STOPPED
     with writing_whole(path) as temporary:
-        _encode(_frames(trace, stage, samples, tell), temporary)
-    return len(samples)
+        _encode(_composed(trace, samples, _by_hand(stage, samples), tell), temporary)
+    return Film(len(samples), renderer)
 
 
 def film_samples(time: Float) -> NDArray[np.int64]:
@@ -91,26 +109,42 @@ def _encode(frames: Iterator[Image], path: Path) -> None:
         film.mux(stream.encode())
 
 
-def _frames(
-    trace: Trace, stage: Stage, samples: NDArray[np.int64], tell: Callable[[int, int], None]
+def _composed(
+    trace: Trace, samples: NDArray[np.int64], views: Iterator[list[Image]], tell: Callable[[int, int], None]
 ) -> Iterator[Image]:
-    panes = [_pane(stage, stage.far, FAR_WIDTH, 0), _pane(stage, stage.close, CLOSE_WIDTH, FAR_WIDTH)]
+    """Frames (HEIGHT + STRIP, width, 3): the two views side by side, and the strip below."""
     strip = _Strip(trace)
-    for done, sample in enumerate(samples.tolist(), start=1):
+    for done, (sample, (far, close)) in enumerate(zip(samples.tolist(), views, strict=True), start=1):
         frame = np.empty((HEIGHT + STRIP, FAR_WIDTH + CLOSE_WIDTH, 3), dtype=np.uint8)
-        for pane in panes:
-            seen = over_paper(picture(paint(pane.background.copy(), _moving(stage, sample), pane.camera)))
-            frame[:HEIGHT, pane.column : pane.column + seen.shape[1]] = seen
+        frame[:HEIGHT, :FAR_WIDTH], frame[:HEIGHT, FAR_WIDTH:] = far, close
         frame[:HEIGHT, FAR_WIDTH] = FAINT
         frame[HEIGHT:] = strip.at(sample)
         yield frame
         tell(done, len(samples))
 
 
-def _pane(stage: Stage, camera: Camera, width: int, column: int) -> _Pane:
+def _by_hand(stage: Stage, samples: NDArray[np.int64]) -> Iterator[list[Image]]:
+    """The far and the close view of every sample, by our own renderer."""
+    panes = [_pane(stage, camera, width) for camera, width in _views(stage)]
+    for sample in samples.tolist():
+        moving = _moving(stage, sample)
+        yield [over_paper(picture(paint(pane.background.copy(), moving, pane.camera))) for pane in panes]
+
+
+def _by_opengl(stage: Stage, samples: NDArray[np.int64], backend: str) -> Iterator[list[Image]]:
+    """The same by MuJoCo's."""
+    return opengl.pictures(stage, samples.tolist(), _views(stage), HEIGHT, backend)
+
+
+def _views(stage: Stage) -> list[tuple[Camera, int]]:
+    """Both cameras with their pictures' widths; a narrow picture sees less, so its camera stands back."""
+    both = ((stage.far, FAR_WIDTH), (stage.close, CLOSE_WIDTH))
+    return [(c._replace(distance=c.distance * max(1.0, HEIGHT / width)), width) for c, width in both]
+
+
+def _pane(stage: Stage, camera: Camera, width: int) -> _Pane:
     still = {b: _mesh(stage, b, 0) for b, fixed in enumerate(stage.still) if fixed}
-    camera = camera._replace(distance=camera.distance * max(1.0, HEIGHT / width))  # a narrow pane sees less
-    return _Pane(camera, paint(blank(width, HEIGHT), still, camera), column)
+    return _Pane(camera, paint(blank(width, HEIGHT), still, camera))
 
 
 def _moving(stage: Stage, sample: int) -> dict[int, Mesh]:

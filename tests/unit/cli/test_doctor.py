@@ -2,13 +2,18 @@ import json
 import re
 import sys
 from importlib import metadata
-from pathlib import Path
 
 import pytest
 
 from skillframe.cli import doctor
 from skillframe.cli.main import run
 from skillframe.errors import EXTRAS
+
+
+@pytest.fixture(autouse=True)
+def no_drawing(monkeypatch):
+    """Whether OpenGL draws takes seconds to find out; `tests/unit/reports/test_opengl.py` does."""
+    monkeypatch.setattr("skillframe.reports.opengl.backend", lambda: "egl")
 
 
 def findings(capsys, code=0):
@@ -117,8 +122,8 @@ def test_for_people_there_is_a_table_and_a_line_for_each_missing_thing(capsys, m
     assert "recordings: export SKILLFRAME_RECORDINGS=FOLDER" in text
 
 
-def test_opengl_is_not_looked_for_because_nothing_draws_with_it(capsys):
-    assert not [name for name in findings(capsys) if "GL" in name]
-    sources = Path(doctor.__file__).parents[1].rglob("*.py")
-    drawing = re.compile(r"\bGLContext\b|\bRenderer\b|\bMjrContext\b|MUJOCO_GL")
-    assert not [path.name for path in sources if drawing.search(path.read_text(encoding="utf-8"))]
+@pytest.mark.parametrize("found", ["egl", None])
+def test_the_renderer_of_videos_is_told_or_how_to_get_one(capsys, monkeypatch, found):
+    monkeypatch.setattr("skillframe.reports.opengl.backend", lambda: found)
+    row = findings(capsys)["OpenGL"]
+    assert row["found"] == (found or "") and ("libosmesa6" in row["fix"]) == (found is None) and not row["required"]

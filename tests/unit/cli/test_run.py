@@ -1,4 +1,5 @@
 import json
+import re
 import shlex
 from pathlib import Path
 
@@ -27,7 +28,9 @@ def test_a_run_leaves_a_trace_a_page_and_a_film(skill: str, tmp_path: Path, caps
     files = {"trace": tmp_path / "run.npz", "replay": tmp_path / "run.html", "video": tmp_path / "run.mp4"}
     options = ["--out", str(files["trace"]), "--replay", str(files["replay"]), "--video", str(files["video"])]
     code = run(["run", skill, *FREE, "--duration", "0.1", *options, "--json"])
-    said = json.loads(capsys.readouterr().out)
+    captured = capsys.readouterr()
+    said = json.loads(captured.out)
+    assert len(re.findall(r"^note: the video was drawn by .* renderer", captured.err, re.MULTILINE)) == 1
     assert code == (0 if said["success"] else 1)
     assert {what: said[what] for what in files} == {what: str(path) for what, path in files.items()}
     assert all(path.stat().st_size > 1000 for path in files.values())

@@ -6,8 +6,14 @@ import pytest
 from report_fakes import trace
 
 from skillframe.errors import InputError
+from skillframe.reports import opengl
 from skillframe.reports.stage import stage_of
-from skillframe.reports.video import FRAME_RATE, film_samples, write_film
+from skillframe.reports.video import FRAME_RATE, OWN, STOPPED, film_samples, write_film
+
+
+@pytest.fixture(autouse=True)
+def no_opengl(monkeypatch):
+    monkeypatch.setattr(opengl, "backend", lambda: None)
 
 
 def frames(path):
@@ -31,7 +37,8 @@ def test_a_second_of_a_run_lasts_a_second_and_the_last_sample_is_shown():
 def test_a_film_moves_and_ends_with_what_was_drawn_last(tmp_path):
     run = shortened(trace(samples=101), 6)  # of 25 samples a second
     told = []
-    count = write_film(run, tmp_path / "run.mp4", lambda done, total: told.append((done, total)))
+    count, drawn_by = write_film(run, tmp_path / "run.mp4", lambda done, total: told.append((done, total)))
+    assert drawn_by == OWN
     shown = frames(tmp_path / "run.mp4")
     assert len(shown) == count == len(told)
     assert told[-1] == (count, count)
@@ -50,3 +57,17 @@ def test_a_name_that_is_no_film_and_a_trace_without_geometry_are_refused(tmp_pat
     with pytest.raises(InputError, match="no geometry"):
         write_film(bare, tmp_path / "run.mp4")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_where_opengl_stops_half_way_the_whole_film_is_drawn_again_and_that_is_said(tmp_path, monkeypatch):
+    def dies(stage, samples, cameras, height, name):
+        yield [np.zeros((height, width, 3), dtype=np.uint8) for _, width in cameras]
+        raise opengl.NoPicture("OpenGL stopped drawing")
+
+    run = shortened(trace(samples=101), 3)
+    assert write_film(run, tmp_path / "own.mp4").renderer == OWN
+    monkeypatch.setattr(opengl, "backend", lambda: "egl")
+    monkeypatch.setattr(opengl, "pictures", dies)
+    assert write_film(run, tmp_path / "run.mp4") == (3, STOPPED)
+    assert np.array_equal(frames(tmp_path / "run.mp4"), frames(tmp_path / "own.mp4"))
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["own.mp4", "run.mp4"]
