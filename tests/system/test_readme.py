@@ -12,6 +12,7 @@ from skillframe.paths import data_dirs
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "README.md").read_text(encoding="utf-8")
+PYTHON = PAGE.partition("```python\n")[2].partition("```")[0]
 STEPS = PAGE.partition("## One by one")[2].partition("```\n")[2].partition("```")[0].splitlines()
 
 
@@ -42,3 +43,34 @@ def test_the_readme_s_steps_can_be_typed_one_by_one(tmp_path, monkeypatch):
         else:
             assert words[0] == "skillframe" and run(words[1:]) == 0, words
     assert all((tmp_path / name).is_file() for name in ("run.mp4", "peg.crisp.yaml", "report.html"))
+
+
+@pytest.mark.slow
+@pytest.mark.needs_plugins
+def test_the_readme_s_python_inserts_the_peg_and_is_about_ten_lines(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    exec(compile(PYTHON, "README.md", "exec"), {})
+    assert capsys.readouterr().out.splitlines()[-1].startswith("True ")
+    assert len([line for line in PYTHON.splitlines() if line.strip()]) <= 11
+
+
+def test_the_readme_opens_with_a_moving_picture_that_is_text_and_small():
+    first = re.search(r"!\[[^]]*\]\(([^)]+)\)", PAGE)
+    picture = (ROOT / first.group(1)).read_text(encoding="utf-8")
+    assert PAGE.index(first.group(0)) < PAGE.index("## ")
+    assert len(picture) < 300_000
+    drawn = re.findall(r'<g class="[fz]"[^>]*>(.*)</g>', picture)
+    assert "@keyframes" in picture and len(set(drawn)) == len(drawn) > 20
+    assert not re.search(r"(href|url|src)\s*[=(]|<script", picture), (
+        "a code host shows it as an image, without a network"
+    )
+
+
+def test_every_figure_of_the_readme_s_table_stands_in_its_evidence():
+    evidence = (ROOT / "docs" / "evidence" / "baselines.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (valley|peg in hole|hose coupler)[^|]*\|(.+)\|$", PAGE, re.MULTILINE)
+    assert len(rows) == 3
+    for world, figures in rows:
+        for skill, count in zip(("lmc", "replay", "dmp", "gmr", "seds"), figures.split("|"), strict=True):
+            name = world.replace(" ", "_")
+            assert re.search(rf"^{name} +{skill} +\d+/12 +{int(count)}/40 ", evidence, re.MULTILINE), (world, skill)
