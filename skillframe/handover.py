@@ -52,7 +52,7 @@ def unknown_end(status: int, reason: object) -> str:
 
 
 def shown(observation: Observation) -> Observation:
-    """Copies that a skill can keep and cannot write to; nothing leads from them to what the loop goes by."""
+    """Copies that a skill can keep and cannot write to. Nothing leads from them to what the loop goes by."""
     time, twist, wrench = observation.time.copy(), observation.twist.copy(), observation.wrench.copy()
     position, rotation = observation.pose.position.copy(), observation.pose.rotation.copy()
     time.flags.writeable = position.flags.writeable = rotation.flags.writeable = False
@@ -177,7 +177,7 @@ class CommandCheck:
         self._values: list[Float | None] = [None, None]
 
     def faults(self, command: Command, tick: int) -> list[Fault]:
-        """Trials whose row is no command; those among them that have ended are for the loop to leave out.
+        """Trials whose row is no command. The loop leaves out those among them that have ended.
 
         Raises:
             SkillframeError: as `check_shapes`.

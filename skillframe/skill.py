@@ -52,7 +52,7 @@ class Observation(NamedTuple):
 
 
 class Impedance(NamedTuple):
-    """Stiffness and damping at the centre of compliance, base axes; build it once per phase and share it.
+    """Stiffness and damping at the centre of compliance, base axes. Build it once per phase and share it.
 
     Attributes:
         stiffness: (N, 6, 6) or (6, 6), symmetric positive semi-definite; zero along compliant axes.
@@ -98,12 +98,12 @@ class Skill(ABC):
 
     @abstractmethod
     def step(self, observation: Observation) -> Command:
-        """Answer one observation; must return at once."""
+        """Answer one observation. This must return at once."""
 
     def restart(
         self, rows: NDArray[np.intp], observation: Observation, rngs: Sequence[np.random.Generator]
     ) -> None:  # fmt: skip
-        """Start again in some trials, as `start` would in them alone; the others go on undisturbed.
+        """Start again in some trials, as `start` would in them alone. The others go on undisturbed.
 
         Compositions use it to let trials enter a skill at different times. A skill that does not provide it is run
         there with one instance per trial.
@@ -116,7 +116,7 @@ class Skill(ABC):
         raise NotImplementedError(f"{type(self).__name__} cannot start again in some of its trials; see per_trial")
 
     def journal(self, trial: int) -> list[tuple[float, str]]:
-        """What happened in a trial and why: times [s] and words; empty if there is nothing to tell."""
+        """What happened in a trial and why: times [s] and words, or empty if there is nothing to tell."""
         return []
 
 
@@ -126,7 +126,7 @@ def no_reasons(count: int) -> Reasons:
 
 
 class _PerTrial(Skill):
-    """Runs one scalar skill per trial; see `per_trial`."""
+    """Runs one scalar skill per trial (see `per_trial`)."""
 
     def __init__(self, make: Callable[[], Skill]) -> None:
         self._make = make

@@ -34,7 +34,7 @@ def case(seeds, plate=1e6):
 
 
 def window(log, valid):
-    """(T, N) both boom pistons truly faster than 10 mm/s and the estimate valid; and the same whether valid or not."""
+    """(T, N) both boom pistons truly faster than 10 mm/s and the estimate valid, and the same whether valid or not."""
     fast = (np.abs(log.speed[..., :2]) > 0.010).all(axis=-1) & (np.arange(len(valid)) * DT > SLIDING)[:, None]
     return fast & valid, fast
 

@@ -40,7 +40,7 @@ class Axis:
     numbers: tuple[Value, ...]
 
     def draw(self, rng: np.random.Generator) -> Value:
-        """One independent value; for "uniform", "normal" and "choice" axes."""
+        """One independent value, for "uniform", "normal" and "choice" axes."""
         if self.kind == "choice":
             return self.numbers[int(rng.integers(len(self.numbers)))]
         a, b = float(self.numbers[0]), float(self.numbers[1])
@@ -54,7 +54,7 @@ class Axis:
 
 
 def cells_of(vary: Mapping[str, Axis]) -> int:
-    """Number of cells of the product of all grid axes; 1 without any."""
+    """Number of cells of the product of all grid axes, or 1 without any."""
     return math.prod(len(axis.numbers) for axis in vary.values() if axis.kind == "grid")
 
 

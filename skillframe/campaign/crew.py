@@ -27,7 +27,7 @@ LONELY_S = 60.0
 
 
 class SchedulerError(SkillframeError):
-    """A cluster that cannot be used; says why."""
+    """A cluster cannot be used. The message says why."""
 
 
 class Crew:
@@ -63,7 +63,7 @@ class Crew:
         return max(1, len(self.usable) + len(self._asked))
 
     def look(self) -> None:
-        """See who came, who left, and who has answered; returns at once.
+        """See who came, who left, and who has answered. Returns at once.
 
         Raises:
             SchedulerError: there is nobody left to work, or nobody who may.

@@ -1,4 +1,4 @@
-"""What a result depends on besides the campaign: versions, processor; and the hashes of everything that went in.
+"""What a result depends on besides the campaign: versions, processor, and hashes of everything that went in.
 
 Rows are bit-identical on one kind of machine with one set of versions; another processor or numpy build may round
 sines differently, so replays name such differences instead of blaming the trial.

@@ -46,7 +46,7 @@ def check_name(name: str, params: type, where: str) -> None:
 
 
 def check_value(name: str, value: Value, params: type, where: str) -> Value:
-    """A value of a quantity, of the type that its world parameter has; every other quantity is a number."""
+    """A value of a quantity, of the type that its world parameter has. Every other quantity is a number."""
     hint = world_hints(params).get(name, float)
     checked: Value = coerce(in_si(name, value, params, where), hint, where)
     return checked

@@ -19,7 +19,7 @@ def remarks(
     folder: Path, rows: Sequence[Row], *, unchecked: int, environments: Sequence[Environment],
     summary: Mapping[str, Any] | None,
 ) -> list[str]:  # fmt: skip
-    """Sentences about rows, most serious first; none where all is well.
+    """Sentences about rows, most serious first, or none where all is well.
 
     Args:
         folder: the campaign's folder, for what to type.

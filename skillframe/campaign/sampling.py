@@ -39,7 +39,7 @@ def seed_sequence(seed: int, trial: int, name: str) -> np.random.SeedSequence:
 
 
 def trial_rng(seed: int, trial: int) -> np.random.Generator:
-    """The generator that a trial's run is handed; a fresh one at every call."""
+    """The generator that a trial's run gets. Each call makes a fresh one."""
     return np.random.default_rng(seed_sequence(seed, trial, RUN))
 
 
@@ -109,7 +109,7 @@ def _sobol_places(spec: CampaignSpec, trials: Sequence[int]) -> NDArray[np.intp]
 
 
 def _sobol_points(seed: int, dimension: int, last: int) -> Float:
-    """Points 0 .. last at least of the scrambled sequence, (m, dimension); generated in powers of two."""
+    """At least points 0 .. last of the scrambled sequence, (m, dimension), generated in powers of two."""
     from scipy.stats import qmc
 
     scramble = np.random.default_rng(seed_sequence(seed, 0, "sobol"))

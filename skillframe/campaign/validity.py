@@ -82,7 +82,7 @@ class Validity:
     note: str = ""
 
     def interval(self, successes: int, trials: int) -> Interval | None:
-        """The 95 % interval of a rate; None if there is none."""
+        """The 95 % interval of a rate, or None if there is none."""
         if self.basis is Basis.NONE:
             return None
         if trials == 0:
@@ -91,7 +91,7 @@ class Validity:
         return (statistics.clopper_pearson if fixed else statistics.confidence_sequence)(successes, trials)
 
     def p_value(self, only_first: int, only_second: int) -> float | None:
-        """p-value of "both skills are equally good" from the trials where they differ; None if there is none."""
+        """p-value of "both skills are equally good" from the trials where they differ, or None if there is none."""
         if self.basis is Basis.NONE:
             return None
         fixed = self.basis is Basis.FIXED

@@ -1,4 +1,4 @@
-"""Rows held against the campaign that they claim to be of, when they are read; and results.csv against its hash.
+"""Checks rows against their campaign, and results.csv against its hash, when they are read.
 
 Everything in a row but its outcome follows from the campaign file: the seed, and the draws of that trial. A row whose
 trial, skill, seed or draw is another one, a second row of one trial, and one whose `success` and `failure` contradict

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any], as_json: bool) -> int:
-    """Tell the outcome of a campaign that has ended; its exit code."""
+    """Tell the outcome of a campaign that has ended. Returns its exit code."""
     from skillframe.campaign.summary import below_bar
     from skillframe.robot.guesses import guess_note
     from skillframe.robot.spec import load_robot

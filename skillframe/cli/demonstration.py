@@ -102,7 +102,7 @@ def reading_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _settings(options: dict[str, Any]) -> dict[str, Any]:
-    """Options as given, without those that were not; a second --columns is the wrench file's."""
+    """The options that were given. A second --columns is the wrench file's."""
     columns = options.pop("columns")
     if len(columns) > 2 or (len(columns) == 2 and options["wrench"] is None):
         raise click.UsageError("--columns can be given twice at most, the second for the --wrench file")

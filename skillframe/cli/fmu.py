@@ -117,7 +117,7 @@ def check(file: str, as_json: bool, allow: bool) -> int:
 
 
 def _print_check(path: Path, found: dict[str, Any]) -> None:
-    """What was found, a line each; then what can be connected and set, with units and start values."""
+    """What was found, one line each, then what can be connected and set, with units and start values."""
     from skillframe.cli.output import table
     from skillframe.fmu.check import confinement_in_words
     from skillframe.fmu.inspection import inspect_fmu

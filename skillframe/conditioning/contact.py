@@ -125,7 +125,7 @@ def _runs(mask: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[tuple[int, i
 def first_free_air(
     time: Float, wrench: Float, noise: NoiseFigures, alive: NDArray[np.bool_] | None = None, where: str = "recording"
 ) -> tuple[float, float]:
-    """The stretch from the start to 0.1 s before the first contact [s], or to the first stall; else to the end.
+    """The stretch from the start to 0.1 s before the first contact [s], or to the first stall, or else to the end.
 
     Raises:
         InputError: the recording begins with a stall, so that what follows may be contact.

@@ -76,7 +76,7 @@ def _windows(time: Float, alive: NDArray[np.bool_] | None) -> tuple[int, NDArray
 
 
 def _cut(samples: NDArray[Any], width: int) -> NDArray[Any]:
-    """Samples (T, ...) as windows (K, width, ...); what fills no window is left out."""
+    """Samples (T, ...) as windows (K, width, ...). What fills no window is left out."""
     count = len(samples) // width
     return samples[: count * width].reshape(count, width, *samples.shape[1:])
 
@@ -130,7 +130,7 @@ def _innovation_variance(corners: Float, wrench: Float, dt: float) -> Float:
 
 
 def model_of(demonstration: Demonstration) -> WrenchModel:
-    """The wrench model of one demonstration; sensor noise stated in its metadata wins over the estimate."""
+    """The wrench model of one demonstration. Sensor noise stated in its metadata wins over the estimate."""
     model = estimate_model(demonstration.time, demonstration.wrench, alive_samples(demonstration))
     sensor = demonstration.meta.get("sensor")
     if not isinstance(sensor, dict):

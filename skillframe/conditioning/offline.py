@@ -48,7 +48,7 @@ def smooth(demonstration: Demonstration, model: WrenchModel | None = None) -> De
 
 
 def filter_wrench(demonstration: Demonstration, model: WrenchModel | None = None) -> Demonstration:
-    """The demonstration with its wrench filtered as the loop would, causally; arguments as `smooth`."""
+    """The demonstration with its wrench filtered as the loop would, causally. Takes the arguments of `smooth`."""
     return _with_filter(demonstration, model, "filter")
 
 
@@ -138,7 +138,7 @@ def doubtful_bias(demonstration: Demonstration, removed: Removed) -> float | Non
 
 
 def _typical_noise(demonstration: Demonstration, live: NDArray[np.bool_]) -> float:
-    """Scatter of the force in motion, rms per axis [N]; 0 where a recording is too short for any."""
+    """Scatter of the force in motion, rms per axis [N], or 0 where a recording is too short for any."""
     if live.sum() < LEAST_SAMPLES:
         return 0.0
     return float(np.sqrt((noise_figures(demonstration.time, demonstration.wrench, live).typical[:3] ** 2).mean()))

@@ -145,7 +145,7 @@ def identify_payload(wrench: Float, gravity: Float) -> Payload:
 
 
 def _solve(design: Float, reading: Float) -> _Solution:
-    """Least squares of reading = design first + bias, over all samples; the scaled condition number with it."""
+    """Least squares of reading = design first + bias, over all samples, with the scaled condition number."""
     count = design.shape[-1]
     columns = np.concatenate([design / 9.81, np.broadcast_to(np.eye(3), (*design.shape[:1], 3, 3))], axis=-1).reshape(
         -1, count + 3

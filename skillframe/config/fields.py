@@ -26,7 +26,7 @@ def settings_of(kind: type) -> Iterator[dict[str, Any]]:
 
 
 def texts(kind: type) -> dict[str, str]:
-    """Entries under "Attributes:" in the docstrings of a dataclass and its bases; several names may share one."""
+    """Entries under "Attributes:" in the docstrings of a dataclass and its bases. Several names may share one."""
     said: dict[str, str] = {}
     for each in reversed(kind.__mro__):
         names: list[str] = []

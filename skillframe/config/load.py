@@ -58,7 +58,7 @@ def build(cls: type[T], values: Mapping[str, Any], where: str) -> T:
 
 
 def _in_si(cls: type, key: str, value: Any, hint: Any, where: str) -> Any:
-    """A text such as "8mm" as a number, where the field is one; its docstring says in which unit."""
+    """A text such as "8mm" as a number, where the field is one. Its docstring says in which unit."""
     if not isinstance(value, str) or parse(value) is None or str in (hint, *typing.get_args(hint)):
         return value
     return si(value, unit_of(texts(cls).get(key, "")), where)
@@ -137,7 +137,7 @@ def _coerce_scalar(value: Any, hint: Any, where: str) -> Any:
 
 
 def parse_setting(text: str) -> tuple[str, Any]:
-    """`KEY=VALUE` from the command line; the value is read as TOML, or kept as text where it is none.
+    """`KEY=VALUE` from the command line. The value is read as TOML, or kept as text where it is none.
 
     Raises:
         InputError: there is no "=", or the value is beyond what a file may hold, such as a number of 41 digits.

@@ -1,4 +1,4 @@
-"""Quantities with a unit, "8mm", "5deg", "20N", as SI numbers; a bare number is SI already.
+"""Quantities with a unit, "8mm", "5deg", "20N", as SI numbers. A bare number is SI already.
 
 A unit is a word of `UNITS`, and each word belongs to one SI unit. A quantity asks for one SI unit; a count or a ratio
 has the unit "" and takes no word.
@@ -48,7 +48,7 @@ def parse(text: str) -> Quantity | None:
 
 
 def unit_of(text: str) -> str:
-    """The SI unit that a text about a quantity states, "of the peg [m]"; "" if it states none that is known."""
+    """The SI unit that a text about a quantity states, "of the peg [m]", or "" if it states none that is known."""
     for said in _SAID.findall(text):
         unit = {"Nm": "N m"}.get(said, str(said))
         if unit in _FACTORS:

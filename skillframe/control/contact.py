@@ -111,7 +111,7 @@ class TrueContact:
         return self._torque is not None
 
     def step(self, force: Float, estimate: Float, torque: Float | None) -> None:
-        """Take in a tick; the arrays are kept until the next look and must not change.
+        """Take in a tick. The arrays are kept until the next look and must not change.
 
         Args:
             force: (N,) size of the true contact force.
@@ -155,7 +155,7 @@ class TrueContact:
 
 
 def over(peak: float, limit: float | None) -> str:
-    """The mark of a trial that did not fail and still peaked above its limit; "" if it did not.
+    """The mark of a trial that did not fail and still peaked above its limit, or "" if it did not.
 
     Args:
         peak: largest true force of the trial [N].

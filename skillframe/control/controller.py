@@ -41,7 +41,7 @@ class Reading(NamedTuple):
 
 
 class ImpedanceController:
-    """The control law of N trials; rows are independent of each other."""
+    """The control law of N trials. Rows are independent of each other."""
 
     def __init__(self, count: int) -> None:
         self._count = count

@@ -1,4 +1,4 @@
-"""What ended a trial, as a short code for tables; the sentence that goes with it stands in `failure` and `reason`."""
+"""What ended a trial, as a short code for tables. The sentence that goes with it stands in `failure` and `reason`."""
 
 from __future__ import annotations
 

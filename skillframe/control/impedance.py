@@ -43,7 +43,7 @@ def impedance_wrench(
 
 
 def task_inertia(jacobian: Float, mass_matrix: Float) -> Float:
-    """Task-space inertia (N, 6, 6), Lambda = (J M^-1 J^T + eps)^-1; eps keeps singular postures finite."""
+    """Task-space inertia (N, 6, 6), Lambda = (J M^-1 J^T + eps)^-1. `eps` keeps singular postures finite."""
     mobility = jacobian @ np.linalg.solve(mass_matrix, np.swapaxes(jacobian, -1, -2))
     inertia: Float = np.linalg.inv(mobility + 1e-6 * np.eye(6)).astype(np.float64, copy=False)
     return 0.5 * (inertia + np.swapaxes(inertia, -1, -2))
@@ -74,7 +74,7 @@ def critical_damping(
 
 
 def _eigen(matrix: Float) -> tuple[Float, Float]:
-    """Eigenvalues (..., n) and vectors (..., n, n); NaN for a matrix that is not finite, as of a trial that diverged.
+    """Eigenvalues (..., n) and vectors (..., n, n). NaN for a matrix that is not finite, as of a trial that diverged.
 
     LAPACK would refuse such a matrix, and with it every other of the batch.
     """

@@ -1,4 +1,4 @@
-"""Safety limits that stop a trial, with the reason in words; each is checked at every control tick.
+"""Safety limits that stop a trial, with the reason in words. Each is checked at every control tick.
 
 - force: norm of the filtered contact force above `force_n` (and torque above `torque_n_m`);
 - motors: torque rate, effort, speed and range of the joints (`skillframe.control.motors`);
@@ -26,7 +26,7 @@ SPEED_CEILING, WRENCH_CEILING = 20.0, 1e6
 
 
 class LimitGuard:
-    """Keeps the limits of N trials; rows are independent of each other.
+    """Keeps the limits of N trials. Rows are independent of each other.
 
     Args:
         limits: of the robot.

@@ -31,7 +31,7 @@ MOTOR_S, RANGE_SLACK = 0.1, 1e-3  # s; rad or m, more than rounding and noise, l
 
 
 class JointLimits(NamedTuple):
-    """Limits of the generalised velocities of one batch row, in the simulator's order; infinite where none is given.
+    """Limits of the generalised velocities of one batch row, in the simulator's order. Infinite where none is given.
 
     Attributes:
         names: (nv) of the joints.
@@ -55,7 +55,7 @@ class JointLimits(NamedTuple):
 
 
 def joint_limits(robot: RobotModel, engine: Any, arms: Sequence[NDArray[np.int64]] | None = None) -> list[JointLimits]:
-    """What the URDF says of a robot's joints, for each arm, or for the whole robot; empty if it has no joints.
+    """What the URDF says of a robot's joints, for each arm, or for the whole robot. Empty if it has no joints.
 
     Of a joint that no tool frame is carried by, as a gripper's that is closed, the range is not watched.
 
@@ -90,7 +90,7 @@ def joint_limits(robot: RobotModel, engine: Any, arms: Sequence[NDArray[np.int64
 
 
 class Motors:
-    """The motors of N rows; rows are independent of each other.
+    """The motors of N rows. Rows are independent of each other.
 
     Args:
         limits: of each row's joints: one for all, or one per arm, which rows take in turn.
@@ -198,7 +198,7 @@ class Motors:
         return f"the URDF gives no effort or no velocity for {few}; what it does not give counts as unlimited"
 
     def shares(self) -> tuple[Float, Float]:
-        """(N,) largest torque asked for over effort so far, and largest speed over velocity; NaN where none is given.
+        """(N,) largest torque asked for over effort so far, and largest speed over velocity. NaN where none is given.
 
         The torque is what the law asks for, so that a share above 1 tells how much a motor was short of.
         """

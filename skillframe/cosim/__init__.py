@@ -1,4 +1,4 @@
-"""Co-simulation of mechanics and actuators over power bonds; usable without any robot.
+"""Co-simulation of mechanics and actuators over power bonds. It needs no robot.
 
 `Master` couples `Mechanics` (forces in, motion out) with a bank of actuators (motion in, forces out),
 `coupling_numbers` and `require_stable` say beforehand whether a step is small enough.

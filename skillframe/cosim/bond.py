@@ -23,5 +23,5 @@ def bond_work(begin: Float, end: Float, path: Float, v0: Float, v1: Float, step:
 
 
 def relative_residual(difference: Float, exchanged: Float) -> Float:
-    """|energy made or lost| per energy exchanged, (count,); zero where nothing was exchanged."""
+    """|energy made or lost| per energy exchanged, (count,), or zero where nothing was exchanged."""
     return np.abs(difference) / np.where(exchanged > 0.0, exchanged, 1.0)

@@ -22,7 +22,7 @@ SPEED = 1e-3  # m/s, of the trial motion
 
 
 class StepTooLarge(SkillframeError):
-    """The step cannot be stable with this load; the sentence has the numbers and the step that would do."""
+    """The step cannot be stable with this load. The sentence has the numbers and the step that would do."""
 
 
 class Coupling(NamedTuple):
@@ -47,7 +47,7 @@ class Coupling(NamedTuple):
 
 
 def coupling_numbers(bank: Actuators, mass: Float, step: float, time: float = 0.0) -> Coupling:
-    """Try the actuators out at their present inputs with a slow push and pull; they are back afterwards.
+    """Try the actuators out at their present inputs with a slow push and pull. They are back afterwards.
 
     Args:
         bank: started; position inputs at the pose to be judged.
@@ -94,7 +94,7 @@ def _pushed(bank: Actuators, speed: float, step: float, time: float, kept: Float
 def require_stable(
     coupling: Coupling, step: float, names: Sequence[str], warn: Callable[[str], None] = lambda text: None
 ) -> None:
-    """Refuse a step that cannot be stable; warn about one that will be inaccurate.
+    """Refuse a step that cannot be stable. Warn about one that will be inaccurate.
 
     Raises:
         StepTooLarge: with the bond, its numbers, and a step that would do.

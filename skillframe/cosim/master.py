@@ -96,7 +96,7 @@ class Master:
         command: Float | float = 0.0,
         parameters: Sequence[Mapping[str, Any]] | None = None,
     ) -> None:
-        """Start the bank at the plant's present motion; the plant feels the forces from then on.
+        """Start the bank at the plant's present motion. The plant feels the forces from then on.
 
         Args:
             time: [s].
@@ -112,14 +112,14 @@ class Master:
         self.difference[:], self.exchanged[:] = 0.0, 0.0
 
     def step(self, command: Float | float) -> bool:
-        """One macro step H under a command (count,); False if an actuator has failed (see `trouble`)."""
+        """One macro step H under a command (count,). Returns False if an actuator has failed (see `trouble`)."""
         self.bank.u[:, self._column["command"]] = command
         if self.settings.tolerance_j is None:
             return self._exchange(self.settings.step)
         return self._halving(self.settings.tolerance_j)
 
     def _halving(self, tolerance: float) -> bool:
-        """H in parts, each small enough for the bond error; parts are H / 2^n, so that they end on H exactly."""
+        """H in parts, each small enough for the bond error. Parts are H / 2^n, so that they end on H exactly."""
         whole, level, done = self.settings.step, 0, 0.0
         deepest = max(0, int(np.floor(np.log2(whole / self.settings.least_step))))
         begin = self.time
@@ -173,13 +173,13 @@ class Master:
         return fine
 
     def _felt(self, before: Float) -> Float:
-        """Forces (count,) of the bank; what was felt before, where an actuator has ended."""
+        """Forces (count,) of the bank. Where an actuator has ended, its last force."""
         force = self.bank.y[:, self._force]
         ended = 0 in self.bank.active.tobytes()
         return np.where(self.bank.active > 0, force, before) if ended else force.copy()
 
     def _actuate(self, begin: Motion, step: float) -> tuple[bool, Float]:
-        """Step the bank along the parabola of the motion; (all well, work the actuators gave)."""
+        """Step the bank along the parabola of the motion. Returns (all well, work that the actuators gave)."""
         x, v, a = begin
         if self._plain and self._all_give_work:  # the common case of what follows, the same numbers in fewer calls
             self._show(x, v, a)

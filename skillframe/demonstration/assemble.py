@@ -133,7 +133,7 @@ def _checked_wrench_file(
 
 
 def _cut(columns: Columns, options: ReadOptions, margin: float = 0.0) -> Columns:
-    """The rows between `start` and `stop`, and a margin [s]; what lies outside is never judged.
+    """The rows between `start` and `stop`, and a margin [s]. What lies outside is never judged.
 
     Raises:
         InputError: fewer than two rows are left.

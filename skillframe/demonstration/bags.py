@@ -111,7 +111,7 @@ def _pose_topic(path: Path, topics: Mapping[str, str], options: ReadOptions) -> 
 
 
 def _wrench_topic(path: Path, topics: Mapping[str, str], options: ReadOptions, meta: Mapping[str, Any]) -> str | None:
-    """The wrench's topic; None where the metadata says that nothing was touched and there is none."""
+    """The wrench's topic, or None where the metadata says that nothing was touched and there is none."""
     if options.wrench_topic is None and meta.get("contact") is False and WRENCHES not in topics.values():
         return None
     return _chosen(path, topics, options.wrench_topic, [WRENCHES], "wrench", [WRENCHES])
@@ -171,7 +171,7 @@ def _frames(options: ReadOptions) -> tuple[str, str]:
 
 
 def _clock(path: Path, recorded: Recorded, zero: int, rate: float | None, option: str) -> dict[str, Float]:
-    """The header clock from `zero` on; none where the stamps were never filled in and a rate is given."""
+    """The header clock from `zero` on, or none where the stamps were never filled in and a rate is given."""
     if np.any(recorded.stamps != 0):
         return {"t": (recorded.stamps - zero).astype(np.float64) * 1e-9}
     if rate is None:

@@ -34,7 +34,7 @@ def alias(name: str) -> str:
 
 
 def refuse_missing(columns: Columns, names: Iterable[str], what: str, advice: str = "") -> None:
-    """Refuse a file without these columns; suggests what a look-alike is probably meant to be."""
+    """Refuse a file without these columns. Suggests what a look-alike is probably meant to be."""
     missing = [name for name in names if name not in columns]
     if not missing:
         return
@@ -47,7 +47,7 @@ def refuse_missing(columns: Columns, names: Iterable[str], what: str, advice: st
 
 
 def refuse_not_finite(columns: Columns) -> None:
-    """Refuse NaN and infinity in every column that has a meaning; other columns may hold gaps."""
+    """Refuse NaN and infinity in every column that has a meaning. Other columns may hold gaps."""
     for name in (n for n in KNOWN if n in columns):
         bad = np.flatnonzero(~np.isfinite(columns[name]))
         beyond = np.flatnonzero(np.abs(columns[name]) > LARGEST)

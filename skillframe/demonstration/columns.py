@@ -125,7 +125,7 @@ def _picks(table: Table, spec: str | None) -> dict[str, int]:
 
 
 def split_names(spec: str) -> list[str]:
-    """The names of a list of columns, separated by commas or else blanks; familiar other names are understood."""
+    """The names of a list of columns, separated by commas or else blanks. Familiar other names are understood."""
     names = [name.strip() for name in (spec.split(",") if "," in spec else spec.split())]
     return [name if "=" in name else ALIASES.get(name, name) for name in names]
 
@@ -150,7 +150,7 @@ def _unique(source: str, pairs: list[tuple[str, int]]) -> dict[str, int]:
 
 
 def select_arm(columns: Columns, arm: str | None) -> Columns:
-    """One arm's columns without their prefix; everything else stays as it is.
+    """One arm's columns without their prefix. Everything else stays as it is.
 
     Raises:
         InputError: several arms and none chosen, no such arm, or arms whose clocks differ.

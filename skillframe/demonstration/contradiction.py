@@ -1,4 +1,4 @@
-r"""A wrench frame that metadata declare and the data contradict; only an explicit declaration is judged.
+r"""A wrench frame that metadata declare and the data contradict. Only an explicit declaration is judged.
 
 Two signatures, both our choice:
 
@@ -87,7 +87,7 @@ def fit_weight_and_bias(force: Float, rotation: Float, frame: str) -> tuple[Floa
 
 
 def weight_evidence(force: Float, rotation: Float, frame: str, weighs: bool = False) -> str | None:
-    """Evidence that forces (T, 3), said to be in these axes, are in the others; None if there is none."""
+    """Evidence that forces (T, 3), said to be in these axes, are in the others, or None if there is none."""
     pick = np.linspace(0, len(force) - 1, min(SAMPLES, len(force))).round().astype(int)
     force, rotation = force[pick], rotation[pick]
     other = "tool" if frame == "base" else "base"

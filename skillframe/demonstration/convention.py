@@ -28,7 +28,7 @@ STANDARD = {"frame": "base", "point": "tool", "sign": "environment", "includes_t
 
 
 def declared_wrench(source: str, meta: Mapping[str, Any], options: ReadOptions) -> dict[str, Any]:
-    """What metadata and settings say about the wrench, checked; settings win.
+    """What metadata and settings say about the wrench, checked. Settings win.
 
     Raises:
         InputError: an unknown key, frame or sign, or a value of the wrong type.

@@ -1,4 +1,4 @@
-"""CSV demonstrations: a header, a row per sample, metadata in `NAME.meta.toml` beside it; numbers round-trip."""
+"""CSV demonstrations: a header, a row per sample, metadata in `NAME.meta.toml` beside it. Numbers round-trip."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def demonstration_columns(demonstration: Demonstration) -> Columns:
 
 
 def write_csv(demonstration: Demonstration, path: Path) -> None:
-    """Write a CSV and its metadata; each file appears complete or not at all."""
+    """Write a CSV and its metadata. Each file appears complete or not at all."""
     columns = demonstration_columns(demonstration)
     for name in columns:
         if any(c in name for c in ',;"\n'):

@@ -47,7 +47,7 @@ def _split_columns(table: Table, options: ReadOptions) -> ReadOptions:
 
 
 def read_wrench_file(options: ReadOptions) -> Columns | None:
-    """The columns of the separate wrench file; None where there is none.
+    """The columns of the separate wrench file, or None where there is none.
 
     Without a header and without names, six columns are fx ... tz and seven have the time before them.
     """

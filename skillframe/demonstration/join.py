@@ -82,7 +82,7 @@ def _gaps(other: Columns, time: Float) -> list[str]:
 
 
 def interpolate(columns: Columns, time: Float) -> dict[str, Float]:
-    """Every column at other times inside its clock; attitudes along the shortest rotation."""
+    """Every column at other times inside its clock. Attitudes turn along the shortest rotation."""
     clock = columns["t"]
     before = np.searchsorted(clock, time, side="right") - 1
     result = {

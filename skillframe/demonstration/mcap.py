@@ -79,7 +79,7 @@ def _records(path: Path, file: BinaryIO) -> Iterator[_Record]:
 
 
 def _chunk_is_protected(path: Path, file: BinaryIO, record: _Record) -> bool:
-    """Check one chunk's checksum and size; False where it carries none."""
+    """Check one chunk's checksum and size. Returns False where it carries none."""
     file.seek(record.content)
     content = file.read(record.length)
     try:
@@ -116,7 +116,7 @@ def _unpacked(path: Path, record: _Record, method: str, body: bytes, size: int) 
 
 
 def _zstd() -> Any:
-    """A function of packed bytes and size; from whichever library the installed `rosbags` brings."""
+    """A function of packed bytes and size, from whichever library the installed `rosbags` brings."""
     for name in ("compression.zstd", "backports.zstd"):
         try:
             module = import_module(name)
@@ -128,7 +128,7 @@ def _zstd() -> Any:
 
 
 def _data_is_protected(path: Path, file: BinaryIO, end: _Record, header: _Record) -> bool:
-    """Check the data section's checksum; False where there is none. Some writers count it from the file's first byte.
+    """Check the data section's checksum. False where there is none. Some writers count it from the file's start.
 
     Others begin after the magic bytes or after the header; any of the three that fits is right.
     """

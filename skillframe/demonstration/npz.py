@@ -73,7 +73,7 @@ def _meta(path: Path, arrays: dict[str, Any]) -> dict[str, Any]:
 
 
 def _columns(path: Path, arrays: dict[str, Any], notes: list[str]) -> dict[str, Float]:
-    """One number per sample and name; what else the file holds beside them is left out with a note."""
+    """One number per sample and name. What else the file holds beside them is left out with a note."""
     columns: dict[str, Float] = {}
     for name, array in arrays.items():
         if name == "meta":
@@ -103,7 +103,7 @@ def _further(name: str) -> bool:
 
 
 def write_npz(demonstration: Demonstration, path: Path) -> None:
-    """Write the native form; the file appears complete or not at all."""
+    """Write the native form. The file appears complete or not at all."""
     meta = {"quaternion": "xyzw", **demonstration.meta, "format": FORMAT, "version": VERSION}
     columns = demonstration_columns(demonstration)
     if "meta" in columns:

@@ -25,7 +25,7 @@ SCALES: Mapping[str, Mapping[str, float]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadOptions:
-    """Reading settings; every one is optional.
+    """Reading settings. Every one is optional.
 
     Attributes:
         columns: column names in order, "t,px,py,pz,...", or picks by header, "t=stamp,px=x,...". "_" ignores a column.

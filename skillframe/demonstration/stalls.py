@@ -64,7 +64,7 @@ def stalls(demonstration: Demonstration) -> list[Stall]:
 
 
 def every_stall(time: Float, pose: Float, wrench: Float, meta: Mapping[str, Any], source: str = "") -> list[Stall]:
-    """Stalls that metadata name and stalls that samples show; arguments as `find`."""
+    """Stalls that metadata name and stalls that samples show. Takes the arguments of `find`."""
     known = kept_stalls(meta, source)
     shown = find(time, pose, wrench, meta)
     known += [s for s in shown if not any(k.what == s.what and k.start <= s.stop and s.start <= k.stop for k in known)]
@@ -102,7 +102,7 @@ def as_meta(found: Sequence[Stall]) -> list[dict[str, Any]]:
 
 
 def alive(demonstration: Demonstration, found: Sequence[Stall] | None = None) -> NDArray[np.bool_]:
-    """Mask (T,) of samples whose wrench is no stall's; the stalls are looked for if they are not given."""
+    """Mask (T,) of samples whose wrench is no stall's. The stalls are looked for if they are not given."""
     time = demonstration.time
     mask = np.ones(len(time), dtype=bool)
     for stall in stalls(demonstration) if found is None else found:
@@ -171,7 +171,7 @@ def _held(time: Float, values: Float, least: float) -> list[tuple[int, int]]:
 
 
 def _resolution(values: Float) -> float:
-    """The least difference of two values; infinite where there is one only."""
+    """The least difference of two values. Infinite where there is only one."""
     apart = np.diff(np.unique(values))
     return float(apart.min()) if apart.size else np.inf
 

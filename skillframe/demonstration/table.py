@@ -95,7 +95,7 @@ def read_table(path: Path, header: bool | None = None) -> Table:
 
 
 def _delimiter(first: str, row: str) -> str | None:
-    """The separator of a row of data; None for runs of blanks and tabs.
+    """The separator of a row of data, or None for runs of blanks and tabs.
 
     A cell may hold blanks (a date and its time) where the file's first row has as many cells and no number among them.
     """
@@ -124,7 +124,7 @@ def _is_numeric(line: str, delimiter: str | None) -> bool:
 
 
 def _number(field: str) -> float | None:
-    """The number in a cell, perhaps in quotes; what only Python calls one (1_000, other scripts' digits) is none."""
+    """The number in a cell, perhaps in quotes. What only Python calls one (1_000, other scripts' digits) is none."""
     field = field.strip().strip('"')
     try:
         return float(field) if field.isascii() and "_" not in field else None

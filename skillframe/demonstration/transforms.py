@@ -25,7 +25,7 @@ UNIT = 0.01  # by which a quaternion's length may differ from 1, as in every dem
 
 
 class Edge(NamedTuple):
-    """How a frame lies in its parent: stamps (T,) [ns], none if for ever; positions (T, 3), quaternions (T, 4)."""
+    """How a frame lies in its parent: stamps (T,) [ns] (none if for ever), positions (T, 3), quaternions (T, 4)."""
 
     parent: str
     stamps: NDArray[np.int64] | None

@@ -83,7 +83,7 @@ def parse_json(text: str | bytes, where: object, fix: str) -> Any:
 
 
 def _not_json(error: json.JSONDecodeError) -> str:
-    """What is wrong with text that is not JSON; of a file that was cut off, that it was."""
+    """What is wrong with text that is not JSON, or that the file was cut off."""
     if not error.doc.strip():
         return "is empty"
     cut = not error.doc[error.pos :].strip() or "Unterminated string" in error.msg

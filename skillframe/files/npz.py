@@ -60,7 +60,7 @@ def read_arrays(path: Path, kind: str, fix: str) -> Arrays:
 
 
 def json_member(path: Path, arrays: Arrays, name: str, fix: str) -> dict[str, Any] | None:
-    """The JSON object that one array holds as text; None where it holds something else.
+    """The JSON object that one array holds as text, or None where it holds something else.
 
     Raises:
         InputError: it is text and no JSON, or JSON that `documents.parse_json` refuses.

@@ -1,1 +1,1 @@
-"""FMUs: files, builds, instances and banks of them, in this process or in child processes; nothing of oil."""
+"""FMUs: files, builds, instances and banks of them, in this process or in child processes. No oil here."""

@@ -81,13 +81,13 @@ class Actuators(Protocol):
     notes: tuple[str, ...]
 
     def start(self, time: float = 0.0, parameters: Sequence[Mapping[str, Any]] | None = None) -> None:
-        """Reset every instance and initialise it at `u`; `parameters` (one mapping per instance) come on top."""
+        """Reset every instance and initialise it at `u`. `parameters` has one mapping per instance."""
 
     def step(self, time: float, step: float) -> bool:
-        """Advance from `time` by `step` [s] with inputs `u`; True if every active instance went well."""
+        """Advance from `time` by `step` [s] with inputs `u`. Returns True if every active instance went well."""
 
     def refresh(self) -> bool:
-        """Outputs at the present inputs; no time passes."""
+        """Outputs at the present inputs. No time passes."""
 
     def save(self) -> None:
         """Remember the state of every active instance, for `restore`."""
@@ -99,7 +99,7 @@ class Actuators(Protocol):
         """What one instance can do."""
 
     def problem(self, index: int) -> str:
-        """Why an instance failed, one sentence; empty if it did not."""
+        """Why an instance failed, one sentence, or empty if it did not."""
 
     def close(self) -> None:
-        """Free everything; the bank cannot be used afterwards."""
+        """Free everything. The bank cannot be used afterwards."""

@@ -31,7 +31,7 @@ def is_allowed(path: Path) -> bool:
 
 
 def allow(path: Path) -> str:
-    """Add an FMU's hash to the list and return it; a second call changes nothing."""
+    """Add an FMU's hash to the list and return it. A second call changes nothing."""
     digest = content_hash(path)
     if not is_allowed(path):
         file = allow_file()

@@ -1,4 +1,4 @@
-"""One FMU instance: fmpy creates, initialises and frees it; the loop calls its functions by address."""
+"""One FMU instance: fmpy creates, initialises and frees it. The loop calls its functions by address."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _logger2() -> Any:
 
 
 def _callbacks2(key: int) -> Any:
-    """Callbacks of an FMI 2 instance; messages that come with printf arguments are formatted by fmpy's proxy."""
+    """Callbacks of an FMI 2 instance. Messages that come with printf arguments are formatted by fmpy's proxy."""
     from fmpy import calloc, fmi2, free
 
     calls = fmi2.fmi2CallbackFunctions()
@@ -53,7 +53,7 @@ def _callbacks2(key: int) -> Any:
 
 
 class InstanceFailed(SkillframeError):
-    """An FMU refused a call outside the loop; the sentence carries its own message."""
+    """An FMU refused a call outside the loop. The sentence carries its own message."""
 
 
 class Instance:
@@ -164,7 +164,7 @@ class Instance:
         getattr(self._fmu, f"set{type_}")(references, values)
 
     def do_step(self, time: float, step: float) -> float | None:
-        """One step through fmpy, outside the loop; the time at which the FMU asks to end, or None.
+        """One step through fmpy, outside the loop. Returns the time at which the FMU asks to end, or None.
 
         Raises:
             InstanceFailed: it returned early although that was not allowed.
@@ -206,7 +206,7 @@ class Instance:
         getattr(self._fmu, name)(self._fmu.component, self._states[slot])
 
     def forget(self) -> None:
-        """Free kept states; one that the FMU does not take back is left to it."""
+        """Free kept states. One that the FMU does not take back is left to it."""
         name = "fmi2FreeFMUstate" if self.version == 2 else "fmi3FreeFMUState"
         for state in self._states.values():
             with suppress(Exception):

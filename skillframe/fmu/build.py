@@ -55,12 +55,12 @@ def cached_path(folder: Path, version: int) -> Path:
 
 
 def build_stepper(source: Path) -> Path | None:
-    """The shared library of stepper.c, from the cache if it is there; None where it cannot be built."""
+    """The shared library of stepper.c, from the cache if it is there, or None where it cannot be built."""
     return build_library("stepper", source.read_text(encoding="utf-8"))
 
 
 def build_library(name: str, text: str) -> Path | None:
-    """The shared library of C text, from the cache if it is there; None where it cannot be built."""
+    """The shared library of C text, from the cache if it is there, or None where it cannot be built."""
     compiler = find_compiler()
     if compiler is None:
         return None

@@ -16,7 +16,7 @@ CHUNK = 1 << 16
 
 
 class Garbled(Exception):
-    """Bytes came that are no message of this channel; the text says what they are."""
+    """Bytes came that are not a message of this channel. The text says what they are."""
 
 
 class Channel:
@@ -33,7 +33,7 @@ class Channel:
         self._rest = b""
 
     def send(self, message: bytes, limit_s: float | None = None) -> None:
-        """Send a message, within a time; raises OSError if the other end has gone or does not read."""
+        """Send a message, within a time. Raises OSError if the other end has gone or does not read."""
         self.end.settimeout(limit_s)
         self._sent = (self._sent + 1) & 0xFFFFFFFF
         self.end.sendall(HEAD.pack(self._token, self._sent, len(message)) + message)

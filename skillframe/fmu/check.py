@@ -41,7 +41,7 @@ def check_fmu(path: Path) -> dict[str, Any]:
 
 
 def _try(facts: FmuFacts, state: str) -> tuple[str, dict[str, Any], list[str]]:
-    """Load, initialise, step ten times; save and restore where that is claimed. What confined it, and what went wrong.
+    """Load, initialise, step ten times, save and restore if claimed. Returns what confined it and what went wrong.
 
     What was unpacked here of an FMU that does not get through is removed.
     """

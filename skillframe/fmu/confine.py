@@ -1,4 +1,4 @@
-"""What Linux offers to confine a process that runs foreign code, asked for by system call; each part may be missing.
+"""What Linux offers to confine a process that runs foreign code, asked for by system call. Each part may be missing.
 
 - A user and process namespace (namespaces(7)): the FMU sees no process but its own, and the kernel ends all of them
   with the first one.
@@ -49,7 +49,7 @@ def _call(name: str, *arguments: object) -> int:
 
 
 def own_namespaces() -> bool:
-    """From now on children of this process live in a process namespace; it stays outside. False where refused."""
+    """From now on children of this process live in a process namespace. It stays outside itself. False if refused."""
     user, group = os.getuid(), os.getgid()
     try:
         _call("unshare", _NEWUSER | _NEWPID)
@@ -61,7 +61,7 @@ def own_namespaces() -> bool:
 
 
 def memory_folder(folder: str, size_bytes: int) -> bool:
-    """Put a file system in memory over a folder, for this process and its children only; False where refused."""
+    """Put a file system in memory over a folder, for this process and its children only. False if refused."""
     with suppress(OSError):
         _call("unshare", _NEWNS)
         data = f"size={size_bytes},nr_inodes=10000,mode=0700".encode()
@@ -121,7 +121,7 @@ def hide_memory() -> None:
 
 
 def adopt_orphans() -> bool:
-    """Processes below this one whose parents have gone become its children (Linux); False where refused."""
+    """Processes below this one whose parents have gone become its children (Linux). Returns False where refused."""
     with suppress(OSError):
         _call("prctl", _SUBREAPER, 1, 0, 0, 0)
         return True

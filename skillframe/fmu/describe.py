@@ -10,7 +10,7 @@ _CAUSALITY = {"input": "INPUT", "output": "OUTPUT", "local": "LOCAL", "parameter
 
 
 def variables_header(table: VariableTable, token: str) -> str:
-    """The C header that numbers the variables; `token` ties binary and description together."""
+    """The C header that numbers the variables. `token` ties binary and description together."""
     listed = rows(table)
     lines = ["/* Made from fmu.toml; do not edit. */", f'#define MODEL_TOKEN "{token}"', "enum {"]
     lines += [f"    {row.symbol} = {row.reference}," for row in listed]

@@ -1,4 +1,4 @@
-"""`FmuBank`: trusted FMUs driven inside this process; loaded and instantiated once, reset between runs."""
+"""`FmuBank`: trusted FMUs driven inside this process, loaded once and reset between runs."""
 
 from __future__ import annotations
 
@@ -75,12 +75,12 @@ class FmuBank:
         self.refresh()
 
     def step(self, time: float, step: float) -> bool:
-        """Advance from `time` by `step` [s] with inputs `u`; True if every active instance went well."""
+        """Advance from `time` by `step` [s] with inputs `u`. Returns True if every active instance went well."""
         self._time = time
         return self._settle(self._step(time, step))
 
     def refresh(self) -> bool:
-        """Outputs at the present inputs; no time passes."""
+        """Outputs at the present inputs. No time passes."""
         return self._settle(self._step(self._time, 0.0))
 
     def _settle(self, worst: int) -> bool:
@@ -99,7 +99,7 @@ class FmuBank:
             self._instances[i].save()
 
     def restore(self) -> None:
-        """Return to the last `save`; statuses are cleared."""
+        """Return to the last `save`. Statuses are cleared."""
         for i in np.flatnonzero(self.active):
             self._instances[i].restore()
             self._problems.pop(int(i), None)
@@ -113,7 +113,7 @@ class FmuBank:
         return self._capabilities[kind]
 
     def problem(self, index: int) -> str:
-        """Why an instance failed, one sentence; empty if it did not."""
+        """Why an instance failed, one sentence, or empty if it did not."""
         return self._problems.get(index, "")
 
     def close(self) -> None:

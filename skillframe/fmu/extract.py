@@ -33,7 +33,7 @@ _FMI3 = re.compile(rb"<(?:Float(?:32|64)|U?Int(?:8|16|32|64)|Boolean|String|Bina
 
 
 def unpack(path: Path) -> Path:
-    """The folder that holds the content of an FMU; made on the first call, the same one afterwards.
+    """The folder that holds the content of an FMU. The first call makes it.
 
     Raises:
         InputError: not a zip, a name that would leave the folder, a link, or too much content.
@@ -58,7 +58,7 @@ def is_unpacked(path: Path) -> bool:
 
 
 def forget(path: Path) -> None:
-    """Remove from the cache what was unpacked of an FMU; only for who unpacked it, because others may run it."""
+    """Remove from the cache what was unpacked of an FMU. Others may run it, so only who unpacked it calls."""
     with suppress(SkillframeError):
         shutil.rmtree(_place(path), ignore_errors=True)
 
@@ -77,7 +77,7 @@ def _tidy(folder: Path) -> None:
 
 @contextmanager
 def description_folder(path: Path, most: int) -> Iterator[Path]:
-    """A folder with the model description of an FMU and what it refers to, nothing else; gone afterwards.
+    """A folder with the model description of an FMU and what it refers to, nothing else. It is removed afterwards.
 
     Args:
         path: the FMU.

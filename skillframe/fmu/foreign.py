@@ -17,7 +17,7 @@ from skillframe.paths import cache_dir
 
 
 def build_from_sources(path: Path) -> BuiltFmu:
-    """An FMU like the given one, with a binary for this machine added; kept in the cache, not allowed in-process.
+    """An FMU like the given one, with a binary for this machine added. It is cached, and not allowed in-process.
 
     Raises:
         InputError: no C sources, or none that its description lists.

@@ -94,7 +94,7 @@ class FmuFacts:
         return found
 
     def settable(self, name: str) -> FmuVariable:
-        """The parameter or input of a name; raises `UnknownName` as `variable` does."""
+        """The parameter or input of a name. Raises `UnknownName` as `variable` does."""
         found = self.variables.get(name)
         if found is not None and found.causality in ("parameter", "input"):
             return found
@@ -125,7 +125,7 @@ class FmuFacts:
 
 
 def inspect_fmu(path: Path) -> FmuFacts:
-    """Facts of an FMU file; one that is not allowed inside this process is read in a child.
+    """Facts of an FMU file. One that is not allowed inside this process is read in a child.
 
     Raises:
         InputError: not an FMU, one that would escape its folder, or a model description that cannot be read.
@@ -161,7 +161,7 @@ def describe_here(facts: FmuFacts) -> dict[str, Any]:
 
 
 def facts_from(given: dict[str, Any], path: Path) -> FmuFacts:
-    """Facts out of `describe_here`; in this process `inspect_fmu` knows them from now on."""
+    """Facts out of `describe_here`. `inspect_fmu` keeps them for this process."""
     lists = {name: tuple(given[name]) for name in ("kinds", "platforms", "source_files", "definitions")}
     variables = {name: FmuVariable(**v) for name, v in given["variables"].items()}
     facts = FmuFacts(**{**given, **lists, "path": path, "variables": variables})

@@ -29,7 +29,7 @@ def fmu_folders() -> dict[str, Path]:
 
 
 def built() -> list[BuiltFmu]:
-    """Every FMU whose present sources have been built; folders that cannot be read are left out."""
+    """Every FMU whose present sources have been built. Folders that cannot be read are left out."""
     rows = []
     for name, folder in fmu_folders().items():
         for version in VERSIONS:

@@ -49,7 +49,7 @@ class MixedBank:
             self._owner.update({int(row): (bank, k) for k, row in enumerate(rows)})
 
     def _each(self, call: Callable[[_Part], bool | None]) -> bool:
-        """Call every part with what the caller wrote, and take over what it says; True if all went well."""
+        """Call every part with what the caller wrote, and take over what it says. Returns True if all went well."""
         fine = True
         for part in self._parts:
             part.bank.u[:] = self.u[part.rows[:, None], part.inputs]
@@ -60,15 +60,15 @@ class MixedBank:
         return fine
 
     def start(self, time: float = 0.0, parameters: Sequence[Mapping[str, Any]] | None = None) -> None:
-        """Reset every instance and initialise it at `u`; see `Actuators`."""
+        """Reset every instance and initialise it at `u`. See `Actuators`."""
         self._each(lambda p: p.bank.start(time, None if parameters is None else [parameters[i] for i in p.rows]))
 
     def step(self, time: float, step: float) -> bool:
-        """Advance from `time` by `step` [s] with inputs `u`; True if every active instance went well."""
+        """Advance from `time` by `step` [s] with inputs `u`. Returns True if every active instance went well."""
         return self._each(lambda part: part.bank.step(time, step))
 
     def refresh(self) -> bool:
-        """Outputs at the present inputs; no time passes."""
+        """Outputs at the present inputs. No time passes."""
         return self._each(lambda part: part.bank.refresh())
 
     def save(self) -> None:
@@ -85,7 +85,7 @@ class MixedBank:
         return bank.capabilities(own)
 
     def problem(self, index: int) -> str:
-        """Why an instance failed, one sentence; empty if it did not."""
+        """Why an instance failed, one sentence, or empty if it did not."""
         bank, own = self._owner[index]
         return bank.problem(own)
 

@@ -1,4 +1,4 @@
-"""Try out what an FMU claims: save, step, restore, step must repeat; outputs may follow inputs without a step."""
+"""Try out what an FMU claims: save, step, restore, step must repeat. Outputs may follow inputs without a step."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ STEP = 1e-3  # s, the communication step of the probe
 
 
 def probe(facts: FmuFacts, spec: ActuatorSpec) -> Capabilities:
-    """Capabilities of an FMU under a mapping; two short instances are made and freed.
+    """Capabilities of an FMU under a mapping. Two short instances are made and freed.
 
     Raises:
         InstanceFailed: it cannot be started at all.
@@ -29,7 +29,7 @@ def probe(facts: FmuFacts, spec: ActuatorSpec) -> Capabilities:
 
 
 def try_out(facts: FmuFacts) -> bool:
-    """Ten steps with inputs at their start values; whether a saved state repeats (False where none can be saved).
+    """Ten steps with inputs at their start values. Returns whether a saved state repeats (False if none can be saved).
 
     Raises:
         InstanceFailed: it does not start or step.

@@ -21,7 +21,7 @@ EXACT = 2.0**53
 
 
 class RecordedRun(NamedTuple):
-    """Columns and number of rows written; the problem that ended the run early, or ""."""
+    """Columns and number of rows written, and the problem that ended the run early, or ""."""
 
     columns: list[str]
     rows: int
@@ -48,7 +48,7 @@ def simulate_to_csv(
 
 
 def _write(out: Path, columns: list[str], rows: Iterator[list[Any]]) -> RecordedRun:
-    """Rows as they come; whatever ends them, those that were reached are kept."""
+    """Rows as they come. Whatever ends them, those that were reached are kept."""
     count, problem = 0, ""
     other: BaseException | None = None
     with writing_whole(out) as part, part.open("w", newline="", encoding="utf-8") as file:
@@ -110,13 +110,13 @@ def read_inputs(path: Path, facts: FmuFacts) -> tuple[list[str], list[list[float
 
 
 def _cell(text: str) -> float | int:
-    """A number; a whole one exactly, since a double holds no more than 53 bits of it."""
+    """A number. Whole ones are exact, since a double holds no more than 53 bits of them."""
     number = float(text)
     return int(text) if abs(number) > EXACT and text.strip().lstrip("+-").isdecimal() else number
 
 
 def _convertible(path: Path, variable: FmuVariable, values: list[float]) -> None:
-    """Every value of a column can be one of the input's type; an array is refused later, by name."""
+    """Every value of a column can be one of the input's type. An array is refused later, by name."""
     for value in values if variable.size == 1 and variable.type != "String" else ():
         values_of(variable, value, path)
     if variable.type == "String":

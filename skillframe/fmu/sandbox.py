@@ -71,7 +71,7 @@ class SandboxBank:
         return spec.name or facts.name  # not which trial of the bank: a trial fails in the same words in any bank
 
     def _ready(self, index: int) -> Child:
-        """The child of an instance; a new one where there is none or the old one has grown fat."""
+        """The child of an instance. A new one if there is none or the old one uses too much memory."""
         child = self._children[index]
         if child is not None and self._held[index] <= self.limits.memory_bytes // 2:
             return child
@@ -86,7 +86,7 @@ class SandboxBank:
         return new
 
     def start(self, time: float = 0.0, parameters: Sequence[Mapping[str, Any]] | None = None) -> None:
-        """Reset every instance, load those that were lost, and initialise at `u`; see `Actuators`."""
+        """Reset every instance, load those that were lost, and initialise at `u`. See `Actuators`."""
         self.active[:] = 1
         self.status[:] = OK
         self._problems.clear()
@@ -100,7 +100,7 @@ class SandboxBank:
             raise InstanceFailed(next(iter(self._problems.values())))
 
     def _tell_start(self, index: int, time: float, extra: Mapping[str, Any]) -> bool:
-        """Ask an instance to start; whether its child is new and has to load the FMU first."""
+        """Ask an instance to start. Returns whether its child is new and has to load the FMU first."""
         before, now = self._children[index], self._ready(index)
         own = {**self._kind(index)[0].parameters, **extra}
         now.tell(b"s", {"time": time, "parameters": own, "u": self.u[index].tolist()})
@@ -121,7 +121,7 @@ class SandboxBank:
             self._lose(index, error)
 
     def step(self, time: float, step: float) -> bool:
-        """Advance from `time` by `step` [s] with inputs `u`; True if every active instance went well."""
+        """Advance from `time` by `step` [s] with inputs `u`. Returns True if every active instance went well."""
         self._time = time
         head = struct.pack("dd", time, step)
         running = [(i, child) for i, child in enumerate(self._children) if self.active[i] and child is not None]
@@ -146,7 +146,7 @@ class SandboxBank:
             return False
 
     def _take(self, index: int, child: Child, answer: bytes, what: str) -> bool:
-        """Status and outputs out of an answer, which is checked as if the FMU had written it; True if all is well.
+        """Status and outputs out of an answer, which is checked as if the FMU had written it. True if all went well.
 
         Raises:
             ChildLost: it is no answer to this question.
@@ -178,7 +178,7 @@ class SandboxBank:
         self.active[index], self.status[index], self._problems[index] = 0, LOST, str(error)
 
     def refresh(self) -> bool:
-        """Outputs at the present inputs; no time passes."""
+        """Outputs at the present inputs. No time passes."""
         return self.step(self._time, 0.0)
 
     def _all(self, letter: bytes, what: str) -> None:
@@ -198,7 +198,7 @@ class SandboxBank:
         self._all(b"w", "restoring its state")
 
     def capabilities(self, index: int) -> Capabilities:
-        """What one instance can do; tried out in a child of its own."""
+        """What one instance can do, tried out in a child of its own."""
         kind = index % len(self._specs)
         if kind not in self._capabilities:
             spec, facts = self._kind(index)
@@ -206,7 +206,7 @@ class SandboxBank:
         return self._capabilities[kind]
 
     def problem(self, index: int) -> str:
-        """Why an instance failed, one sentence; empty if it did not."""
+        """Why an instance failed, one sentence, or empty if it did not."""
         return self._problems.get(index, "")
 
     def close(self) -> None:
@@ -220,7 +220,7 @@ class SandboxBank:
 
 
 def loading(facts: FmuFacts) -> dict[str, Any]:
-    """What a child is told to load an FMU; it reads no description itself."""
+    """What a child is told to load an FMU. It reads no description itself."""
     return {"facts": describe_here(facts), "path": str(facts.path)}
 
 

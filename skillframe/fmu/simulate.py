@@ -70,7 +70,7 @@ def check_request(facts: FmuFacts, request: Request) -> None:
 
 
 def simulate(request: Request, sandboxed: bool, limit_s: float = 30.0) -> Iterator[list[Any]]:
-    """Rows, each time then outputs; in a child process if sandboxed.
+    """Rows, each time then outputs, from a child process if sandboxed.
 
     Raises:
         InputError, UnknownName: before the first row.

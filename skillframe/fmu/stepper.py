@@ -52,7 +52,7 @@ def stepper_library() -> ctypes.CDLL | None:
 
 
 class SlotTable:
-    """The slots of a bank and the arrays that they point into; kept alive together."""
+    """The slots of a bank and the arrays that they point into, kept alive together."""
 
     def __init__(self, wirings: Sequence[Wiring], u: Float, y: Float) -> None:
         self._keep: list[NDArray[np.generic]] = []
@@ -84,7 +84,7 @@ class SlotTable:
 
 
 def compiled_step(table: SlotTable, active: NDArray[np.uint8]) -> Step | None:
-    """A function (time, step) -> worst status that steps every slot in one call; None without a compiler."""
+    """A function (time, step) -> worst status that steps every slot in one call, or None without a compiler."""
     library = stepper_library()
     if library is None:
         return None

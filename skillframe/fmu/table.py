@@ -92,7 +92,7 @@ def read_table(folder: Path) -> VariableTable:
 
 
 def rows(table: VariableTable) -> list[Row]:
-    """All variables in the order of their value references; time, the independent variable, is last."""
+    """All variables in the order of their value references. Time, the independent variable, is last."""
     groups: list[tuple[Causality, dict[str, Entry]]] = [
         ("input", table.input), ("output", table.output), ("local", table.local), ("parameter", table.parameter),
         ("independent", {"time": Entry(unit="s" if "s" in table.units else "", text="time")}),

@@ -18,7 +18,7 @@ FLAGS = ("-O2", "-std=c11", "-fPIC", "-shared", "-fvisibility=hidden", "-fno-mat
 
 
 class CompilerFailed(SkillframeError):
-    """The compiler refused the sources; carries the first lines of what it said."""
+    """The compiler refused the sources. The text has the first lines of what it said."""
 
 
 def find_compiler() -> list[str] | None:

@@ -69,7 +69,7 @@ class Worker:
             return b"!" + f"{type(error).__name__}: {error}".encode()
 
     def load(self, payload: bytes) -> bytes:
-        """Load the FMU; columns of the parent's arrays may be more than ours."""
+        """Load the FMU. Columns of the parent's arrays may be more than ours."""
         given = json.loads(payload)
         spec = ActuatorSpec(**{**given["spec"], "name": given["name"]})
         self.bank = FmuBank([spec], [_facts(given)], compiled=False)
@@ -100,7 +100,7 @@ class Worker:
         return struct.pack("q", status) + bank.y[0, self.out_of].tobytes() + text.encode()
 
     def start(self, payload: bytes) -> bytes:
-        """Reset and initialise; the memory held, then as a step."""
+        """Reset and initialise. Returns the memory held, then the same as a step."""
         given = json.loads(payload)
         self._take(given["u"])
         self.one.status[:] = 0
@@ -133,11 +133,11 @@ class Worker:
         return json.dumps(list(probe(_facts(given), ActuatorSpec(**given["spec"])))).encode()
 
     def check(self, payload: bytes) -> bytes:
-        """A short trial with inputs at their start values; whether its state repeats."""
+        """A short trial with inputs at their start values. Returns whether its state repeats."""
         return json.dumps(try_out(_facts(json.loads(payload)))).encode()
 
     def simulate(self, payload: bytes) -> bytes:
-        """Simulate on its own, sending rows as they come; the last answer is empty."""
+        """Simulate on its own, sending rows as they come. The last answer is empty."""
         from skillframe.fmu.simulate import Request, run
 
         given = json.loads(payload)

@@ -54,7 +54,7 @@ class EnergyBill:
         self._power: Float | None = None
 
     def step(self, velocity: Float) -> None:
-        """Add a sample; velocity (N, k) of the pistons."""
+        """Add a sample. The pistons' velocity is (N, k)."""
         y, shape = self._bank.y, self._price.shape
         if self._flows:
             self.supply += np.vecdot(self._price, np.maximum(y.take(self._flows, axis=1), 0.0).reshape(shape))

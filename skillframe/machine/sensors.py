@@ -19,7 +19,7 @@ BLOCK = 100
 
 
 class MachineSensors:
-    """The sensors of N machines with n coordinates and k cylinders; randomness from one generator per trial.
+    """The sensors of N machines with n coordinates and k cylinders. Each trial has one random generator.
 
     Attributes:
         z, rate: (N, n) filtered; pressure_a, pressure_b: (N, k) filtered [Pa]. lag: of all of them [s].

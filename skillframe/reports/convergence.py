@@ -27,7 +27,7 @@ FAILS, BETWEEN, WORKS = np.array([224, 132, 80]), np.array([244, 240, 232]), np.
 
 
 def influence(results: Results) -> list[str]:
-    """Varied quantities, the most telling first; without those that have fewer than two known values in the table."""
+    """Varied quantities, the most telling first. Those with fewer than two known values in the table are left out."""
     known = {name: values_of(results.rows, quantity(name)) for name in results.varied}
     drawn = [name for name, values in known.items() if len(np.unique(values[np.isfinite(values)])) > 1]
     scores = {name: max(_information(results.of(s), name) for s in results.skills) for name in drawn}

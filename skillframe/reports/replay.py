@@ -115,7 +115,7 @@ def _camera(camera: Camera) -> dict[str, Any]:
 
 
 def viewer(identifier: str, label: str) -> Markup:
-    """The viewer's element: a canvas with its controls; the script finds its data by the identifier."""
+    """The viewer's element: a canvas with its controls. The script finds its data by the identifier."""
     controls = [
         tag("button", "Play", type="button", class_="play", aria_label="Play or pause"),
         tag("input", type="range", class_="slider", min=0, max=1, step=1, value=0, aria_label="Time"),

@@ -62,7 +62,7 @@ def merge(meshes: Sequence[Mesh]) -> Mesh:
 
 
 def mesh_of(geom: Mapping[str, Any]) -> Mesh:
-    """One geometry of a trace in its body's frame; an unknown kind gives an empty mesh."""
+    """One geometry of a trace in its body's frame. An unknown kind gives an empty mesh."""
     kind, size = geom.get("kind", ""), [float(s) for s in geom.get("size") or ()]
     if kind == "mesh":
         mesh = creased(np.array(geom["vertices"], dtype=float), np.array(geom["faces"], dtype=np.int64))

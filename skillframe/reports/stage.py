@@ -123,7 +123,7 @@ class Stage:
 
     @cached_property
     def cut(self) -> tuple[Mesh | None, ...]:
-        """Per body its mesh cut open, in its frame; None where it is not cut."""
+        """Per body its mesh cut open, in its frame, or None where it is not cut."""
         return tuple(self._cut_body(b) for b in range(len(self.names)))
 
     def _cut_body(self, body: int) -> Mesh | None:
@@ -175,7 +175,7 @@ def stage_of(trace: Trace) -> Stage | None:
 
 
 def at_tip(trace: Trace, position: Float, quaternion: Float) -> Float:
-    """Where the tool's tip is (T, 3) for poses (T, 3), (T, 4) of the centre of compliance; that itself if unknown."""
+    """Where the tool's tip is (T, 3) for poses (T, 3), (T, 4) of the centre of compliance, or that itself."""
     tip, center = (trace.meta.get("frames") or {}).get("tip"), trace.meta.get("center_of_compliance")
     start = np.asarray(position, dtype=float)
     if tip is None or center is None:

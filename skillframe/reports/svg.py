@@ -75,7 +75,7 @@ class Axes:
         return join([line, text(LEFT - 6, y + 4, number(value), "tick", "end")])
 
     def line(self, x: Float, y: Float, class_: str) -> Markup:
-        """A line through the data; NaN breaks it."""
+        """A line through the data. NaN breaks it."""
         pieces, good = [], np.isfinite(x) & np.isfinite(y)
         for run in np.split(np.arange(len(x)), np.flatnonzero(np.diff(good)) + 1):
             if len(run) and good[run[0]]:
@@ -142,7 +142,7 @@ def envelope(x: Float, y: Float, most: int = 260) -> tuple[Float, Float]:
 
 
 def legend(axes: Axes, entries: Sequence[tuple[str, str]], start: float = 60.0) -> Markup:
-    """Names of curves in one line above the plot, right-aligned: (name, class of its stroke); long ones are cut."""
+    """Names of curves in one line above the plot, right-aligned: (name, class of its stroke). Long ones are cut."""
     letters = (axes.right - start - LEGEND_MARK * len(entries)) / LEGEND_LETTER / max(len(entries), 1)
     longest = max(int(letters), 4) if sum(len(name) for name, _ in entries) > letters * len(entries) else 1000
     entries = [(name if len(name) <= longest else name[: longest - 1] + "\N{HORIZONTAL ELLIPSIS}", class_)

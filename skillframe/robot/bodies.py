@@ -53,7 +53,7 @@ def rigid_bodies(urdf: Urdf) -> list[Body]:
 
 
 def size_of(body: Body, bodies: list[Body]) -> float:
-    """A body's size [m]: its reach, or, where that is unknown, that of the robot's largest link; 0 if none is known."""
+    """A body's size [m]: its reach, or, where that is unknown, that of the robot's largest link. 0 if none is known."""
     if body.reach > 0.0 and not body.bound:
         return body.reach
     return max(b.reach for b in [body, *bodies])
@@ -71,7 +71,7 @@ def missing_meshes(urdf: Urdf) -> dict[str, str]:
 
 
 def placement(element: ET.Element | None) -> Pose:
-    """Pose that an <origin> inside an element says; fixed-axis roll, pitch, yaw."""
+    """Pose that an <origin> inside an element states, in fixed-axis roll, pitch, yaw."""
     origin = element.find("origin") if element is not None else None
     roll, pitch, yaw = np.diag(numbers(origin, "rpy", 3, _ZERO3))
     rotation = rotation_matrix(yaw) @ rotation_matrix(pitch) @ rotation_matrix(roll)
@@ -79,7 +79,7 @@ def placement(element: ET.Element | None) -> Pose:
 
 
 def _gather(body: Body, urdf: Urdf, children: dict[str, list[Joint]], head: str) -> list[tuple[str, str]]:
-    """Fill a body with the links that are fixed to its head; returns the joints that leave it."""
+    """Fill a body with the links that are fixed to its head. Returns the joints that leave it."""
     leaving: list[tuple[str, str]] = []
     links = [(head, Pose(np.zeros(3), np.eye(3)))]
     for name, pose in links:  # grows while it is walked

@@ -51,7 +51,7 @@ def loaded_inertias(robot: RobotModel, masses: Float) -> tuple[str, list[pin.Ine
 
 
 class _Joint(NamedTuple):
-    """Placement (3, 3), (3,) in its parent; axis (3,); column of z; does it slide?"""
+    """Placement (3, 3), (3,) in its parent, axis (3,), column of z, and whether it slides."""
 
     rotation: Float
     position: Float
@@ -102,7 +102,7 @@ class CarriedLoad:
         return result.copy()
 
     def _prepared(self, count: int) -> tuple[Float, Float, Callable[[], None]]:
-        """Arrays in and out for so many machines, and what computes one from the other; the last one is kept."""
+        """Arrays in and out for so many machines, and what computes one from the other. The last one is kept."""
         if self._ready is None or len(self._ready[0]) != count:
             given, result = np.zeros((count, self._freedoms)), np.zeros((count, self._freedoms))
             one = self._function

@@ -314,7 +314,7 @@ def _advance(chain: ClosedChain, z: Float, zd: Float, force: Float, external: Fl
 def step(
     chain: ClosedChain, z: Float, zd: Float, force: Float, dt: float, external: Float | None = None
 ) -> tuple[Float, Float]:
-    """One classical Runge-Kutta step of length dt [s] under piston forces held over it; the oracle's integrator."""
+    """One classical Runge-Kutta step of length dt [s] under piston forces held over it: the oracle's integrator."""
     a1 = _advance(chain, z, zd, force, external)
     v2 = zd + 0.5 * dt * a1
     a2 = _advance(chain, z + 0.5 * dt * zd, v2, force, external)

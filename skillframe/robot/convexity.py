@@ -35,7 +35,7 @@ class Hull(NamedTuple):
 
 
 def hull_of(vertices: Float) -> Hull | None:
-    """The hull of points (V, 3); None where they lie in one plane."""
+    """The hull of points (V, 3), or None where they lie in one plane."""
     from scipy.spatial import ConvexHull, QhullError
 
     size = float(np.ptp(vertices, axis=0).max()) if len(vertices) else 0.0
@@ -65,7 +65,7 @@ def volume_of(vertices: Float, faces: NDArray[np.int64]) -> float:
 
 
 def open_edges(vertices: Float, faces: NDArray[np.int64]) -> int:
-    """Number of edges that do not have two triangles, or an even number of them; equal vertices count as one."""
+    """Number of edges that do not have two triangles, or an even number of them. Equal vertices count as one."""
     _, same = np.unique(vertices, axis=0, return_inverse=True)
     merged = same.reshape(-1)[faces]
     whole = (merged[:, 0] != merged[:, 1]) & (merged[:, 1] != merged[:, 2]) & (merged[:, 2] != merged[:, 0])
@@ -99,7 +99,7 @@ def is_convex(vertices: Float, faces: NDArray[np.int64], hull: Hull) -> bool:
 
 
 def unfit_to_collide(vertices: Float, faces: NDArray[np.int64] | None) -> tuple[str, str] | None:
-    """What keeps a mesh from being collided with as it is drawn, and what to do; None if nothing does.
+    """What keeps a mesh from being collided with as it is drawn, and what to do, or None if nothing does.
 
     A mesh without triangles stands for the hull of its vertices.
     """

@@ -29,7 +29,7 @@ def lengths(bodies: list[Body]) -> list[float]:
 
 
 def guessed_masses(bodies: list[Body]) -> list[float]:
-    """Mass of every body [kg], by the law above; a root that does not move is counted as if it did."""
+    """Mass of every body [kg], by the law above. A root that does not move is counted as if it did."""
     own = lengths(bodies)
     ahead = own.copy()
     for index in range(len(bodies) - 1, 0, -1):  # children stand behind their parents
@@ -48,7 +48,7 @@ def cylinder(mass: float, length: float, center: tuple[float, float, float], gue
 
 
 def guess_note(spec: RobotSpec) -> str:
-    """What to say where something failed with guessed masses; "" if none is guessed."""
+    """What to say where something failed with guessed masses, or "" if none is guessed."""
     links = [name for name, inertia in spec.inertia.items() if inertia.guessed]
     if not links:
         return ""

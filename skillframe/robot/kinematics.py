@@ -130,7 +130,7 @@ def inverse_kinematics(robot: RobotModel, arm: str | int, pose: Pose, q0: Float)
 
 
 def random_configuration(model: pin.Model, rng: np.random.Generator) -> Float:
-    """(nq,) configuration uniform within the limits; where there are none, within +-pi rad or m of neutral."""
+    """(nq,) configuration uniform within the limits. Where there are none, within +-pi rad or m of neutral."""
     q: Float = pin.integrate(model, pin.neutral(model), rng.uniform(-np.pi, np.pi, model.nv))
     low, high, bounded = _bounds(model)
     span = np.minimum(high, 1e6) - np.maximum(low, -1e6)
@@ -167,7 +167,7 @@ def _bounds(model: pin.Model) -> tuple[Float, Float, Flags]:
 
 
 def _starts(model: pin.Model, frame: int, q0: Float) -> Iterator[Float]:
-    """First q0, then random configurations of the joints that move the frame; every other joint stays."""
+    """First q0, then random configurations of the joints that move the frame. Every other joint stays."""
     yield q0
     moves = np.zeros(model.nq, dtype=bool)
     for index in list(model.supports[model.frames[frame].parentJoint])[1:]:
@@ -220,7 +220,7 @@ def _columns(model: pin.Model, bounded: Flags) -> tuple[list[int], list[int]]:
 
 
 def _step(jacobian: Float, error: Float, held: Flags) -> Float:
-    """Levenberg-Marquardt step; joints that stand at a limit are left out."""
+    """Levenberg-Marquardt step. Joints that stand at a limit are left out."""
     jacobian = np.where(held, 0.0, jacobian)
     damping = 0.5 * float(error @ error) + 1e-10
     gain = jacobian @ jacobian.T

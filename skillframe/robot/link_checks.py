@@ -100,7 +100,7 @@ def _harm(robot: RobotModel, body: Body, index: int | None) -> tuple[Literal["fa
 
 
 def _impossible(mass: float, principal: Float) -> str:
-    """What is impossible of a mass and its principal moments, ascending; "" if nothing is."""
+    """What is impossible about a mass and its principal moments, ascending, or "" if nothing is."""
     low, middle, high = (float(x) for x in principal)
     if mass < 0.0:
         return f"has a negative mass ({mass:g} kg)"
@@ -129,7 +129,7 @@ def oversized_inertias(robot: RobotModel, given: Mapping[str, Given], bodies: li
 
 
 def _gyration(mass: float, moments: Float) -> float:
-    """Radius of gyration about the worst axis [m]; infinite for inertia without mass."""
+    """Radius of gyration about the worst axis [m], or infinite for inertia without mass."""
     top = float(np.linalg.eigvalsh(moments)[-1])
     if top <= 0.0:
         return 0.0

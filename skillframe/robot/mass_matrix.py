@@ -48,7 +48,7 @@ def smallest_pivots(model: pin.Model, home: Float) -> Pivots:
 
 
 def pivot_ratios(mass: Float) -> Float:
-    """(n,) D_i / M_ii of a symmetric matrix, eliminated from the last row; 0 where M_ii is not positive."""
+    """(n,) D_i / M_ii of a symmetric matrix, eliminated from the last row, or 0 where M_ii is not positive."""
     diagonal = np.diag(mass)
     scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
     rest = mass / scale[:, None] / scale
@@ -62,7 +62,7 @@ def pivot_ratios(mass: Float) -> Float:
 
 
 def _relative(moved: Float, carried: Float) -> Float:
-    """Ratio where something is carried; elsewhere (a follower may have all the inertia) 1, 0 or -1."""
+    """Ratio where something is carried. Elsewhere (a follower may have all the inertia) 1, 0 or -1."""
     there = carried > 0.0
     return np.where(there, moved / np.where(there, carried, 1.0), np.sign(moved))
 

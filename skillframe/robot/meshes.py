@@ -98,7 +98,7 @@ def _obj_faces(content: bytes, count: int) -> NDArray[np.int64]:
 
 
 def _stl_vertices(content: bytes) -> Float:
-    """Binary STL holds 50 bytes a triangle after 84 bytes of header; anything else is its text form."""
+    """Binary STL holds 50 bytes a triangle after 84 bytes of header. Anything else is its text form."""
     count = int.from_bytes(content[80:84], "little")
     if len(content) < 84 or len(content) < 84 + 50 * count:
         words = [line.split() for line in content.decode("ascii", "replace").splitlines()]

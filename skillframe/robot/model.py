@@ -34,7 +34,7 @@ ROOT_JOINT = "root_joint"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotModel:
-    """A robot ready for kinematics and dynamics; nominal, whatever the simulated plant varies.
+    """A robot ready for kinematics and dynamics. It is nominal, whatever the simulated plant varies.
 
     Attributes:
         urdf: the checked tree it was built from.
@@ -168,7 +168,7 @@ def _check_size(urdf: Urdf) -> None:
 
 
 def _bare_tree(urdf: Urdf, overlay: Mapping[str, LinkInertia]) -> str:
-    """URDF text with inertias and joints only; the overlay replaces a link's own inertia."""
+    """URDF text with inertias and joints only. The overlay replaces a link's own inertia."""
     robot = ET.Element("robot", name=urdf.name)
     for name, link in urdf.links.items():
         bare = ET.SubElement(robot, "link", name=name)

@@ -24,7 +24,7 @@ _SHAPES = {
 
 
 def numbers(element: ET.Element | None, attribute: str, count: int, default: tuple[float, ...]) -> tuple[float, ...]:
-    """Numbers of an attribute, `default` where element or attribute is absent; `ValueError` where they are none."""
+    """Numbers of an attribute, `default` where element or attribute is absent. `ValueError` where they are none."""
     text = element.get(attribute) if element is not None else None
     if text is None:
         return default

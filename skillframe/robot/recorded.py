@@ -64,6 +64,6 @@ def _joints(model: RobotModel, robot: str, frame: int, names: Sequence[str]) -> 
 
 
 def _set(joint: pin.JointModel, configuration: Float, value: float) -> None:
-    """One joint's coordinates; a continuous joint holds cosine and sine."""
+    """One joint's coordinates. A continuous joint holds cosine and sine."""
     angle = (np.cos(value), np.sin(value)) if joint.nq == 2 else (value,)
     configuration[joint.idx_q : joint.idx_q + joint.nq] = angle

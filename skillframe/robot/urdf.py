@@ -82,7 +82,7 @@ def _read_bytes(path: Path) -> bytes:
 
 
 def _parse_xml(path: Path, content: bytes) -> ET.Element:
-    """The element tree, built on expat without namespaces; a document type is refused before its entities expand."""
+    """The element tree, built on expat without namespaces. A document type is refused before its entities expand."""
     builder, parser = ET.TreeBuilder(), expat.ParserCreate()
 
     def refuse(*_: object) -> NoReturn:

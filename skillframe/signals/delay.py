@@ -29,7 +29,7 @@ def require_delay(seconds: float, where: object) -> None:
 
 
 class CommandDelay:
-    """Commands (N, k) that arrive later, each trial's by its own whole number of samples; zero before the first.
+    """Commands (N, k) that arrive later, each trial's by its own whole number of samples, or zero before the first.
 
     Args:
         ticks: (N,) samples of delay.

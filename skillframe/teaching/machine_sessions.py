@@ -48,7 +48,7 @@ def record_operated(
     progress: Callable[[str], None] | None = None,
     watch: Watch | None = None,
 ) -> Recording:
-    """Demonstrate a scene `count` times; arguments as `skillframe.teaching.sessions.record`.
+    """Demonstrate a scene `count` times. The arguments are those of `skillframe.teaching.sessions.record`.
 
     Raises:
         InputError: the force reflection would be unstable, or the scene's task has no direction.
@@ -79,7 +79,7 @@ def operate(
     duration_s: float = LONGEST_S,
     watch: Watch | None = None,
 ) -> Result:
-    """Operators teach len(rngs) machines in lock-step, each until the task is done; with traces.
+    """Operators teach len(rngs) machines in lock-step, each until the task is done. Returns traces too.
 
     A trial is a success where the task is done, wherever the scene's goal is: an operator who pushes hard may leave the
     tool deeper in a soft corner than a run is to end.

@@ -57,7 +57,7 @@ class StagedTeacher(Skill):
 
 
 class _StagedHand(Skill):
-    """One hand, stage by stage; N = 1."""
+    """One hand, stage by stage (N = 1)."""
 
     def __init__(self, stages: Sequence[Task], fixture: Pose, settings: TeacherSettings, hand_to_tip: Float) -> None:
         self._stages, self._fixture, self._settings, self._hand_to_tip = stages, fixture, settings, hand_to_tip

@@ -31,7 +31,7 @@ BLOCK = 500
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hand:
-    """How the hand holds: translation stiffness [N/m], damping [Ns/m], relaxation time [s]; rotation alike.
+    """How the hand holds: translation stiffness [N/m], damping [Ns/m], relaxation time [s], and the same for rotation.
 
     `speed` [m/s] is how fast it pushes on, `turn_rate` [rad/s] how fast an active hand turns the part, and
     `torque_max` [Nm] how hard. At its largest push a hand that `gives_way` goes back as far as it is pushed back; one
@@ -165,7 +165,7 @@ class Teacher(Skill):
         return sample
 
     def _push(self, noise: Float, seen: Float, dt: float) -> Float:
-        """Advance the hand's position; returns its velocity (N, 3)."""
+        """Advance the hand's position. Returns its velocity (N, 3)."""
         settings, hand = self._settings, self._hand
         error = self._position - seen
         if self._direction is None:
@@ -184,7 +184,7 @@ class Teacher(Skill):
         return velocity
 
     def _turn_hand(self, seen: Float, dt: float) -> Float:
-        """Advance the hand's attitude; returns its angular velocity (N, 3)."""
+        """Advance the hand's attitude. Returns its angular velocity (N, 3)."""
         hand = self._hand
         if self._aligned is not None:
             remaining = rotation_vector(self._aligned @ np.swapaxes(self._rotation, -1, -2))
@@ -208,7 +208,7 @@ class Teacher(Skill):
 
 
 class _Delay:
-    """Hands back what was pushed `ticks` ago; the first value until then."""
+    """Returns what was pushed `ticks` ago, and the first value until then."""
 
     def __init__(self, ticks: int) -> None:
         self._ticks, self._line = ticks, list[tuple[Float, ...]]()

@@ -122,7 +122,7 @@ def require_stable_loop(settings: OperatorSettings) -> None:
 
 
 class TeleoperationChannel:
-    """One way between master and machine: sampled every packet, held, and late; (N, 3) at every tick of dt [s]."""
+    """One way between master and machine: sampled every packet, held and delayed. (N, 3) at every tick of dt [s]."""
 
     def __init__(self, settings: OperatorSettings, count: int, dt: float) -> None:
         self._every = max(1, round(1.0 / (settings.packet_hz * dt)))
@@ -131,7 +131,7 @@ class TeleoperationChannel:
         self._sent: Float = np.zeros((count, 3))
 
     def step(self, value: Float) -> Float:
-        """What arrives now, when this is there to be sent; zero before the first packet."""
+        """What arrives now, when this is there to be sent, or zero before the first packet."""
         if self._tick % self._every == 0:
             self._sent = value.copy()
         self._tick += 1
@@ -139,7 +139,7 @@ class TeleoperationChannel:
 
 
 class Operator(Skill):
-    """N operators at their masters; what they command is what their machines are to follow.
+    """N operators at their masters. Their machines follow what they command.
 
     Args:
         task: what the operators know, in the fixture frame; its direction is where they push.

@@ -146,7 +146,7 @@ def _add_tool(spec: mujoco.MjSpec, robot: RobotModel, scene: Scene, bodies: dict
 
 
 def _add_holder(spec: mujoco.MjSpec, robot: RobotModel, holder: Holder, bodies: dict[int, Any]) -> Any:
-    """The fixture as a body in the second arm's grip; that arm's joint friction holds still, not creep."""
+    """The fixture as a body in the second arm's grip. The joint friction of that arm makes it hold still."""
     body = _mount(robot, 1, bodies, SECOND).add_body(name=FIXTURE)
     body.pos, body.quat = holder.position, wxyz(holder.quaternion)
     in_hand = pin.SE3(matrix_from_quaternion(holder.quaternion), np.array(holder.position))
@@ -180,7 +180,7 @@ def tool_inertia(tool: Tool) -> pin.Inertia:
 def add_geom(
     spec: mujoco.MjSpec, body: Any, geom: Geom, name: str, *, contype: int, conaffinity: int, friction: float
 ) -> None:
-    """Add one geom of a scene to a MuJoCo body; geoms that do not collide are only drawn."""
+    """Add one geom of a scene to a MuJoCo body. Geoms that do not collide are only drawn."""
     made = body.add_geom(
         name=name, type=_KINDS[geom.kind], pos=geom.position, quat=wxyz(geom.quaternion), rgba=geom.rgba
     )

@@ -30,7 +30,7 @@ def drawn_bodies(plant: Plant) -> list[dict[str, Any]]:
 
 
 def geom_json(geom: Geom) -> dict[str, Any]:
-    """One geom as plain values; lengths rounded to a micrometre."""
+    """One geom as plain values, lengths rounded to a micrometre."""
     result: dict[str, Any] = {
         "kind": geom.kind, "size": [round(float(s), 6) for s in geom.size],
         "position": [round(float(p), 6) for p in geom.position],

@@ -155,7 +155,7 @@ class LinkIntrusion:
         return list(zip(k[close].tolist(), link[close].tolist(), strict=True))
 
     def _depth(self, position: Float, rotation: Float, link: int, body: int, centre: Float) -> float:
-        """How deep a link's shape stands in a body of the fixture at worst [m], 0 if it does not; one trial."""
+        """How deep a link's shape stands in a body of the fixture at worst [m], 0 if it does not. For one trial."""
         fixture = self._fixture
         mine = np.flatnonzero(fixture.body == body)
         at = position[body] + rotate(rotation[body], fixture.position[mine])
@@ -172,7 +172,7 @@ class LinkIntrusion:
         return deepest
 
     def _pair(self, link: int, wall: int, position: Float, rotation: Float) -> float:
-        """Depth of two shapes in each other; of a mesh that is not convex that of its deepest point."""
+        """Depth of two shapes in each other. For a mesh that is not convex, that of its deepest point."""
         depth = -self._distance(int(self._links.geom[link]), wall)
         points = self._points[link]
         if points is None or depth <= TOLERANCE:

@@ -87,7 +87,7 @@ class Layout:
         return result
 
     def _order(self, model: Any) -> list[tuple[int, int, int]]:
-        """Of every joint its size and its place in Pinocchio's and in MuJoCo's configuration; found once."""
+        """Of every joint its size and its place in Pinocchio's and in MuJoCo's configuration, found once."""
         if self._ordered[0] is not model:
             joints = [(model.joints[i], model.names[i]) for i in range(1, model.njoints)]
             places = [(j.nq, j.idx_q, int(self.model.joint(name).qposadr[0])) for j, name in joints]

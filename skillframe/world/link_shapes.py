@@ -85,7 +85,7 @@ def _shapes_of(robot: RobotModel, name: str, link: ET.Element, frame: pin.Frame)
 
 
 def _shape(robot: RobotModel, element: ET.Element, placement: pin.SE3) -> tuple[Geom, Float | None] | None:
-    """A shape as a convex geom and, if it is not convex, points of its surface; None where it cannot be read."""
+    """A shape as a convex geom and, if it is not convex, points of its surface, or None where it cannot be read."""
     mesh = element.find("geometry/mesh")
     if mesh is None:
         geom = placed_geom(element, placement, {})
@@ -101,7 +101,7 @@ def _shape(robot: RobotModel, element: ET.Element, placement: pin.SE3) -> tuple[
 
 @lru_cache(maxsize=256)  # a campaign asks for the same links in every chunk
 def _mesh(content: bytes) -> tuple[Geom, Float | None] | None:
-    """The hull of triangles (T, 3, 3), and points of the surface if that fills something; None if it is flat."""
+    """The hull of triangles (T, 3, 3), and points of the surface if that fills something, or None if it is flat."""
     triangles = np.frombuffer(content).reshape(-1, 3, 3)
     corners = triangles.reshape(-1, 3)
     hull = hull_of(corners)

@@ -78,7 +78,7 @@ class Plant:
         self._bind()
 
     def arms(self) -> list[Plant]:
-        """This plant as each of its arms' sensor and tool point see it; they share one state."""
+        """This plant as each of its arms' sensor and tool point see it. They share one state."""
         if not self._held:
             return [self]
         second = copy.copy(self)
@@ -119,7 +119,7 @@ class Plant:
             self.batch.set_const()
 
     def _load(self, draws: Draws) -> bool:
-        """Give each trial its own payload; whether there was one to give."""
+        """Give each trial its own payload. Returns whether there was one to give."""
         if "robot.payload" not in draws:
             return False
         name, inertias = loaded_inertias(self.robot, draws["robot.payload"])
@@ -155,7 +155,7 @@ class Plant:
 
     @property
     def joint_positions(self) -> Float:
-        """(N, nv) position of the joint that each generalised velocity is of [rad or m]; nothing for a free base."""
+        """(N, nv) position of the joint that each generalised velocity belongs to [rad or m]. A free base has none."""
         whole: Float = self._qpos
         return whole if self.model.nq == self.model.nv else whole[:, self._layout.places]
 
@@ -174,7 +174,7 @@ class Plant:
         self.batch.step(ids=self._some(ids), stage=_VELOCITY)
 
     def acceleration(self, torque: Float, ids: NDArray[np.int64]) -> Float:
-        """Accelerations (N, nv) of some trials under generalised forces (N, nv), MuJoCo's order; no time passes."""
+        """Accelerations (N, nv) of some trials under generalised forces (N, nv), MuJoCo's order. No time passes."""
         self._apply_torque(torque)
         self.batch.forward(ids=self._some(ids))
         acceleration: Float = self._acceleration
@@ -185,7 +185,7 @@ class Plant:
         return ids if len(ids) < self.count else None
 
     def _apply_torque(self, torque: Float) -> None:
-        """Nothing drives the fixture's sprung parts; a controller that cancels gravity would lift them."""
+        """Nothing drives the fixture's sprung parts. A controller that cancels gravity would lift them."""
         self._applied[:] = torque
         if len(self._layout.sprung):
             self._applied[:, self._layout.sprung] = 0.0
@@ -254,7 +254,7 @@ class Plant:
         return State(in_fixture, turned)
 
     def body_frames(self) -> tuple[Float, Float]:
-        """Positions (N, B, 3) and axes (N, B, 3, 3) of all bodies, the world first; a live view of the positions."""
+        """Positions (N, B, 3) and axes (N, B, 3, 3) of all bodies, the world first. The positions are a live view."""
         return self._xpos, self._xmat.reshape(*self._xpos.shape, 3)
 
     def body_poses(self) -> tuple[Float, Float]:
@@ -269,7 +269,7 @@ def grasp_pose(draws: Draws, count: int) -> Pose | None:
 
 
 def displacement(draws: Draws, prefix: str, count: int) -> Pose | None:
-    """A pose from `<prefix>.offset_x|y|z` and the rotation vector `<prefix>.tilt_x|y|z`; None if none is drawn."""
+    """A pose from `<prefix>.offset_x|y|z` and the rotation vector `<prefix>.tilt_x|y|z`, or None if none is drawn."""
     if not any(key.startswith((f"{prefix}.offset_", f"{prefix}.tilt_")) for key in draws):
         return None
 

@@ -1,4 +1,4 @@
-"""The one place that relates rates: control, contact, skill, trace; non-integer ratios are refused."""
+"""The one place that relates rates: control, contact, skill, trace. Non-integer ratios are refused."""
 
 from __future__ import annotations
 

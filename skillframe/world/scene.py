@@ -1,4 +1,4 @@
-"""A scene: fixtures, the tool in the robot's grip, where a run starts and when the task is done; data only.
+"""A scene: fixtures, the tool in the robot's grip, where a run starts and when the task is done. It holds data only.
 
 Frames: the *fixture frame* is where the task is described (its z axis points up, out of the hole or valley); the *tool
 frame* is the robot's `tool_frame` (flange, wrist), its z axis points out along the tool. A scene knows nothing of
@@ -67,7 +67,7 @@ class Tool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Holder:
-    """How the second arm of a two-armed robot holds the scene's fixture; one-armed robots find it standing still.
+    """How the second arm of a two-armed robot holds the scene's fixture. One-armed robots find it standing still.
 
     Attributes:
         tool: what that arm holds, fixture included, in its tool frame; it is drawn and touched as the fixture is, so
@@ -103,7 +103,7 @@ class Sprung:
 
 
 class State(NamedTuple):
-    """Where the tool is, seen from the fixture, for goal predicates; N trials.
+    """Where the tool is, seen from the fixture, for goal predicates, for N trials.
 
     Attributes:
         tip: pose of the tool's "tip" in the true fixture frame: (N, 3), (N, 3, 3), tool axes.

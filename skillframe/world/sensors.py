@@ -22,7 +22,7 @@ TARE_TICKS = 100
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SensorSettings:
-    """Noise of the sensors; standard deviations per 1 kHz sample.
+    """Noise of the sensors, as standard deviations per 1 kHz sample.
 
     Attributes:
         force_noise: [N]; 0.3 N is a wrist sensor on a moving robot (0.2-0.65 N in the kuka_ati recordings).
@@ -40,7 +40,7 @@ class SensorSettings:
 
 
 class Sensors:
-    """The sensors of N trials; all randomness comes from one generator per trial, drawn in blocks."""
+    """The sensors of N trials. All randomness comes from one generator per trial, drawn in blocks."""
 
     def __init__(
         self, settings: SensorSettings, plant: Plant, rngs: Sequence[np.random.Generator], draws: Mapping[str, Float]

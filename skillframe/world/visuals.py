@@ -50,7 +50,7 @@ def bones(model: pin.Model, shaped: Container[str]) -> Iterator[tuple[str, Geom]
 
 
 def placed_geom(visual: ET.Element, placement: pin.SE3, materials: Mapping[str, ET.Element]) -> Geom | None:
-    """The primitive of a `<visual>` or `<collision>` of a link that is placed so in its body; None for a mesh."""
+    """The primitive of a `<visual>` or `<collision>` of a link that is placed so in its body, or None for a mesh."""
     shape = visual.find("geometry")
     child = None if shape is None else next(iter(shape), None)
     if child is None:

@@ -1,4 +1,4 @@
-"""Prints the project's speed and memory figures, each beside its bound; `make bench` runs it.
+"""Prints the project's speed and memory figures, each beside its bound. `make bench` runs it.
 
 Ratios are taken side by side in one run and from CPU time, so that they hold on a busy machine too. A bound that is
 missed is marked; the exit code is 0 all the same, because a benchmark is read, not gated.
@@ -125,7 +125,7 @@ def two_arms():
 
 
 def memory():
-    """Resident and virtual memory of 256 trials, in a process of its own; then of a long run with a fine trace."""
+    """Resident and virtual memory of 256 trials, in a process of its own, then of a long run with a fine trace."""
     for what in ("batch", "long"):
         text = subprocess.run(
             [sys.executable, __file__, f"--memory-{what}"], capture_output=True, text=True, check=True

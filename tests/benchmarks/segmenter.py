@@ -1,4 +1,4 @@
-"""Speed of the segmenter: its fit, a whole `segment` call, and a policy's step online; CPU time, medians.
+"""Speed of the segmenter: its fit, a whole `segment` call, and a policy's step online. CPU time, medians.
 
 Run by `run.py`, or alone: `python -m tests.benchmarks.segmenter` from the project's root.
 """
@@ -29,7 +29,7 @@ LEVEL = np.array([1.0, 1.0, 0.0])
 
 
 def median_cpu(work: Callable[[], Any], repeats: int = REPEATS) -> float:
-    """Median CPU seconds of a call; one more goes before, for imports and caches."""
+    """Median CPU seconds of a call. One more goes before, for imports and caches."""
     work()
     taken = []
     for _ in range(repeats):
@@ -68,7 +68,7 @@ def fit_seconds() -> tuple[float, str]:
 
 
 def segment_seconds() -> tuple[float, float]:
-    """`skillframe segment` on three files, in a process that has imported what it needs; their mean length [s]."""
+    """`skillframe segment` on three files, in a process that has its imports. Returns their mean length [s]."""
     from skillframe.cli import main
     from skillframe.extend.reading import write_demonstration
 

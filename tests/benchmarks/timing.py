@@ -1,4 +1,4 @@
-"""CPU times of the batched loop and of what it is held against; wall time on a shared machine says little."""
+"""CPU times of the batched loop and of what it is held against. Wall time on a shared machine says little."""
 
 import time
 

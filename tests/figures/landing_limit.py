@@ -51,7 +51,7 @@ def stays(surface, onset, opening):
 
 
 def latest(surface, opening):
-    """Latest onset [s] in steps of a millisecond with which the load stays; None if none does."""
+    """Latest onset [s] in steps of a millisecond with which the load stays, or None if none does."""
     onsets = [onset for onset in np.arange(0.0, 0.06, 1e-3) if stays(surface, onset, opening)]
     return max(onsets, default=None)
 

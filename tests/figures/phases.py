@@ -1,4 +1,4 @@
-"""How well phases are found and followed: what is missed, what is false, how late; for the tables over many seeds.
+"""How well phases are found and followed: what is missed, what is false, how late. For the tables over many seeds.
 
 A change is missed if no boundary is within 0.3 s of the interval in which it truly happens, and a boundary is false if
 it is farther than 0.35 s from every such interval. One boundary may serve two changes, so recall flatters who cuts too
@@ -21,7 +21,7 @@ Interval = tuple[float, float]
 
 
 class Score(NamedTuple):
-    """Changes, how many were missed, false boundaries, and the errors [s] of those found; late is positive."""
+    """Changes, how many were missed, false boundaries, and the errors [s] of those found. Late is positive."""
 
     changes: int
     missed: int
@@ -50,7 +50,7 @@ NOTHING = Score(0, 0, 0, [])
 
 
 def distance(time: float, change: Interval) -> float:
-    """How long after a change a time is [s]; negative before it, zero within it."""
+    """How long after a change a time is [s]. Negative before it, zero within it."""
     return time - float(np.clip(time, *change))
 
 

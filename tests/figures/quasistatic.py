@@ -164,7 +164,7 @@ def hose(seed: int, index: int = 0, *, noise: float = 8.0) -> Made:
 
 
 def peg(seed: int, index: int = 0, *, noise: float = 8.0) -> Made:
-    """Down with 8 degrees of tilt, aligned by turning on the rim, inserted by 5 cm; recorded at the wrist."""
+    """Down with 8 degrees of tilt, aligned by turning on the rim, inserted by 5 cm. Recorded at the wrist."""
     rng = np.random.default_rng([44, seed, index])
     hand = Hand(rng=rng, noise=np.deg2rad(noise))
     tilt = (1.0 if index % 2 else -1.0) * np.deg2rad(8.0)
@@ -215,7 +215,7 @@ def wipe(seed: int, index: int = 0, *, noise: float = 8.0) -> Made:
 
 @cache
 def demonstrations(task: str, seed: int, count: int = 3, first: int = 0, **options: float) -> list[Made]:
-    """`count` demonstrations of a task; the valley's sides in turn."""
+    """`count` demonstrations of a task, the valley's sides in turn."""
     if task == "valley":
         return [valley(100 * seed + first + i, 1.0 if i % 2 == 0 else -1.0, **options) for i in range(count)]
     make = {"ls": lower_and_slide, "hose": hose, "peg": peg, "wipe": wipe}[task]

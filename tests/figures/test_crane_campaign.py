@@ -1,4 +1,4 @@
-"""200 cranes with FMUs over supply pressure, valve deadband, delay and friction; one FMU crashes and one hangs."""
+"""200 cranes with FMUs over supply pressure, valve deadband, delay and friction. One FMU crashes and one hangs."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ def test_the_crane_ends_in_the_corner_from_three_starts_whatever_its_friction_an
 
 @pytest.mark.parametrize("surface", TRIALS)
 def test_a_crane_that_goes_on_pressing_into_the_corner_comes_to_rest(surface: str) -> None:
-    """Six machines, 22 s, the last 8 of them; 200 N is what stiction may be told from in the best case."""
+    """Six machines, 22 s, the last 8 of them. 200 N is what stiction may be told from in the best case."""
     document = json.loads(SKILL.read_text(encoding="utf-8"))
     document["phases"][0]["stop"]["stall_s"] = 100.0
     traces = into_the_corner(surface, 6, 41, document, trace_hz=50.0, seconds=22.0).result.traces

@@ -43,7 +43,7 @@ def learned_angles(pairs: list[Taught], which: slice, settings: dict[str, object
 
 
 def report(angle: float, delay: float) -> np.ndarray:
-    """Prints a block of the table; the margins (20,) of the first variant."""
+    """Prints a block of the table. Returns the margins (20,) of the first variant."""
     pairs, failed = taught(angle, delay)
     peak = [trace.meta["peak_force_n"] for pair in pairs for trace in pair.traces]
     error = [estimate_error(trace) for pair in pairs for trace in pair.traces]
@@ -78,7 +78,7 @@ def test_what_two_demonstrations_teach_is_feasible_and_well_inside_the_set(angle
 
 @pytest.mark.parametrize("surface", ["wood", "styrofoam"])
 def test_what_was_learned_ends_in_the_corner_from_three_starts(surface: str) -> None:
-    """The pair of the first seed, taught with the longest delay and the least fitting angle; 36 of 36."""
+    """The pair of the first seed, taught with the longest delay and the least fitting angle. 36 of 36."""
     document = learn(taught(ANGLES[0], DELAYS[-1])[0][0].demonstrations)
     corner = into_the_corner(surface, 36, seed=43, document=document)
     result = corner.result

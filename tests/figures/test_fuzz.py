@@ -49,7 +49,7 @@ def test_a_few_hundred_damaged_inputs_are_answered_with_0_1_or_2(tmp_path: Path)
 @pytest.mark.timeout(0)
 @pytest.mark.skipif(sys.platform != "linux", reason="forks and /proc are needed")
 def test_twenty_thousand_damaged_inputs_of_a_new_seed_are_answered_with_0_1_or_2(tmp_path: Path) -> None:
-    """The seed is the date, so that another day tries others; it is printed, and repeats the run."""
+    """The seed is the date, so that another day tries others. It is printed, and repeats the run."""
     ended = fuzz(COUNT, time.strftime("%Y-%m-%d"), tmp_path)
     print("\n".join(line for line in ended.stdout.splitlines()[-60:]))
     assert ended.returncode == 0, ended.stdout[-6000:] + ended.stderr[-2000:]

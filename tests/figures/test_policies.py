@@ -92,7 +92,7 @@ def line(name: str, *cells: object) -> None:
 
 
 def run_all(name: str) -> int:
-    """Policies of a task, all from starts of their own; prints a row for each centre of compliance."""
+    """Policies of a task, all from starts of their own. Prints a row for each centre of compliance."""
     task = TASKS[name]
     policies = [taught(task, task.seed + i) for i in range(POLICIES)]
     wins = {}

@@ -1,4 +1,4 @@
-"""The acceptance figures of the segmenter over fresh seeds, beside all baselines; `pytest -s -m figures` prints them.
+"""The acceptance figures of the segmenter over fresh seeds, beside all baselines. `pytest -s -m figures` prints them.
 
 Boundaries are judged within windows of 50 ms: missed beyond 0.30 s, false beyond 0.35 s (see `tests.figures.phases`).
 Seeds were used for nothing else. Thresholds that are called reachable are asserted; rows marked "hard" are shown.
@@ -68,7 +68,7 @@ def learned(group: Callable[[int], Sequence[Taught]], seed: int, segmenter: str)
 
 
 class Group:
-    """Demonstrations of one kind by seed; compares by what it makes, so that fits are kept."""
+    """Demonstrations of one kind by seed. Compares by what it makes, so that fits are kept."""
 
     def __init__(self, task: str, count: int = 3, noise: float = 8.0, slope: float = 45.0) -> None:
         self.task, self.count, self.noise, self.slope = task, count, noise, slope
@@ -178,7 +178,7 @@ def touched(demonstration: Demonstration) -> float:
 
 @pytest.mark.parametrize("task", ["corner", "ls"])
 def test_a_touch_down_on_a_table_is_found_in_one_demonstration(task):
-    """The person lowers a box, or a tool, onto a table and goes on along it; truth is the touch itself."""
+    """The person lowers a box, or a tool, onto a table and goes on along it. Truth is the touch itself."""
     off, segments = [], []
     for seed in SEEDS:
         if task == "corner":

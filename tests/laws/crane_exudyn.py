@@ -145,7 +145,7 @@ class Crane:
         return rows
 
     def run(self, commands, period, step):
-        """Hold each row of commands (T, 3) for a period [s], integrating in steps; a row of `History` per period."""
+        """Hold each row of commands (T, 3) for a period [s], integrating in steps. A row of `History` per period."""
         exu, mbs = self.exu, self.mbs
         settings = exu.SimulationSettings()
         settings.timeIntegration.verboseMode = 0

@@ -59,7 +59,7 @@ class Monolith:
         self._known = (b"", None)
 
     def _mechanics(self, y):
-        """What depends on z and zd alone; kept, because a Jacobian by differences asks 19 times for the same."""
+        """What depends on z and zd alone. Kept, because a Jacobian by differences asks 19 times for the same."""
         key = y[:6].tobytes()
         if self._known[0] != key:
             s = self.chain.at(y[:3], y[3:6])

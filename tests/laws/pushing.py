@@ -48,7 +48,7 @@ class Push(Skill):
         return Command(Pose(self.position, self.rotation), self.twist, self.impedance, self.zero, status, reason)
 
     def _stalled(self, observation):
-        """Position and tool axis have stayed in a small box for `STALL_S`; sensor noise alone is no motion."""
+        """Position and tool axis have stayed in a small box for `STALL_S`. Sensor noise alone is no motion."""
         now = np.concatenate([observation.pose.position, observation.pose.rotation[..., 2]], axis=-1)
         far = np.abs(now - self.anchor)
         moved = (far[:, :3] > 2.0 * STALL_M).any(-1) | (far[:, 3:] > 2.0 * STALL_RAD).any(-1)
@@ -63,7 +63,7 @@ class Push(Skill):
 
 
 class Hold(Skill):
-    """Stay where the run started, plus an offset and a feed-forward; end with a status when told to."""
+    """Stay where the run started, plus an offset and a feed-forward. End with a status when told to."""
 
     def __init__(self, stiffness, offset=(0.0, 0.0, 0.0), feedforward=lambda time: np.zeros(6), damping=None, end=None):
         self.stiffness, self.offset, self.feedforward, self.damping, self.end = (

@@ -1,4 +1,4 @@
-"""Short ways to run a push in a shipped world, for tests of the loop; robots and scenes are loaded once."""
+"""Short ways to run a push in a shipped world, for tests of the loop. Robots and scenes are loaded once."""
 
 from dataclasses import replace
 from functools import cache

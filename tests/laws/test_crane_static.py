@@ -90,7 +90,7 @@ def period(z, shape, hertz, step=5e-4):
 @pytest.mark.slow
 @pytest.mark.parametrize("z", [START, (0.3, -1.2, 0.2), (0.9, -1.8, 0.6)])
 def test_the_natural_frequencies_are_those_of_theory_with_geometric_stiffness(z):
-    """Within 0.5 %; leaving out the load's stiffness would miss the lowest by more than that."""
+    """Within 0.5 %. Leaving out the load's stiffness would miss the lowest by more than that."""
     mass = tooled().at(np.asarray(z), np.zeros(3)).mass
     squares, shapes = eigh(stiffness(z), mass)
     oil_alone = np.sqrt(eigh(stiffness(z, geometric=False), mass)[0]) / (2 * np.pi)

@@ -22,7 +22,7 @@ RESULTS = ("success", "status", "duration_s", "peak_force_n", "final_error_m", "
 
 
 def draws_of(world, count):
-    """Random draws within the sizes of a case, by trial; friction and masses are factors about nominal."""
+    """Random draws within the sizes of a case, by trial. Friction and masses are factors about nominal."""
     rng = np.random.default_rng(5)
     made = {}
     for key, size in CASES[world][1].items():

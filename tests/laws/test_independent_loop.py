@@ -30,7 +30,7 @@ def draws_for(world):
 
 
 def directions_for(world):
-    """Down into the hole; into the valley up to 50 degrees aside, so that some stick on the slope."""
+    """Down into the hole. Into the valley up to 50 degrees aside, so that some stick on the slope."""
     tilt = np.random.default_rng(4).uniform(-0.9, 0.9, TRIALS) * (world == "valley")
     return np.stack([np.sin(tilt), np.zeros(TRIALS), -np.cos(tilt)], axis=-1)
 

@@ -208,7 +208,7 @@ def compiled(folder: Path, code, **hooks):
 
 
 def pack(path: Path, description=None, binary=None, version=2, members=()):
-    """The zip; members are (name or ZipInfo, content)."""
+    """The zip of members (name or ZipInfo, content)."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
         if description is not None:
             file.writestr("modelDescription.xml", description)

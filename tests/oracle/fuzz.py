@@ -64,7 +64,7 @@ class Hang(BaseException):
 
 
 def fuzz(cases, run, count, seed, folder, tell=lambda done: None):
-    """Give `count` damaged inputs to `run(arguments) -> exit code`; what came of them."""
+    """Give `count` damaged inputs to `run(arguments) -> exit code`. Returns what came of them."""
     warm_up(cases, run, folder)
     found, began, index = Found(), time.perf_counter(), 0
     while index < count:
@@ -90,7 +90,7 @@ def warm_up(cases, run, folder):
 
 
 def collect(reader, child, found, index, cases, seed, tell):
-    """Results of one process until it ends; the index after the last input it was given."""
+    """Results of one process until it ends, and the index after the last input that it got."""
     rest = b""
     while True:
         ready, _, _ = select.select([reader], [], [], SECONDS * LIMIT_ON_WALL + 30.0)
@@ -121,7 +121,7 @@ def collect(reader, child, found, index, cases, seed, tell):
 
 
 def drawn(cases, index, seed):
-    """Input number `index`: case, damaged content and command; the same for one seed, whatever ran before."""
+    """Input number `index`: case, damaged content and command. The same for one seed, whatever ran before."""
     rng = random.Random(f"{seed}/{index}")
     case = rng.choices(cases, [case.share for case in cases])[0]
     content = mutated(case.target, case.files[case.target], rng) if case.target else b""

@@ -147,7 +147,7 @@ def any_style(rng):
 
 
 def write(recording, folder: Path, name: str, style, rng) -> Path:
-    """A recording as a file of this style; its metadata say what the contract leaves open."""
+    """A recording as a file of this style. Its metadata say what the contract leaves open."""
     path = folder / f"{name}{style['ending']}"
     force, torque, said = _as_sensed(recording, style)
     count = len(recording["time"])

@@ -77,7 +77,7 @@ def words_changed(content, rng):
 
 
 def json_changed(content, rng):
-    """One value of another kind, a key gone, a key more, a value nested deeply; of lines, in one of them."""
+    """One value of another kind, a key gone, a key more, a value nested deeply. Of lines, in one of them."""
     lines = content.split(b"\n")
     whole = len(lines) < 2 or rng.random() < 0.1 or not lines[0].rstrip().endswith(b"}")
     i = rng.randrange(len(lines))

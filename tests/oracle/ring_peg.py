@@ -35,7 +35,7 @@ class Geometry:
 
 @dataclass(frozen=True, kw_only=True)
 class Tool:
-    """Carrier and tool as one body; the inertia is about the common centre of mass, tool axes."""
+    """Carrier and tool as one body. The inertia is about the common centre of mass, tool axes."""
 
     mass: float
     center: np.ndarray
@@ -44,7 +44,7 @@ class Tool:
 
 @dataclass(frozen=True, kw_only=True)
 class Push:
-    """Equation (1) at the tip with a pushed desired point; matrices are diagonal in base axes, (C, 6)."""
+    """Equation (1) at the tip with a pushed desired point. Matrices are diagonal in base axes, (C, 6)."""
 
     stiffness: np.ndarray
     damping: np.ndarray
@@ -130,7 +130,7 @@ def summed(case, values, count):
 
 
 def step(velocity, inertia, force, contacts, center, friction):
-    """Velocity (C, 6) of the centre of mass after one step; linear part first, base axes."""
+    """Velocity (C, 6) of the centre of mass after one step. Linear part first, base axes."""
     case, point, normal, depth = contacts
     count = len(velocity)
     unit = np.broadcast_to(np.eye(3), (len(case), 3, 3))
@@ -156,7 +156,7 @@ def step(velocity, inertia, force, contacts, center, friction):
 
 
 def insert(geometry, tool, push, friction, wrist, rotation, duration):
-    """Push C tools from their starts; returns the path of their tips (T, C, 3) and final attitudes (C, 3, 3)."""
+    """Push C tools from their starts. Returns the path of their tips (T, C, 3) and final attitudes (C, 3, 3)."""
     contacts, count = Contacts(geometry), len(wrist)
     velocity, offset = np.zeros((count, 6)), np.array([0.0, 0.0, geometry.tip])
     desired, attitude, path = wrist + rotation @ offset, rotation.copy(), []

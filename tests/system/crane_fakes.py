@@ -69,7 +69,7 @@ MISCHIEF = {
 
 
 def fake_cylinder(folder: Path, kind: str) -> Path:
-    """A spring and a damper with the names of a cylinder; from 50 ms on it does its mischief."""
+    """A spring and a damper with the names of a cylinder. From 50 ms on it does its mischief."""
     source = folder / kind
     source.mkdir(parents=True)
     text = (CRANE / "robot.toml").read_text()

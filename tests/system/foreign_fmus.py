@@ -96,7 +96,7 @@ OUTPUT;cylinder.fmu;pressure_b;;pb
 
 
 def container(version, cylinder: Path, folder: Path, parameters: bool = False) -> Path:
-    """An FMU around a cylinder's, made by the toolbox with its own compiled master; parameters as cylinder.NAME."""
+    """An FMU around a cylinder's, made by the toolbox with its own compiled master. Parameters as cylinder.NAME."""
     shutil.copy(cylinder, folder / "cylinder.fmu")
     (folder / "held.csv").write_text(CONTAINER)
     code = "from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer; fmucontainer()"

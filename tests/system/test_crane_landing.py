@@ -8,7 +8,7 @@ pytestmark = pytest.mark.slow
 
 
 def test_the_crane_that_ships_stays_on_wood():
-    """1e6 N/m; true forces, every millisecond."""
+    """1e6 N/m. True forces, every millisecond."""
     assert pressed(1e6, mass=1.02, friction=0.8).lost == 0.0
 
 

@@ -46,7 +46,7 @@ def document() -> Any:
 
 @pytest.fixture
 def judged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Any:
-    """Show and run a document; each ends with 0 or 1, or with 2 and one sentence."""
+    """Show and run a document. Each ends with 0 or 1, or with 2 and one sentence."""
 
     def judge(document: Any) -> list[int]:
         path, codes = tmp_path / "edited.json", []

@@ -40,7 +40,7 @@ def foreign(folder: Path) -> Path:
 
 
 def moved(robot):
-    """A push of 0.5 s along x with our law; the trace's poses and forces."""
+    """A push of 0.5 s along x with our law. Returns the trace's poses and forces."""
     model = load_model(load_robot(robot))
     model = replace(model, spec=replace(model.spec, limits=Limits(force_n=None, torque_rate_nm_s=None)))
     setup = Setup(robot=model, scene=scene("free"), center_of_compliance=np.zeros(3))

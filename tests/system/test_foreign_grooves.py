@@ -1,4 +1,4 @@
-"""Recordings made elsewhere go through `demonstration convert` and `learn`; whether a direction works has a formula."""
+"""Recordings made elsewhere go through `demonstration convert` and `learn`. Whether a direction works has a formula."""
 
 from __future__ import annotations
 

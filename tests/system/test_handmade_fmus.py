@@ -44,7 +44,7 @@ def lag(tmp_path_factory):
 
 @pytest.fixture
 def said(capfd):
-    """(exit code, stdout, stderr) of `skillframe fmu`; never more than a sentence, never a child left."""
+    """(exit code, stdout, stderr) of `skillframe fmu`. Never more than a sentence, never a child left."""
 
     def say(*arguments):
         capfd.readouterr()

@@ -62,7 +62,7 @@ def started(mark, code, *arguments):
 
 
 def ended_in(mark, code, *arguments):
-    """(exit code, stdout, stderr, seconds) of Python code; it is ended in any case."""
+    """(exit code, stdout, stderr, seconds) of Python code. It is ended in any case."""
     begin = time.monotonic()
     process = started(mark, code, *arguments)
     try:
@@ -76,7 +76,7 @@ def ended_in(mark, code, *arguments):
 
 @pytest.fixture
 def mark(tmp_path):
-    """A folder that everything started here names; nothing is left of it in the end."""
+    """A folder that everything started here names. Nothing is left of it in the end."""
     yield tmp_path
     for pid in processes(tmp_path):
         with suppress(ProcessLookupError):  # gone meanwhile
@@ -100,7 +100,7 @@ def confined():
 
 
 def nothing_is_left(mark, landlock=True):
-    """No process and, where the kernel confines writing, no file; the last process may take a moment to go."""
+    """No process and, where the kernel confines writing, no file. The last process may take a moment to go."""
     patience = time.monotonic() + 5.0
     while (left := processes(mark)) and time.monotonic() < patience:
         time.sleep(0.02)

@@ -1,4 +1,4 @@
-"""Laws of rotations, poses and wrenches; examples would only repeat the formulas."""
+"""Laws of rotations, poses and wrenches. Examples would only repeat the formulas."""
 
 import numpy as np
 import pytest

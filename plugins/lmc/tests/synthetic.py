@@ -116,7 +116,7 @@ def turning(
 
 
 def levering(recipe: Recipe | None = None, *, reach: float = 0.2, force: float = 10.0) -> Demonstration:
-    """A rod turned over an edge at its tip: the edge drives the wrist along an arc; recorded at the wrist.
+    """A rod turned over an edge at its tip: the edge drives the wrist along an arc. It is recorded at the wrist.
 
     The edge holds the tip, so the hand's pure torque makes the wrist move along v = w x r; the edge pushes along v.
     """
@@ -133,7 +133,7 @@ def levering(recipe: Recipe | None = None, *, reach: float = 0.2, force: float =
 
 
 def pair_of_alignments(recipe: Recipe | None = None, tilt: float = 8.0) -> list[Demonstration]:
-    """A tool pressed down while the hand turns it upright, from +tilt and from -tilt degrees about y; at the wrist."""
+    """A tool pressed down while the hand turns it upright, from +tilt and from -tilt degrees about y, at the wrist."""
     return [_alignment(sign * np.radians(tilt), recipe or Recipe()) for sign in (1.0, -1.0)]
 
 

@@ -1,4 +1,4 @@
-"""An insertion with search as its exception: insert; where that comes to rest too early, search, then insert again."""
+"""An insertion with search as its exception. Where it comes to rest too early, search, then insert again."""
 
 from functools import cache
 

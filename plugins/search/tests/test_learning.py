@@ -85,7 +85,7 @@ def test_in_the_axes_of_the_start_turning_the_whole_task_changes_nothing():
 
 
 def test_it_presses_against_the_mean_force():
-    """The truth is straight down; friction of 2 N over a finite search averages out to within 2 degrees."""
+    """The truth is straight down. Friction of 2 N over a finite search averages out to within 2 degrees."""
     push = phase_of(searching()).push.direction
     assert np.degrees(np.arccos(-push[2])) < 2.0
 

@@ -1,4 +1,4 @@
-"""The figures of the search in MuJoCo, 60 goals each and the same goals for every method; `make figures` prints them.
+"""The figures of the search in MuJoCo, 60 goals each and the same goals for every method. `make figures` prints them.
 
 Fillet 0.8 mm, play 0.25 mm (peg) and 0.5 mm (pins), friction 0.2, push 10 N, limit of the speed 15 mm/s. Published
 (seed): 85 % for the peg and 67 % for the socket, with a budget that is not given; ours is 20 s. The fillet, not the

@@ -56,7 +56,7 @@ def test_where_there_is_no_hole_it_fails_in_its_time_and_does_not_cry_found():
 
 
 def test_it_presses_with_its_push_while_it_slides():
-    """Ten newtons within 3 % in the mean, once the push has grown; the sensor's bias is removed by the tare."""
+    """Ten newtons within 3 % in the mean, once the push has grown. The sensor's bias is removed by the tare."""
     trace = run(given("spiral"), offset=(0.019, 0.0, 0.0)).traces[0]
     late = trace.time > 1.0
     assert trace.wrench_true[late, 2].mean() == pytest.approx(10.0, rel=0.03)
@@ -99,7 +99,7 @@ def test_a_blind_person_s_searches_teach_one_that_finds_the_hole():
 
 @pytest.mark.slow
 def test_the_learned_spread_and_force_are_near_the_person_s():
-    """Believed 4 mm: he stops where he finds it and shows less; within 40 %. Pushed with 10 N, within 10 %."""
+    """Believed 4 mm: he stops where he finds it and shows less. Within 40 %. Pushed with 10 N, within 10 %."""
     phase = document("search", "peg_in_hole", PLANE, push=None)["phases"][0]
     deviation = np.sqrt(np.diag(phase["exploration"]["covariance"]))
     assert ((deviation > 0.0024) & (deviation < 0.0056)).all()

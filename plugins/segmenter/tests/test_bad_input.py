@@ -205,7 +205,7 @@ def test_a_boundary_that_a_person_moves_stays_where_it_was_put(run, files, tmp_p
 
 
 def test_boundaries_are_counted_after_phases_are_joined_and_any_of_them_can_be_moved():
-    """Joining takes boundaries away that the segmenter has found; nobody sees those, and they must not come back."""
+    """Joining takes boundaries away that the segmenter has found. Nobody sees those, and they must not come back."""
     demonstrations = [legs(i, X, Z, -X) for i in range(3)]
     found = registry().segmenter("wrench_hmm").fit(demonstrations, None, {})
     joined = relabelled(found, 1, 2)

@@ -44,7 +44,7 @@ def test_evidence_looks_at_the_wrench_and_at_no_other_regressor():
 
 @pytest.mark.parametrize("lean", [-1.0, -0.5, 0.5, 1.0])
 def test_friction_tells_phases_apart_whichever_side_the_tool_leans_on(lean):
-    """Three demonstrations say that the side differs anyway; the sign of friction does not."""
+    """Three demonstrations say that the side differs anyway. The sign of friction does not."""
     rng = np.random.default_rng(3)
     made = learned(rng, (1.0, -1.0, 1.0))
     down, along = (made.log_evidence(wrenches(rng, 50, lean, friction)) for friction in (0.0, -0.25))

@@ -79,7 +79,7 @@ X, Y, Z = np.eye(3).tolist()
     ],
 )
 def test_phases_may_stand_in_for_each_other_if_both_can_turn_as_the_other_turns(one, two, alike):
-    """One push explains lowering and interlocking; what tells them apart is the axis that they turn about."""
+    """One push explains lowering and interlocking. What tells them apart is the axis that they turn about."""
     bodies = learned(0.0, **one), learned(0.0, **two)
     assert _turn_alike(*bodies) is alike
     assert _turn_alike(*bodies[::-1]) is alike

@@ -49,14 +49,14 @@ def test_soft_directions_are_shorter_than_one(x):
 
 
 def test_friction_is_no_part_of_the_contact_normal():
-    """A slide's force has a part along the motion; what is left of it is normal to the motion."""
+    """A slide's force has a part along the motion. What is left of it is normal to the motion."""
     motion = np.array([[0.9, 0.0, 0.0, 0.0, 0.0, 0.0]])
     seen = emission.observe(motion, np.array([[-0.2, 0.0, 0.8, 0.0, 0.0, 0.0]]))
     np.testing.assert_allclose(seen.free[0, 0], np.diag([1.0, 1.0, 1.0 - 0.8**2]), atol=1e-12)
 
 
 def test_a_phase_s_direction_is_found_from_slides_on_planes_that_face_different_ways():
-    """Each window shows only what its plane lets through; together they show the desired direction."""
+    """Each window shows only what its plane lets through. Together they show the desired direction."""
     wanted = np.array([0.1, -0.2, -0.8])
     normal = RNG.normal(size=(400, 3))
     normal /= norm(normal)[:, None]

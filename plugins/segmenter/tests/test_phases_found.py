@@ -1,4 +1,4 @@
-"""Phases found in quasi-static demonstrations: the acceptance figures on a few seeds; all of them in `make figures`."""
+"""Phases found in quasi-static demonstrations: the acceptance figures on a few seeds. All of them in `make figures`."""
 
 from dataclasses import replace
 
@@ -63,7 +63,7 @@ def test_where_the_task_stands_changes_nothing_at_all(by):
 
 
 def test_a_turned_scene_has_the_same_phases():
-    """Soft norms turn with the scene; only the sphere's grid does not, hence 95 % of the time and not all of it."""
+    """Soft norms turn with the scene. Only the sphere's grid does not, hence 95 % of the time and not all of it."""
     here, taught = found("ls", SEEDS[0])
     turn = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
     turn *= np.linalg.det(turn)

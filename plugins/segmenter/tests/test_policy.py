@@ -88,7 +88,7 @@ def test_what_phases_say_beside_themselves_is_kept_apart_unless_they_agree():
 
 @pytest.mark.parametrize("skill", ["lmc", pytest.param("gmr", marks=pytest.mark.slow)])
 def test_every_phase_holds_all_that_its_own_pieces_taught(skill):
-    """A mixture's demonstrations stand beside its phase in the file; in a policy, each phase has its own."""
+    """A mixture's demonstrations stand beside its phase in the file. In a policy, each phase has its own."""
     taught = [m.demonstration for m in made.demonstrations("ls", 2)]
     kind = registry().skill(skill)
     document = learned(registry().skill("policy"), taught, LearnOptions(settings={"skill": skill}))

@@ -1,4 +1,4 @@
-"""What goes round and round is found, whatever its plane, and nothing else is; it is one phase, and no LMC."""
+"""What goes round and round is found, whatever its plane, and nothing else is. It is one phase, and no LMC."""
 
 from dataclasses import replace
 

@@ -75,7 +75,7 @@ def bulk_modulus(pressure: Float, p: SimpleNamespace) -> Float:
 
 
 def opening(spool: Float, deadband: Float) -> Float:
-    """Eq. 2: opening of the edges from the spool's position, -1 to 1; the overlap opens nothing."""
+    """Eq. 2: opening of the edges from the spool's position, -1 to 1. The overlap opens nothing."""
     x = clip(spool, -1.0, 1.0)
     result: Float = copysign(maximum(absolute(x) - deadband, 0.0) / (1.0 - deadband), x)
     return result
@@ -128,7 +128,7 @@ def friction_force(p: SimpleNamespace, deflection: Float, velocity: Float) -> Fl
 
 
 def end_stop_force(p: SimpleNamespace, position: Float, velocity: Float) -> Float:
-    """Eq. 9: force of the end stops on the piston [N]; they push and never pull."""
+    """Eq. 9: force of the end stops on the piston [N]. They push and never pull."""
     low, high = -position, position - p.stroke
     k, d = p.endstop_stiffness, p.endstop_damping
     push = where(low > 0, maximum(k * low - d * velocity, 0.0), 0.0)
@@ -137,7 +137,7 @@ def end_stop_force(p: SimpleNamespace, position: Float, velocity: Float) -> Floa
 
 
 def piston_force(p: SimpleNamespace, y: Float, position: Float, velocity: Float) -> Float:
-    """Eq. 9: force on the piston [N], positive extends; `y` (6, n) are the states."""
+    """Eq. 9: force on the piston [N], positive extends. `y` (6, n) are the states."""
     result: Float = (
         p.area_a * y[2] - p.area_b * y[3] - friction_force(p, y[5], velocity) + end_stop_force(p, position, velocity)
     )

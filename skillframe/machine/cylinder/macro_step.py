@@ -68,7 +68,7 @@ def begin(p: SimpleNamespace, y: Vector, memory: Vector, given: Vector) -> Vecto
 
 
 def substep(p: SimpleNamespace, stage: Vector, memory: Vector, given: Vector) -> Vector:
-    """STAGE after the next internal step; as it is, where a cylinder has come to its end."""
+    """STAGE after the next internal step. It stays where a cylinder has come to its end."""
     turn, a, h = stage[20], given[3], given[5] / stage[19]
     motion, y, k1 = _motion(p, memory, given, stage[18]), stage[0:6], stage[6:12]
     here, middle, there = (motion.at((turn + share) * h) for share in (0.0, 0.5, 1.0))
@@ -111,7 +111,7 @@ def _rows(vector: Vector, count: int = 6) -> list[Any]:
 
 
 def _count(p: SimpleNamespace, y: Vector, motion: eq.PistonMotion, rates: Vector, step: Any) -> Any:
-    """How many internal steps keep h lambda below one half; `rates` now, to see ports open."""
+    """How many internal steps keep h lambda below one half. `rates` are those now, to see ports open."""
     pa, pb, low = y[2], y[3], p.return_pressure
     to_supply = minimum(absolute(y[4] - pa), absolute(y[4] - pb))
     least = minimum(to_supply, minimum(absolute(pa - low), absolute(pb - low))) + p.laminar_pressure

@@ -17,7 +17,7 @@ CYLINDER = "hydraulic_cylinder"
 def open_cylinders(
     specs: Sequence[ActuatorSpec], trials: int = 1, base: Path | None = None, version: int = 2
 ) -> Actuators:
-    """A bank for these actuators; arguments and errors as `skillframe.fmu.opening.open_actuators`.
+    """A bank for these actuators. Arguments and errors are those of `skillframe.fmu.opening.open_actuators`.
 
     Without a C compiler, a machine whose actuators are all `hydraulic_cylinder` gets the Python reference, which
     `notes` says.

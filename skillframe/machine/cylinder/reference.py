@@ -78,7 +78,7 @@ class ReferenceBank:
                     raise UnknownName("output of hydraulic_cylinder", name, self._known_outputs)
 
     def start(self, time: float = 0.0, parameters: Sequence[Mapping[str, Any]] | None = None) -> None:
-        """Initialise every cylinder in static equilibrium at `u`; see `Actuators`.
+        """Initialise every cylinder in static equilibrium at `u`. See `Actuators`.
 
         Raises:
             UnknownName, InputError: a parameter that is not there, or is no number.
@@ -120,7 +120,7 @@ class ReferenceBank:
         self.y[rows, column] = shown[rows, of]
 
     def step(self, time: float, step: float) -> bool:
-        """Advance from `time` by `step` [s] with inputs `u`; True if every active cylinder went well."""
+        """Advance from `time` by `step` [s] with inputs `u`. Returns True if every active cylinder went well."""
         self._take()
         r = self._routines
         r.given[:, -1] = step
@@ -147,7 +147,7 @@ class ReferenceBank:
         return not bad.any()
 
     def refresh(self) -> bool:
-        """Outputs at the present inputs; no time passes."""
+        """Outputs at the present inputs. No time passes."""
         self._take()
         self._routines.show()
         self._give(self._routines.shown)
@@ -167,7 +167,7 @@ class ReferenceBank:
         return Capabilities(True, True, True, True, True, True)
 
     def problem(self, index: int) -> str:
-        """Why a cylinder failed, one sentence; empty if it did not."""
+        """Why a cylinder failed, one sentence, or empty if it did not."""
         return self._problems.get(index, "")
 
     def close(self) -> None:

@@ -49,7 +49,7 @@ class Routines:
         self._finish = [self._bind("finish", stage, self.result) for stage in self._stages]
 
     def step(self, active: NDArray[np.uint8]) -> None:
-        """From `state`, `memory` and `given` to `result`; cylinders that are not active do not slow others down."""
+        """From `state`, `memory` and `given` to `result`. Cylinders that are not active do not slow others down."""
         with np.errstate(all="ignore"):
             self._begin()
             count = int((self._stages[0][:, STAGE.index("count")] * active).max(initial=0.0))

@@ -1,4 +1,4 @@
-"""`corner`: a box set down on a table and pushed into the corner of two walls (seed, Fig. 2b); sizes are ours."""
+"""`corner`: a box set down on a table and pushed into the corner of two walls (seed, Fig. 2b). Sizes are ours."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class CornerParams:
 
 
 def build(params: CornerParams) -> Scene:
-    """The walls stand where x and y of the box's lower middle would be zero; the table's top is z = 0."""
+    """The walls stand where x and y of the box's lower middle would be zero. The table's top is z = 0."""
     require(
         "corner",
         {

@@ -1,4 +1,4 @@
-"""`edge`: a table's edge to lever a rod on (seed, Fig. 7); turning the rod moves the wrist by contact alone."""
+"""`edge`: a table's edge to lever a rod on (seed, Fig. 7). Turning the rod moves the wrist by contact alone."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class EdgeParams:
 
 
 def build(params: EdgeParams) -> Scene:
-    """A table that fills x < 0, z < 0; its edge is the y axis. The wrist is at x > 0, below; the tip points up over it.
+    """A table that fills x < 0, z < 0. Its edge is the y axis. The wrist is at x > 0, below. The tip points up over it.
 
     The rod is turned down about +y until it lies level on the edge.
     """

@@ -24,7 +24,7 @@ class FreeParams:
 
 
 def build(params: FreeParams) -> Scene:
-    """A tool in empty space; every pose is a goal."""
+    """A tool in empty space. Every pose is a goal."""
     ball = Geom(kind="sphere", size=(0.005,), position=(0.0, 0.0, WRIST_TO_TIP), rgba=TOOL_COLOUR)
     start = (0.0, 0.0, 0.05)
 

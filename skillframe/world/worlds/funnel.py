@@ -1,4 +1,4 @@
-"""`funnel`: several slopes around a point; a ball slides to the middle from all sides."""
+"""`funnel`: several slopes around a point. A ball slides to the middle from all sides."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`hose_coupler`: two coupler faces that align flush under push (seed, Fig. 12); tool point at the flange.
+"""`hose_coupler`: two coupler faces that align flush under push (seed, Fig. 12). The tool point is at the flange.
 
 A disc of radius 30 mm and fillet 2 mm stands for the coupler's face, 150 mm ahead of the flange; the fixture is the
 other half's flat face. With `interlock` the coupler carries two lugs, the fixture a low collar, 9 mm wider than the
@@ -49,7 +49,7 @@ class HoseParams:
 
 
 def build(params: HoseParams) -> Scene:
-    """The fixture's face is the plane z = 0; the goal is a flush face (tilt below `tolerance`, within 1 mm).
+    """The fixture's face is the plane z = 0. The goal is a flush face (tilt below `tolerance`, within 1 mm).
 
     With `interlock` the goal is lugs under the claws: turned to 2 degrees, within 1.5 mm and 1.5 degrees of flush.
     """
@@ -133,7 +133,7 @@ def _collar(params: HoseParams, boxes: int = 24) -> tuple[Geom, ...]:
 
 
 def _claws(params: HoseParams) -> tuple[Geom, ...]:
-    """Two claws on the fixture: a back that stops the lug, and a roof over it; both clear of the coupler's face."""
+    """Two claws on the fixture: a back that stops the lug, and a roof over it. Both are clear of the coupler's face."""
     radius, half, thickness = params.radius + CLEAR + 0.005, 0.005, 0.004
     roof = ABOVE + LUG_HEIGHT + PLAY
     claws = []

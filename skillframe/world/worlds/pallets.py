@@ -61,7 +61,7 @@ class PalletsParams:
 
 
 def build(params: PalletsParams) -> Scene:
-    """Ground is z = 0; the stop's face touches the tool where its x is 0.5 m, the stack's top where z is its height."""
+    """Ground is z = 0. The stop's face touches the tool where its x is 0.5 m, the stack's top where z is its height."""
     stiffness = params.stiffness or STIFFNESS[params.surface]
     _check(params, stiffness)
     top, face = params.pallets * STEP, 0.5 + RADIUS
@@ -123,7 +123,7 @@ def _check(params: PalletsParams, stiffness: float) -> None:
 
 
 def _tool() -> Tool:
-    """What touches is a sphere at the machine's tool frame; the load itself is part of the machine."""
+    """What touches is a sphere at the machine's tool frame. The load itself is part of the machine."""
     return Tool(
         geoms=(Geom(kind="sphere", size=(RADIUS,), rgba=TOOL_COLOUR),), mass=1e-3, center_of_mass=(0.0, 0.0, 0.0),
         inertia=(1e-6, 1e-6, 1e-6), frames={"wrist": (0.0, 0.0, 0.0), "tip": (0.0, 0.0, 0.0)},
@@ -131,7 +131,7 @@ def _tool() -> Tool:
 
 
 def _top(top: float, face: float, surface: str) -> tuple[Geom, ...]:
-    """The plate under the tool: reaches below the stop, so that nothing slips between; seen as boards or sheets."""
+    """The plate under the tool: reaches below the stop, so that nothing slips between. Boards or sheets."""
     low, high = face - LENGTH - PLATE, face + PLATE
     solid = Geom(
         kind="box", size=(0.5 * (high - low), 0.5 * WIDTH, PLATE), position=(0.5 * (low + high), 0.0, top - PLATE),

@@ -44,7 +44,7 @@ class PegParams:
 
 
 def build(params: PegParams) -> Scene:
-    """The hole opens upwards at the fixture's origin; the goal is the tip below `done_depth`."""
+    """The hole opens upwards at the fixture's origin. The goal is the tip below `done_depth`."""
     require(
         "peg_in_hole",
         {

@@ -1,4 +1,4 @@
-"""`socket`: a plug with two round pins and a key, and its socket; a search in three dimensions (seed, Fig. 10).
+"""`socket`: a plug with two round pins and a key, and its socket. A search in three dimensions (seed, Fig. 10).
 
 The published task is an electricity socket; its measures are not given. Ours are of the common European kind: pins of
 4.8 mm at 19 mm from each other, and beside them a key that keeps the plug from going in the wrong way round. The key
@@ -56,7 +56,7 @@ class SocketParams:
 
 
 def build(params: SocketParams) -> Scene:
-    """The socket's face is the plane z = 0, its holes lie on the x axis; the goal is the tip below `done_depth`."""
+    """The socket's face is the plane z = 0, its holes lie on the x axis. The goal is the tip below `done_depth`."""
     free = params.radius + params.clearance
     require(
         "socket",
@@ -99,7 +99,7 @@ def build(params: SocketParams) -> Scene:
 
 
 def _plug(params: SocketParams) -> tuple[Geom, ...]:
-    """Pins and key in the tool frame; the tool's y axis is the fixture's -y."""
+    """Pins and key in the tool frame. The tool's y axis is the fixture's -y."""
     pin = filleted_peg(params.radius, params.length, params.fillet, params.segments, WRIST_TO_TIP)
     pins = [replace(pin, position=(side * 0.5 * params.spacing, 0.0, 0.0)) for side in (-1.0, 1.0)]
     half = 0.5 * (params.length - KEY_SHORTER)

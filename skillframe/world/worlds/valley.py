@@ -1,4 +1,4 @@
-r"""`valley`: two slopes that meet in a line along y; a ball slides to the bottom from either side (seed, Fig. 3).
+r"""`valley`: two slopes that meet in a line along y. A ball slides to the bottom from either side (seed, Fig. 3).
 
 Sliding down a slope of angle a with friction mu under a push tilted by t from straight down needs
 t < a - atan(mu): the analytic convergence region of one desired direction.

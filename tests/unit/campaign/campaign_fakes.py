@@ -73,7 +73,7 @@ def table(folder):
 
 
 def good(job):
-    """A skill succeeds while |tilt| stays below its cone less the friction; noise comes from the trial's generator."""
+    """A skill succeeds while |tilt| stays below its cone less the friction. Noise comes from the trial's generator."""
     spec = CampaignSpec.from_plain(job.spec)
     drawn = draws(spec, job.trials)
     noise = np.array([rng.standard_normal() for rng in trial_rngs(spec.seed, job.trials)])
@@ -230,7 +230,7 @@ def always_raises(job):
 
 
 def dies_once(job):
-    """Kills its worker the first time the guilty trial runs; the marker lies beside the rows."""
+    """Kills its worker the first time the guilty trial runs. The marker lies beside the rows."""
     marker = Path(job.folder) / "died"
     if _guilty(job) and not marker.exists():
         marker.touch()

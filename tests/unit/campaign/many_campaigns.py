@@ -116,7 +116,7 @@ def make(kind, seed, low=0.05, high=0.95):
 
 
 def rows_of(made, done):
-    """Rows as a campaign stores them; done is a list of (trial, skill)."""
+    """Rows as a campaign stores them. Done is a list of (trial, skill)."""
     labels, success = made.spec.labels, made.success.tolist()
     return [{"trial": t, "skill": labels[k], "success": success[k][t], "failure": "stuck"} for t, k in sorted(done)]
 

@@ -39,7 +39,7 @@ def workers_of_this_process():
 
 
 def command_of(process):
-    """Its command line; none of one that has just been killed, which may be gone or a zombie by now."""
+    """Its command line, or none of one that has just been killed, which may be gone or a zombie by now."""
     try:
         return process.cmdline()
     except psutil.NoSuchProcess:  # a zombie is one of these, too

@@ -23,7 +23,7 @@ def most(campaigns):
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("law", LAWS)
 def test_no_interval_and_no_p_value_of_a_synthetic_campaign_is_wrong_more_often_than_it_says(kind, law):
-    """A slice of a grid taken for the grid misses in nearly all of FEW campaigns; `most` allows 5 of 12."""
+    """A slice of a grid taken for the grid misses in nearly all of FEW campaigns. `most` allows 5 of 12."""
     for way in WAYS:
         found = count(kind, way, range(FEW), **LAWS[law])
         assert found.missed <= most(found.intervals), way
@@ -77,7 +77,7 @@ def test_five_hundred_campaigns_of_each_kind_of_axis_cover_at_least_as_often_as_
 
 @pytest.mark.figures
 def test_the_interval_over_sobol_points_is_not_proved_for_a_checkerboard_misses_more_often():
-    """Why `method` says so. 4 x 4 x 4 fields, every other one works: truth 1/2; 100 trials, no power of two."""
+    """Why `method` says so. 4 x 4 x 4 fields, every other one works: truth 1/2. 100 trials, no power of two."""
     missed = 0
     for seed in range(MANY):
         vary = {f"world.{name}": sobol() for name in "xyz"}

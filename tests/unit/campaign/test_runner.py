@@ -185,7 +185,7 @@ def client(folder, function="slow", *workers):
 
 
 def kill_at_a_random_moment(folder, rng, *workers):
-    """Kill the client some time after its next row; False once there is nothing left to kill."""
+    """Kill the client some time after its next row. Returns False once there is nothing left to kill."""
     path = folder / "rows.jsonl"
     size = path.stat().st_size if path.exists() else 0
     process = client(folder, "slow", *workers)

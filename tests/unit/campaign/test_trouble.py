@@ -1,4 +1,4 @@
-"""Trouble of the environment never becomes a row; what a skill does wrong does."""
+"""Trouble of the environment never becomes a row. What a skill does wrong does."""
 
 import shutil
 

@@ -105,7 +105,7 @@ def test_debug_is_understood_anywhere_on_the_line(monkeypatch):
 
 @pytest.mark.parametrize("words", [["worlds", "list"], ["--help"], ["run", "--help"], ["--version"]])
 def test_a_reader_that_leaves_early_is_no_error(words):
-    """As `head` does; what is printed is less than a buffer holds, so that it is written at the end."""
+    """As `head` does. What is printed is less than a buffer holds, so that it is written at the end."""
     read, write = os.pipe()
     os.close(read)
     code = f"from skillframe.cli.main import main; main({words!r})"

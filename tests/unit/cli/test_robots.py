@@ -15,7 +15,7 @@ HONEST = """<robot name="r"><link name="base"/><link name="arm"><inertial><mass 
 
 @pytest.fixture
 def check(tmp_path, capsys):
-    """Run `robots check --json` on a text; returns exit code, JSON and what stderr says."""
+    """Run `robots check --json` on a text. Returns exit code, JSON and what stderr says."""
 
     def run_check(text):
         path = tmp_path / "r.urdf"

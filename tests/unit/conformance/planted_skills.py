@@ -1,4 +1,4 @@
-"""Skills with one defect each, as an author could write them by mistake; every one holds or glides otherwise."""
+"""Skills with one defect each, as an author could write them by mistake. Every one holds or glides otherwise."""
 
 import contextlib
 import os

@@ -1,4 +1,4 @@
-"""A coordinator obeys the laws of a skill, with a dimension of arms; the checks see it when it does not."""
+"""A coordinator obeys the laws of a skill, with a dimension of arms. The checks see it when it does not."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from skillframe.skill import Command, Impedance, Skill, no_reasons
 
 
 class Stand(Skill):
-    """Holds every arm where it is; `alter` may spoil the command."""
+    """Holds every arm where it is. `alter` may spoil the command."""
 
     def __init__(self, alter):
         self.alter = alter

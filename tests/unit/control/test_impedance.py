@@ -92,7 +92,7 @@ def test_designed_damping_is_symmetric_and_never_below_the_floor(seed):
 
 
 def test_the_energy_of_a_mass_on_the_controlled_spring_only_falls():
-    """Translation of a free body under equation (1), semi-implicit Euler at 1 ms; damped, so the integrator's own
+    """Translation of a free body under equation (1), semi-implicit Euler at 1 ms. Damped, so the integrator's own
     energy error (of order dt^2, 1e-6 relative) is far below what is dissipated."""
     inertia = np.diag([2.6, 2.6, 2.6, 0.05, 0.05, 0.05])[None]
     stiffness = np.diag([0.0, 1000.0, 1000.0, 20.0, 20.0, 20.0])

@@ -105,7 +105,7 @@ def run_ramp(rate, ticks):
 
 
 def test_a_torque_rate_above_the_limit_for_some_ticks_running_stops_the_trial():
-    """A ramp just above the limit lags the limiter more each tick; just below it never touches the limiter."""
+    """A ramp just above the limit lags the limiter more each tick. Just below it never touches the limiter."""
     assert run_ramp(999.0, 100) == []
     assert run_ramp(1500.0, RATE_PERSISTENCE - 1) == []
     assert run_ramp(1500.0, RATE_PERSISTENCE) == [f"torque rate limit: above 1000 Nm/s for {RATE_PERSISTENCE} ticks"]

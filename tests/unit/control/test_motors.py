@@ -111,7 +111,7 @@ def test_a_sound_arm_inserts_and_one_whose_motors_give_a_hundredth_of_a_newton_m
 
 
 def test_an_effort_just_below_what_holding_needs_ends_the_trial_and_one_just_above_does_not():
-    """Holding still takes gravity's torque; its largest share of an effort is measured with the sound arm first."""
+    """Holding still takes gravity's torque. Its largest share of an effort is measured with the sound arm first."""
 
     def held(effort):
         now = replace(setup("panda", "free", "wrist"), robot=panda(effort=effort))

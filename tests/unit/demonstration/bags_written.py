@@ -23,7 +23,7 @@ Topics = Mapping[str, tuple[str, list[tuple[int, Any]]]]
 
 
 def write_bag(path: Path, topics: Topics, frame: str = "base", zero: bool = False) -> Path:
-    """A bag of any kind; gives the file."""
+    """A bag of any kind. Returns the file."""
     ros1 = path.suffix == ".bag"
     store = STORE1 if ros1 else STORE2
     plugin = StoragePlugin.MCAP if path.suffix == ".mcap" else StoragePlugin.SQLITE3

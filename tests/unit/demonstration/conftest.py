@@ -35,7 +35,7 @@ def demo() -> Demonstration:
 
 @pytest.fixture
 def rows(demo: Demonstration) -> list[list[str]]:
-    """The demonstration as CSV cells, header first; a test spoils one and writes them."""
+    """The demonstration as CSV cells, header first. A test spoils one and writes them."""
     values = np.column_stack([demo.time, demo.position, demo.quaternion, demo.wrench])
     return [HEADER.split(","), *([repr(float(v)) for v in row] for row in values)]
 

@@ -1,4 +1,4 @@
-"""Habits of other people's exports: bags as folders, in parts or packed; npz and CSV files that hold more than ours."""
+"""Habits of other people's exports: bags as folders, in parts or packed. Npz and CSV files that hold more than ours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Checksums of MCAP recordings: a flipped bit anywhere is refused or changes nothing; a file without any says so."""
+"""Checksums of MCAP recordings: a flipped bit anywhere is refused or changes nothing. A file without any says so."""
 
 from __future__ import annotations
 

@@ -285,7 +285,7 @@ def test_wrong_reading_options_are_refused(rows: Cells, write: Write, options: d
 
 
 def of_two_arms(rows: Cells, shift: float, drift: float = 0.0) -> Cells:
-    """The recording twice, each arm with its own clock; the second's shifted and running fast."""
+    """The recording twice, each arm with its own clock. The second's is shifted and runs fast."""
     names = [f"{arm}_{name}" for arm in ("left", "right") for name in rows[0]]
     late = [repr(float(row[0]) * (1.0 + drift) + shift) for row in rows[1:]]
     return [names, *([*row, t, *row[1:]] for row, t in zip(rows[1:], late, strict=True))]

@@ -1,4 +1,4 @@
-"""Trace files with damaged arrays or metadata are refused in a sentence; what is recorded of a run is read."""
+"""Trace files with damaged arrays or metadata are refused in a sentence. What is recorded of a run is read."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_metadata_that_cannot_be_used_are_refused(read: Callable[..., Trace], ke
 
 
 def test_a_whole_number_beyond_every_float_is_read_as_infinity(read: Callable[..., Trace]) -> None:
-    """JSON has no whole numbers; infinity is what a run that diverged writes itself."""
+    """JSON has no whole numbers. Infinity is what a run that diverged writes itself."""
     assert read(meta=json.dumps({**META, "final_error_m": 10**400})).meta["final_error_m"] == np.inf
 
 

@@ -81,7 +81,7 @@ def test_a_workspace_just_too_small_stops_the_run_at_its_wall():
 
 @pytest.mark.parametrize(("share", "trips"), [(0.95, False), (1.10, True)])
 def test_a_torque_rate_above_its_limit_stops_the_run_and_one_below_does_not(share, trips):
-    """A feed-forward force that grows steadily; its largest joint torque per newton is measured first."""
+    """A feed-forward force that grows steadily. Its largest joint torque per newton is measured first."""
     limit, push = 500.0, np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
     now = setup("panda", "free", point="wrist")
     home = start_configurations(now.robot, now.scene, {}, 1)[0]

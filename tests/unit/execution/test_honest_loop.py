@@ -215,7 +215,7 @@ def test_the_skill_of_one_arm_that_answers_with_one_row_is_refused_on_a_robot_wi
 
 
 class Coordinator(Hold):
-    """Two arms, each held where it is; hands back what a function makes of the command."""
+    """Two arms, each held where it is. Returns what a function makes of the command."""
 
     def __init__(self, change):
         super().__init__(np.diag([2000.0] * 3 + [100.0] * 3))

@@ -1,4 +1,4 @@
-"""Building: reproducible, cached, valid, honest about its own faces; the standard's own headers agree with ours."""
+"""Building: reproducible, cached, valid, honest about its own faces. The standard's own headers agree with ours."""
 
 import subprocess
 import zipfile

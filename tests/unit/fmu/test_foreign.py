@@ -79,7 +79,7 @@ def test_mischief_ends_its_own_trial_with_a_sentence(built, kind, words):
 
 
 def test_a_crash_has_the_same_words_beside_a_parent_that_holds_much_memory(built):
-    """Linux counts the parent's peak, up to the child's exec, as the child's; 400 MB are above a quarter of 1500 MB."""
+    """Linux counts the parent's peak, up to the child's exec, as the child's. 400 MB are above a quarter of 1500 MB."""
     held = np.ones(50_000_000)
     bank = pair(built, "crash")
     run(bank)
@@ -257,7 +257,7 @@ def test_all_children_of_a_bank_step_at_the_same_time(built):
 
 
 def test_only_what_is_foreign_runs_in_children_and_its_end_leaves_the_others(built):
-    """One actuator of a trial is allowed, its neighbour crashes; both have their columns in one table."""
+    """One actuator of a trial is allowed, its neighbour crashes. Both have their columns in one table."""
     allow(built("trusted"))
     outputs = {"force": "force", "lag": "lag"}
     specs = [ActuatorSpec(fmu=str(built(k)), name=k, outputs=outputs) for k in ("trusted", "crash")]

@@ -1,4 +1,4 @@
-"""Outputs of every type, arrays too, are simulated as fmpy does it; only real scalars can be an actuator's."""
+"""Outputs of every type, arrays too, are simulated as fmpy does it. Only real scalars can be an actuator's."""
 
 import zipfile
 from pathlib import Path

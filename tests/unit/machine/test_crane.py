@@ -114,7 +114,7 @@ def test_reduced_forces_have_the_power_of_the_trees_forces(z, zd, force):
 
 @given(INSIDE, RATES, RATES)
 def test_the_reduced_equations_agree_with_a_constrained_solver(z, zd, force):
-    """Independent: multipliers in the tree's coordinates; out-of-plane rows of the loops are zero, hence lstsq."""
+    """Independent: multipliers in the tree's coordinates. Out-of-plane rows of the loops are zero, hence lstsq."""
     state = crane().at(z, zd)
     model, data = crane().model, crane().model.createData()
     drive = np.zeros(model.nv)

@@ -9,7 +9,7 @@ DT = 1e-3
 
 
 def test_a_machine_that_moves_steadily_is_known_to_be_where_it_is_and_not_where_it_was():
-    """The filter of a ramp lags by 2/w and knows its rate; a sample of 1 ms is 0.08 of its 13 ms."""
+    """The filter of a ramp lags by 2/w and knows its rate. A sample of 1 ms is 0.08 of its 13 ms."""
     quiet = MachineNoise(encoder=0.0, pressure=0.0)
     gauges, rate, still = MachineSensors(quiet, [np.random.default_rng(0)], 3, 3, DT), 0.2, np.zeros((1, 3))
     gauges.start(still, still, still)

@@ -46,7 +46,7 @@ def robot(*parts: str, name: str = "made") -> str:
 
 
 def tree(seed: int, size: int, scale: float = 1.0, kinds: tuple[str, ...] = ("revolute",)) -> str:
-    """A random tree of `size` moving links; lengths grow with scale, masses with its cube."""
+    """A random tree of `size` moving links. Lengths grow with scale, masses with its cube."""
     rng = random.Random(seed)
     parts = [link("base")]
     for i in range(size):

@@ -54,7 +54,7 @@ def printed(path):
 
 @pytest.mark.parametrize("name", ARMS)
 def test_printed_masses_of_an_arm_come_near_to_the_real_ones(bare, name):
-    """Within a factor of 1.7 of the moving mass that its maker gives; 2.5 for the Gen3, which is built of carbon fibre.
+    """Within a factor of 1.7 of the moving mass that its maker gives. 2.5 for the Gen3, which is built of carbon fibre.
 
     One law of length cannot know an arm's payload class; before, each link got the longest link's mass."""
     reaches, real = ARMS[name]
@@ -104,7 +104,7 @@ def test_a_cure_for_a_link_much_shorter_than_the_others_is_not_oversized_itself(
 
 
 def test_the_same_lines_are_printed_once(bare, capsys):
-    """The first problem prints all six; each of the six links without inertia after it refers to them."""
+    """The first problem prints all six. Each of the six links without inertia after it refers to them."""
     assert run(["robots", "check", str(bare(ARMS["UR5e"][0]))]) == 1
     said = capsys.readouterr().out
     assert said.count("guessed = true") == 6

@@ -34,7 +34,7 @@ def test_draws_follow_the_belief_and_are_cut():
 
 
 def test_the_way_has_the_belief_s_spread():
-    """Within 15 % of the belief over 20 searches; less than it, as the middle is passed on the way elsewhere."""
+    """Within 15 % of the belief over 20 searches. Less than it, as the middle is passed on the way elsewhere."""
     settings = BlindSettings()
     ways = [_script(settings, rng, 0.005).place[200:, :2] for rng in rngs(20)]
     np.testing.assert_allclose(np.concatenate(ways).std(axis=0), 0.004, rtol=0.15)

@@ -64,7 +64,7 @@ def with_gain(gain, **changes):
 
 
 def test_the_gain_of_set_ups_that_were_tried_is_what_was_worked_out_for_them():
-    """0.67 and 0.65 without the master's velocity; with it, w D counts too."""
+    """0.67 and 0.65 without the master's velocity. With it, w D counts too."""
     small = replace(STEADY, scale=4.0, stiffness=1e5, force_scale=1000.0, hand_stiffness=600.0)
     large = replace(STEADY, scale=13.0, stiffness=3e4, force_scale=1000.0, hand_stiffness=600.0)
     assert (loop_gain(small), loop_gain(large)) == (pytest.approx(2 / 3), pytest.approx(0.65))

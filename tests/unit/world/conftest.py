@@ -1,4 +1,4 @@
-"""Robots and scenes that the tests of the world share; loaded once."""
+"""Robots and scenes that the tests of the world share. Loaded once."""
 
 from functools import cache
 

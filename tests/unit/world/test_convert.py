@@ -57,7 +57,7 @@ def velocity_map(model, configuration):
 
 
 def states(robot_model, scene):
-    """A plant and a loaded Pinocchio model at the same random states; velocities in both orders."""
+    """A plant and a loaded Pinocchio model at the same random states. Velocities in both orders."""
     rng = np.random.default_rng(1)
     model = robot_model.model
     tool = scene.tool

@@ -97,7 +97,7 @@ def test_a_link_that_comes_to_touch_ends_the_trial_within_a_hundredth_of_a_secon
 
 
 def test_a_trial_among_others_ends_with_the_same_words_as_alone():
-    """Three of four fixtures are turned towards the forearm; in any order and number each trial ends as alone."""
+    """Three of four fixtures are turned towards the forearm. In any order and number each trial ends as alone."""
     skill, now = (
         Hold(STIFF),
         walled("panda", "free", Geom(kind="box", size=(0.1, 0.02, 0.4), position=(-0.1, 0.3, 0.3))),
@@ -119,7 +119,7 @@ def test_a_trial_among_others_ends_with_the_same_words_as_alone():
 
 @pytest.mark.parametrize(("q", "depth"), [(0.2, None), (0.1495, None), (0.14, 10), (0.1, 50), (-0.07, 80)])
 def test_the_depth_of_a_sphere_in_a_box_is_that_of_the_shortest_way_out(slide, q, depth):
-    """r + a - |q|; half a millimetre is within the tolerance."""
+    """r + a - |q|. Half a millimetre is within the tolerance."""
     found = causes(slide(SPHERE, [q], BOX))
     assert found == ([] if depth is None else [(0, f"link 'carriage' is {depth} mm inside the fixture")])
 

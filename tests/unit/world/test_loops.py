@@ -65,7 +65,7 @@ def test_the_plant_is_held_by_the_piston_forces_of_the_loop_embedding_model(cran
 
 
 def test_an_open_loop_swing_agrees_with_the_oracle_and_the_loops_stay_closed(crane):
-    """5 um of gap is the bound of the design; the tip may be off by ten times that after an unstable swing of 0.5 s."""
+    """5 um of gap is the bound of the design. The tip may be off by ten times that after an unstable swing of 0.5 s."""
     model, data, layout, chain = crane
     place(crane, START)
     z, zd = START, np.zeros(3)

@@ -14,7 +14,7 @@ from skillframe.world.shapes import surface_of_revolution
 
 
 def tube(outer=0.03, inner=0.01, height=0.05, segments=24, through=True):
-    """A ring about z as vertices and triangles, closed; or a pot that is `height` deep under a floor as thick again."""
+    """A ring about z as vertices and triangles, closed. Or a pot that is `height` deep under a floor as thick again."""
     angle = 2.0 * np.pi * np.arange(segments) / segments
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     low = -height if through else -2.0 * height
@@ -44,7 +44,7 @@ def with_fixture(scene, vertices, faces, **more):
 
 
 def test_a_mesh_with_a_hole_is_refused_in_one_sentence_with_what_its_hull_fills(scene):
-    """A ring of radii r < R: the hull is the disc, which holds r^2 / (R^2 - r^2) more; 1/8 for 10 and 30 mm."""
+    """A ring of radii r < R: the hull is the disc, which holds r^2 / (R^2 - r^2) more. 1/8 for 10 and 30 mm."""
     with pytest.raises(InputError, match=r"mesh 0 of the fixture: is not convex: its hull holds 12 % more") as caught:
         with_fixture(scene, *tube())
     assert "split it into convex pieces" in str(caught.value)

@@ -14,7 +14,7 @@ ALL, TICK = np.arange(1), 1e-3
 
 
 def push(now, force, ticks):
-    """The free tool, kept from turning, pushed by a force (3,); deflections (ticks, 2) of stack and stop."""
+    """The free tool, kept from turning, pushed by a force (3,). Deflections (ticks, 2) of stack and stop."""
     rows, wrench, upright = [], np.zeros((now.count, now.model.nv)), now.tool_pose().rotation.copy()
     for _ in range(ticks):
         bias = now.kinematics(np.zeros(3)).bias

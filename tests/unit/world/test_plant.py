@@ -132,7 +132,7 @@ def test_a_grasp_moves_the_tool_in_the_grip_and_not_the_wrist(plant):
 
 
 def test_a_varied_mass_changes_the_plant_and_leaves_the_nominal_one_alone(robot, scene):
-    """The truth's gravity load grows with its links; a controller that reads a nominal plant does not learn of it."""
+    """The truth's gravity load grows with its links. A controller that reads a nominal plant does not learn of it."""
     model, task = robot("panda"), scene("free")
     draws = {"robot.mass_scale": np.array([1.0, 1.3])}
     fixture, start = fixture_poses(model, draws, 2), start_configurations(model, task, draws, 2)

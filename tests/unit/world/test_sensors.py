@@ -40,7 +40,7 @@ def test_taring_removes_the_bias_whatever_it_is(plant):
 
 
 def test_noise_has_the_stated_size_and_no_mean(plant):
-    """4000 samples: the standard deviation is known to 1.1 %, the mean to 1.6 % of it; five times that is allowed."""
+    """4000 samples: the standard deviation is known to 1.1 %, the mean to 1.6 % of it. Five times that is allowed."""
     now = plant("free_tool", "free", count=8)
     hold(now)
     settings = SensorSettings(force_bias=0.0, torque_bias=0.0)

@@ -90,7 +90,7 @@ def test_the_peg_s_vertices_lie_on_the_cylinder_the_fillet_or_the_tip_face():
 
 
 def test_a_mesh_s_triangles_enclose_its_volume_outwards():
-    """Gauss: a closed, outward surface encloses sum a . (b x c) / 6; the polygon's area is n/2 r^2 sin(2 pi / n)."""
+    """Gauss: a closed, outward surface encloses sum a . (b x c) / 6. The polygon's area is n/2 r^2 sin(2 pi / n)."""
     peg = filleted_peg(0.0165, 0.08, 0.005, 48, 0.2)
     a, b, c = (peg.vertices[peg.faces[:, i]] for i in range(3))
     volume = np.linalg.det(np.stack([a, b, c], axis=1)).sum() / 6.0
@@ -154,7 +154,7 @@ def test_every_joint_of_the_arm_is_seen(plant):
 
 
 def test_what_does_not_move_of_a_robot_is_drawn_too_in_the_colours_that_its_urdf_names(robot, scene):
-    """hiab_xs031 stands on a grey foot with a white pillar; its boom is orange."""
+    """hiab_xs031 stands on a grey foot with a white pillar. Its boom is orange."""
     model, task = robot("hiab_xs031"), scene("pallets")
     now = Plant(model, task, 1, fixture_poses(model, {}, 1), {})
     drawn = {body["name"]: body["geoms"] for body in drawn_bodies(now)}

@@ -46,7 +46,7 @@ def log_sum(values: Float) -> Float:
 
 
 def fit(samples: Float, components: int) -> tuple[Mixture, float]:
-    """A mixture of scaled samples (n, d) and its log-likelihood; starts from equal stretches of their order."""
+    """A mixture of scaled samples (n, d) and its log-likelihood. It starts from equal stretches of their order."""
     n, d = samples.shape
     shares = np.zeros((n, components))
     shares[np.arange(n), np.arange(n) * components // n] = 1.0

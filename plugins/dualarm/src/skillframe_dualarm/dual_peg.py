@@ -46,7 +46,7 @@ class DualPegParams:
 
 
 def build(params: DualPegParams) -> Scene:
-    """The hole opens along the fixture's z axis; the goal is the tip below `done_depth`."""
+    """The hole opens along the fixture's z axis. The goal is the tip below `done_depth`."""
     require(
         "dual_peg",
         {

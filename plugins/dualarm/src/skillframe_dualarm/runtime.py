@@ -65,7 +65,7 @@ def stiffnesses(phase: Phase, arm: Arm, turn: Float) -> tuple[Float, Float]:
 
 
 class DualArm(Skill):
-    """The coordinator; observations and commands are (N, 2, ...).
+    """The coordinator. Observations and commands are (N, 2, ...).
 
     Args:
         phase: what the arms do.
@@ -107,7 +107,7 @@ class DualArm(Skill):
         return Command(pose, self._twist, self._impedance, extra, self._status.copy(), self._reason.copy())
 
     def _advance(self, dt: float, travel: Float) -> NDArray[np.bool_]:
-        """Move on, no arm's desired pose further ahead of it than the lead; says who pushes."""
+        """Move on, no arm's desired pose further ahead of it than the lead. Says who pushes."""
         lead = self._phase.lead_force_n / self._phase.stiffness
         moving = self._share > 0.0
         limit = ((travel + lead)[:, moving] / self._share[moving]).min(-1)
@@ -125,7 +125,7 @@ class DualArm(Skill):
         return result
 
     def _judge(self, time: Float, approach: Float, pushing: NDArray[np.bool_]) -> None:
-        """End the trials that have stalled or run out of time; the first reason stays."""
+        """End the trials that have stalled or run out of time. The first reason stays."""
         phase = self._phase
         gained = (approach > self._best + phase.stall_m) | ~pushing
         self._best = np.where(gained, approach, self._best)

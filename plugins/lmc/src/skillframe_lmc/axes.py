@@ -78,6 +78,6 @@ def compliant_axes(means: Float, direction: Float | None, sigma: float) -> Compl
 
 
 def _signed(axis: Float) -> Float:
-    """An axis has no sign; let its largest component be positive."""
+    """An axis has no sign. Let its largest component be positive."""
     result: Float = axis * np.copysign(1.0, axis[np.argmax(np.abs(axis))])
     return result

@@ -139,7 +139,7 @@ def _noise(demonstration: Demonstration) -> tuple[float, float]:
 
 
 def _white_noise(values: Float) -> float:
-    """Standard deviation of white noise on a smooth signal (T, n); for noise, second differences have sqrt(6) sigma."""
+    """Standard deviation of white noise on a smooth signal (T, n). For noise, second differences have sqrt(6) sigma."""
     if len(values) < 5:
         return 0.0
     second = values[2:] - 2.0 * values[1:-1] + values[:-2]
@@ -156,7 +156,7 @@ def translation(blocks: Track, settings: Settings) -> Motion:
 
 
 def rotation(blocks: Track, settings: Settings) -> Motion:
-    """The rotational intervals of a demonstration; increments in the axes of learning."""
+    """The rotational intervals of a demonstration, with increments in the axes of learning."""
     R = blocks.rotation
     distance = norm(rotation_vector(R @ R[0].T))
     chord = 2.0 * blocks.quaternion  # |2 q_1 - 2 q_0| is the angle between them, to third order
@@ -170,7 +170,7 @@ def rotation(blocks: Track, settings: Settings) -> Motion:
 
 
 def touching(motion: Motion) -> Motion:
-    """The same motion without its intervals that are free of contact; path and duration stay those of the whole."""
+    """The same motion without its intervals that are free of contact. Path and duration stay those of the whole."""
     keep = norm(motion.load) >= motion.load_min
     return motion._replace(displacement=motion.displacement[keep], load=motion.load[keep], work=motion.work[keep])
 
@@ -191,7 +191,7 @@ def _path(points: Float, step: float) -> float:
 
 
 def _knots(points: Float, step: float) -> NDArray[np.intp]:
-    """Indices where the distance from the last knot reaches the step; plain floats, the fastest loop there is here."""
+    """Indices where the distance from the last knot reaches the step. Plain floats make the fastest loop here."""
     rows, limit = points.tolist(), step * step
     knots, last = [0], rows[0]
     for i, row in enumerate(rows[1:], start=1):

@@ -1,4 +1,4 @@
-"""The one phase of an LMC skill document as checked records; what is wrong is named by its key."""
+"""The one phase of an LMC skill document as checked records. What is wrong is named by its key."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stop:
-    """When the phase ends; ours, the papers give no stop condition.
+    """When the phase ends. This is ours, because the papers give no stop condition.
 
     Attributes:
         stall_s: the phase is done when, while pushing, nothing has moved for this long,

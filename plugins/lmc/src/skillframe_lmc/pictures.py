@@ -50,7 +50,7 @@ def directions(name: str, part: Part, axes: str) -> Figure:
 
 
 def _sectors(part: Part, *, teacher_driven_only: bool) -> list[Sectors]:
-    """The sectors kept in the evidence; those that did not vote are left out."""
+    """The sectors kept in the evidence. Those that did not vote are left out."""
     found = []
     for seen in part.evidence["demonstrations"]:
         v, m = (np.array(seen[key], dtype=float).reshape(-1, 3) for key in ("motion", "push"))

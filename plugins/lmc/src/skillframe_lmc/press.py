@@ -66,7 +66,7 @@ def presses(tracks: Sequence[Track], motions: Sequence[Motion]) -> list[Press] |
 
 
 def press(track: Track, motion: Motion) -> Press | None:
-    """The standing force of one demonstration; None if it was not pressed."""
+    """The standing force of one demonstration, or None if it was not pressed."""
     away = norm(track.position - track.position[0])
     moves = np.append(moving_blocks(np.diff(track.position, axis=0), np.diff(track.time)), 0.0) > 0.0
     strength = norm(track.force)

@@ -14,7 +14,7 @@ from skillframe.errors import InputError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """What the learner goes by; SI units, radians.
+    """What the learner uses, in SI units and radians.
 
     Attributes:
         step_m, step_rad: path between two knots; half of `step_m` where the whole path is under 20 mm.

@@ -17,7 +17,7 @@ SMOOTHING_S = 0.05
 
 
 class StallWatch:
-    """Watches N trials; each row by itself."""
+    """Watches N trials, each row by itself."""
 
     def __init__(self, stop: Stop) -> None:
         self._stop = stop

@@ -36,7 +36,7 @@ class Work(NamedTuple):
 
     @property
     def fraction(self) -> float:
-        """The environment's share; 0 where no work counts."""
+        """The environment's share, or 0 where no work counts."""
         total = self.teacher + self.environment
         return self.environment / total if total > 0.0 else 0.0
 

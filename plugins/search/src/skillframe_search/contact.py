@@ -63,7 +63,7 @@ def samples(demonstration: Demonstration, at: Float, in_start_attitude: bool) ->
 
 
 def _means(values: Float, index: NDArray[np.int64], count: int) -> Float:
-    """Means per bin; a bin without a sample (a gap) takes its neighbours' line."""
+    """Means per bin. A bin without a sample (a gap) takes its neighbours' line."""
     keep = index < count
     number = np.bincount(index[keep], minlength=count)
     total = np.stack([np.bincount(index[keep], column[keep], count) for column in values.T], axis=1)

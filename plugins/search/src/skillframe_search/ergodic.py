@@ -46,7 +46,7 @@ def ergodic(exploration: Exploration, speed: float, duration: float) -> Float:
 
 
 class _Basis:
-    """Cosines on the box [-half, half]; rows are the basis functions.
+    """Cosines on the box [-half, half]. Rows are the basis functions.
 
     Attributes:
         importance: (n,) L_k.

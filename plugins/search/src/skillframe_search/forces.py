@@ -82,7 +82,7 @@ def _log_density(values: Float, means: Float, covariances: Float) -> Float:
 def _expectation_maximisation(
     data: Float, components: int, rng: np.random.Generator
 ) -> tuple[Float, Float, Float, float]:
-    """Weights, means, covariances and log-likelihood of a mixture; starts from samples far from each other."""
+    """Weights, means, covariances and log-likelihood of a mixture. It starts from samples far from each other."""
     n, d = data.shape
     means = _far_apart(data, components, rng)
     weights, covariances = np.full(components, 1.0 / components), np.tile(np.eye(d), (components, 1, 1))

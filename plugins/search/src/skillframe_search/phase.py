@@ -1,4 +1,4 @@
-"""The one phase of a search document as checked records; what is wrong is named by its key."""
+"""The one phase of a search document as checked records. What is wrong is named by its key."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Path:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stiffness:
-    """Across the push [N/m], and of rotation [Nm/rad]; along the push there is none while searching."""
+    """Across the push [N/m], and of rotation [Nm/rad]. Along the push there is none while searching."""
 
     translation: float
     rotation: float
@@ -55,7 +55,7 @@ class Stiffness:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stop:
-    """When the search begins and ends; all ours.
+    """When the search begins and ends. All of it is ours.
 
     Attributes:
         touch_n: the surface is touched when the push is answered by this much,

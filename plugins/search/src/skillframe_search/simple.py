@@ -17,7 +17,7 @@ FINE = 2e-4  # m between the spiral's points
 
 
 def spiral(dimensions: int, pitch: float, length: float, layers: Sequence[float] = (0.0,)) -> Float:
-    """(n, k) places [m]: each layer takes its share of the length; a layer is an offset of the last coordinate."""
+    """(n, k) places [m]: each layer takes its share of the length. A layer is an offset of the last coordinate."""
     share = length / len(layers)
     last = np.sqrt(4.0 * np.pi * share / pitch)  # the length up to angle t is p t^2 / 4 pi, but for the first turn
     angle = np.sqrt(np.linspace(0.0, last**2, max(round(share / FINE), 16)))

@@ -35,7 +35,7 @@ class Motion(NamedTuple):
 
 
 def walked(places: Float, speed: float, duration: float) -> Float:
-    """(T, k) the polygon walked at constant speed, a place every 20 ms; it stays at its end."""
+    """(T, k) the polygon walked at constant speed, a place every 20 ms. It stays at its end."""
     travelled = np.concatenate([[0.0], np.cumsum(norm(np.diff(places, axis=0)))])
     along = np.arange(round(duration / STEP_S) + 1) * STEP_S * speed
     keep = np.concatenate([[True], np.diff(travelled) > 1e-12])
@@ -83,7 +83,7 @@ class _Program(NamedTuple):
 
 @lru_cache(maxsize=16)
 def _program(count: int, k: int, speed: int, acceleration: int) -> _Program:
-    """The program of T = count places in k dimensions; speed [um/s] and acceleration [um/s^2]."""
+    """The program of T = count places in k dimensions, with speed [um/s] and acceleration [um/s^2]."""
     import casadi
     from scipy import sparse
 

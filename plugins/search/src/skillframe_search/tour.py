@@ -50,7 +50,7 @@ def reach(exploration: Exploration, length: float) -> float:
 def _unseen(
     exploration: Exploration, rng: np.random.Generator, seen: Float, seen_m: float, cut: float, count: int
 ) -> Float:
-    """Samples that are not near the way so far; where most of it has been looked at, any."""
+    """Samples that are not near the way so far, or any where most of it has been searched."""
     places = exploration.draw(rng, 4 * count, cut)
     apart = np.sqrt(((places[:, None] - seen[None]) ** 2).sum(axis=2).min(axis=1))
     return np.concatenate([places[apart > seen_m], places[apart <= seen_m]])[:count]

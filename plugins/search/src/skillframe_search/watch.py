@@ -20,7 +20,7 @@ ANSWER_S, SURFACE_S, MEMORY_S = 0.02, 0.5, 1.0
 
 
 class Watch:
-    """Watches N trials; each row by itself.
+    """Watches N trials, each row by itself.
 
     Attributes:
         answer: (N,) what the surface gives back [N].
@@ -50,7 +50,7 @@ class Watch:
         self._lost[rows] = -np.inf
 
     def look(self, observation: Observation) -> NDArray[np.bool_]:
-        """Take in an observation; which trials have fallen in (N,)."""
+        """Take in an observation. Returns which trials have fallen in (N,)."""
         dt = observation.dt
         felt = -_dot(observation.wrench[:, :3], self._direction)
         self.answer = self.answer + (felt - self.answer) * (dt / (ANSWER_S + dt))

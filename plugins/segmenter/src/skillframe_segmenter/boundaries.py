@@ -23,7 +23,7 @@ class Move(NamedTuple):
 
 
 def parse_move(text: str, names: Sequence[str]) -> Move:
-    """A move out of "DEMONSTRATION:BOUNDARY=SECONDS"; the demonstration by number (from 1) or file name.
+    """A move out of "DEMONSTRATION:BOUNDARY=SECONDS". The demonstration is a number (from 1) or a file name.
 
     Raises:
         InputError: not of that form, or not a time. UnknownName: no such demonstration.

@@ -25,7 +25,7 @@ EVERY = 8  # products between two rescalings: a step shrinks by 1e-13 at most in
 
 
 class Smoothed(NamedTuple):
-    """Probabilities over whole demonstrations; B demonstrations, T windows, K phases.
+    """Probabilities over whole demonstrations: B demonstrations, T windows, K phases.
 
     Attributes:
         posterior: (B, T, K) p(phase at t | all windows).
@@ -128,7 +128,7 @@ def _passed(first: Float, steps: Float) -> tuple[Float, Float]:
 
 
 def _handed(first: Float, across: Float) -> tuple[Float, Float]:
-    """Vectors (K, B, n) at the starts of blocks that they cross by (K, K, B, n); logs of what was divided out (B,)."""
+    """Vectors (K, B, n) at the starts of blocks that they cross by (K, K, B, n), and logs of the divisors (B,)."""
     matrices = np.ascontiguousarray(across.transpose(3, 2, 0, 1))
     carry = np.ascontiguousarray(first.T)[:, None]
     starts = np.empty((len(matrices), *carry.shape))

@@ -81,7 +81,7 @@ class Segments(NamedTuple):
 
 
 def segments(signals: Sequence[Float]) -> Segments:
-    """The segments of signals (T, n), one after the other; a signal without windows has none."""
+    """The segments of signals (T, n), one after the other. A signal without windows has none."""
     some = [x for x in signals if len(x)]
     bounds = [np.array([0, *cuts(x), len(x)]) for x in some]
     sizes = np.concatenate([np.diff(b) for b in bounds])
@@ -90,7 +90,7 @@ def segments(signals: Sequence[Float]) -> Segments:
 
 
 def grouped(found: Segments, phases: int) -> Labels | None:
-    """Labels of every window from K groups of segments; None if there are fewer segments than groups."""
+    """Labels of every window from K groups of segments, or None if there are fewer segments than groups."""
     if len(found.sizes) < phases:
         return None
     return np.repeat(_k_means(found.means, found.sizes.astype(float), phases), found.sizes)

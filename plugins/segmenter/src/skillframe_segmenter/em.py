@@ -57,7 +57,7 @@ class Model:
 
 
 class Data(NamedTuple):
-    """All demonstrations, end to end; W windows in all.
+    """All demonstrations, end to end, with W windows in all.
 
     Attributes:
         seen: motions and contacts.
@@ -112,7 +112,7 @@ def gather(
     demonstrations: Sequence[Features], regressors: Sequence[Float], settings: Settings,
     going: Sequence[NDArray[np.bool_]] | None = None,
 ) -> Data:  # fmt: skip
-    """Demonstrations as one body of data; `going` are the windows of each that go round, if that is a phase."""
+    """Demonstrations as one body of data. `going` are the windows of each that go round, if that is a phase."""
     lengths = np.array([len(d.motion) for d in demonstrations])
     seen = emission.observe(
         np.concatenate([d.motion for d in demonstrations]), np.concatenate([d.contact for d in demonstrations])
@@ -124,7 +124,7 @@ def gather(
 
 
 def best(data: Data, segments: Segments, phases: int, settings: Settings) -> Fit:
-    """The better of the two starts for a number of phases, motion only; `segments` of all that does not go round."""
+    """The better of the two starts for a number of phases, motion only. `segments` are of what does not go round."""
     straight = data.straight
     others = phases - (data.going is not None)
     starts = [_by_time([int(x.sum()) for x in data.split(straight)], others)]
@@ -193,7 +193,7 @@ def with_transitions(data: Data, fit: Fit, settings: Settings) -> Fit:
 
 
 def log_densities(data: Data, model: Model, residual: Float | None = None) -> Float:
-    """(W, K) tempered log densities, with what a person has ruled out; residuals as `emission.fitted` gives them."""
+    """(W, K) tempered log densities, with what a person has ruled out. Residuals are those of `emission.fitted`."""
     result = model.temper * emission.log_likelihood(data.seen, model.phases, residual)
     if data.going is not None:
         result += NEVER * (data.going[:, None] != (np.arange(model.count) == model.count - 1))
@@ -210,7 +210,7 @@ def _maximise(data: Data, posterior: Float, weights: Float) -> tuple[Model, Floa
 
 
 def _moving(data: Data, posterior: Float) -> tuple[Phases, Float]:
-    """How the phases move; the covariance of one that goes round is no measure for the others."""
+    """How the phases move. The covariance of one that goes round is no measure for the others."""
     if data.going is None:
         return emission.fitted(data.seen, posterior)
     parts = [emission.fitted(data.seen, mine) for mine in (posterior[:, :-1], posterior[:, -1:])]
@@ -226,7 +226,7 @@ def _expect(data: Data, model: Model, steps: Float, residual: Float) -> Expected
 
 
 def _steps(data: Data, probabilities: Float) -> Float:
-    """(B, T - 1, K, K) transitions into windows, from one row per window; the identity into windows that are not."""
+    """(B, T - 1, K, K) transitions into windows, from one row per window. The identity where there is no window."""
     k = probabilities.shape[-1]
     result = np.empty((k, k, *data.inside.shape))
     result[...] = np.eye(k)[:, :, None, None]

@@ -40,7 +40,7 @@ class Phases(NamedTuple):
 
 
 class Observed(NamedTuple):
-    """W windows ready for (1); views of arrays whose last axis, in memory, is time: K is small, W is not.
+    """W windows ready for (1). Views of arrays whose last axis, in memory, is time: K is small, W is not.
 
     Attributes:
         motion: (W, 6) u.
@@ -75,7 +75,7 @@ def _residuals(seen: Observed, direction: Float) -> Float:
 
 
 def log_likelihood(seen: Observed, phases: Phases, residual: Float | None = None) -> Float:
-    """Log density (W, K) of (1) with eta = 1; residuals (K, 6, W) as `fitted` gives them, if they are at hand."""
+    """Log density (W, K) of (1) with eta = 1. Residuals (K, 6, W) as `fitted` gives them, if they are at hand."""
     lower = np.linalg.cholesky(phases.covariance)
     white = np.linalg.inv(lower) @ (_residuals(seen, phases.direction) if residual is None else residual)
     log_det = np.log(np.einsum("kii->ki", lower)).sum(-1)

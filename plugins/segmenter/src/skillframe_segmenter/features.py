@@ -54,7 +54,7 @@ class Features(NamedTuple):
 
 
 def soft(x: Float, scale: float) -> Float:
-    """X (..., 3) softly normalised; shorter than one."""
+    """X (..., 3) softly normalised, so shorter than one."""
     result: Float = x / np.sqrt((x * x).sum(-1, keepdims=True) + scale * scale)
     return result
 
@@ -71,7 +71,7 @@ def regressors(contact: Float) -> Float:
 
 
 def scales(demonstrations: Sequence[Windows]) -> list[Scales]:
-    """The scales of each demonstration; force and torque are those of all."""
+    """The scales of each demonstration. Force and torque are those of all."""
     wrench = [w.wrench for w in demonstrations]
     force = max(0.2 * _percentile(wrench, slice(0, 3), 90), 1.5 * _noise(wrench, slice(0, 3)), 1e-9)
     torque = max(0.2 * _percentile(wrench, slice(3, 6), 90), 1.5 * _noise(wrench, slice(3, 6)), force * ARM_M)

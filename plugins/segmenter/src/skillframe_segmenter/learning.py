@@ -98,7 +98,7 @@ def _held(
     found: Document, demonstrations: Sequence[Demonstration], rows: Sequence[Document], moves: Sequence[Move],
     own: Mapping[str, Any], cutting: Mapping[str, Any],
 ) -> Document:  # fmt: skip
-    """The segmentation with rows in which a person has moved boundaries; a model of micro-phases is fitted again."""
+    """The segmentation with rows in which a person has moved boundaries. A model of micro-phases is fitted again."""
     if "phase_of" not in found["phase_model"]:
         return {**found, "demonstrations": list(rows)}
     again = refitted(found, demonstrations, rows, {m.demonstration for m in moves}, own["phases"], cutting)
@@ -111,7 +111,7 @@ def _count(found: Document) -> int:
 
 
 def pieces(found: Document, demonstrations: Sequence[Demonstration], phases: Sequence[int]) -> list[Demonstration]:
-    """The parts of all demonstrations that belong to some phases; very short ones only if there are no others.
+    """The parts of all demonstrations that belong to some phases. Very short ones count only if there are no others.
 
     Neighbouring intervals of these phases stay one part.
     """
@@ -172,7 +172,7 @@ def _one_direction(
     learn_phase: Callable[[Sequence[Demonstration], LearnOptions], Document], parts: Sequence[Demonstration],
     options: LearnOptions,
 ) -> bool:  # fmt: skip
-    """Whether one direction explains all of them; none does if the learner refuses them together (a press, say)."""
+    """Whether one direction explains all of them. None does if the learner refuses them together (a press, say)."""
     try:
         body = learn_phase(parts, options)
     except InputError:
@@ -186,7 +186,7 @@ def neighbours(rows: Sequence[Mapping[str, Any]]) -> list[tuple[int, int]]:
 
 
 def _in_contact(found: Document, demonstrations: Sequence[Demonstration], phase: int) -> bool:
-    """Whether a phase feels a force beyond the model's scale at most times; false where there is no such model."""
+    """Whether a phase feels a force beyond the model's scale at most times. False where there is no such model."""
     scale: float = found["phase_model"].get("scales", {}).get("force", inf)
     force = np.concatenate([norm(piece.wrench[:, :3]) for piece in pieces(found, demonstrations, [phase])])
     return float(np.median(force)) > scale

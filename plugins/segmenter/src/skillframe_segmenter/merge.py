@@ -51,7 +51,7 @@ def sphere(count: int) -> Float:
 
 
 def _accepted(motion: Float, free: Float, angle: float, held: bool) -> Float:
-    """(D + 1,) share of windows that accept each direction, "none" last; motion (W, 3), free (W, 3, 3)."""
+    """(D + 1,) share of windows that accept each direction, "none" last. Motion is (W, 3), free (W, 3, 3)."""
     count = len(motion)
     allowed = (free.reshape(3 * count, 3).astype(np.float32) @ sphere(DIRECTIONS).T.astype(np.float32)).reshape(
         count, 3, DIRECTIONS
@@ -86,7 +86,7 @@ def _shares(
 
 
 def _leaning(shares: Float, sizes: Float) -> Float:
-    """Shares (cells, 2, D + 1) of a phase, each drawn to their mean by `WANDERING` windows; sizes (cells,)."""
+    """Shares (cells, 2, D + 1) of a phase, each drawn to their mean by `WANDERING` windows. Sizes (cells,)."""
     if len(sizes) < 2:
         return shares
     weight = sizes[:, None, None]
@@ -113,7 +113,7 @@ def _votes(group: Sequence[int], shares: Sequence[Float]) -> float:
 def groups_of_one_motion(
     seen: Observed, travelled: Float, labels: Sequence[NDArray[np.intp]], phases: int, angle: float, least: float
 ) -> list[int]:
-    """The group of each phase; phases of one group are one motion.
+    """The group of each phase. Phases of one group are one motion.
 
     Args:
         seen: all windows.

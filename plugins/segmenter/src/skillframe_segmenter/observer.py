@@ -37,7 +37,7 @@ class Debounce:
         self.seen = np.zeros(count, dtype=np.intp)
 
     def decide(self, posterior: Float) -> NDArray[np.intp]:
-        """The phase that has been probable for long enough (N,), or `NOBODY`; posterior (N, P)."""
+        """The phase that has been probable for long enough (N,), or `NOBODY`. The posterior is (N, P)."""
         best = posterior.argmax(axis=1)
         sure = posterior[np.arange(len(best)), best] > self._bar
         self.seen = np.where(sure & (best == self._candidate), self.seen + 1, sure.astype(np.intp))
@@ -89,7 +89,7 @@ class Gate:
         assert k == len(self._members)
 
     def look(self, observation: Observation) -> Asked | None:
-        """Take in one tick; says something at the end of each window."""
+        """Take in one tick. It answers at the end of each window."""
         self._sum += observation.wrench
         self._ticks += 1
         if self._ticks < self._per_window:
@@ -105,7 +105,7 @@ class Gate:
         return Asked(phase, self.posterior, self._debounce.seen, self._still(observation))
 
     def believe(self, row: int, phase: int) -> None:
-        """A trial has entered a phase for another reason than the gate's; let the belief follow."""
+        """A trial has entered a phase for another reason than the gate's. Let the belief follow."""
         mine = np.where(self._model.phase_of == phase, self._model.gate.share, 1e-6)
         self._belief[row] = mine / mine.sum()
 

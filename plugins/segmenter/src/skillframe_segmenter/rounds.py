@@ -37,7 +37,7 @@ Mask = NDArray[np.bool_]
 
 
 def rounds(cut: Sequence[Windows], seen: Sequence[Features]) -> list[Mask] | None:
-    """Which windows of each demonstration go round; None if that is no phase of theirs."""
+    """Which windows of each demonstration go round, or None if that is no phase of theirs."""
     found = [going_round(w, f) for w, f in zip(cut, seen, strict=True)]
     return found if 2 * sum(bool(each.any()) for each in found) > len(found) else None
 

@@ -211,7 +211,7 @@ def _shortest(path: Labels) -> int:
 
 
 def _numbered(found: Segmented) -> Segmented:
-    """Phases by first appearance; micro-phases whose phase holds no window join the phase of their nearest motion."""
+    """Phases by first appearance. Micro-phases whose phase holds no window join the phase of their nearest motion."""
     number = runs.in_order(found.labels)
     direction = found.fit.model.phases.direction
     kept = np.array([k for k, g in enumerate(found.phase_of) if int(g) in number])
@@ -259,7 +259,7 @@ def _said_to_go(
 
 
 def _labels_of(row: Document, cut: Windows) -> Labels:
-    """Phase of every window from boundaries in time; a window belongs to where its middle is."""
+    """Phase of every window from boundaries in time. A window belongs to where its middle is."""
     middle = np.array(cut.edges(range(cut.size))) + 0.5 * (cut.edges([1])[0] - cut.start)
     return np.array(row["labels"], dtype=np.intp)[np.searchsorted(row["boundaries"], middle)]
 
@@ -291,7 +291,7 @@ def online_model(prepared: Prepared, found: Segmented, settings: Settings) -> Ph
 
 
 def successors(labels: Sequence[Labels], phases: int) -> Float:
-    """(P, P + 1) how often each phase was followed by each; the last column counts ends."""
+    """(P, P + 1) how often each phase was followed by each. The last column counts ends."""
     counts = np.zeros((phases, phases + 1))
     for each in labels:
         order = [int(x) for x in each[runs.starts_of_runs(each)]]

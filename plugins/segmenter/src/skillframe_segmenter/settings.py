@@ -68,7 +68,7 @@ class Settings(Cutting):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PolicySettings(Cutting):
-    """What `learn --skill policy --set` can change; the other keys go to the learner of the phases.
+    """What `learn --skill policy --set` can change. The other keys go to the learner of the phases.
 
     Attributes:
         segmenter: what cuts demonstrations into phases: wrench_hmm, pose_hmm or zvc. The settings of `zvc` are `still`

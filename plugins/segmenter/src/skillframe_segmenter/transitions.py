@@ -30,7 +30,7 @@ def prior_weights(phases: int, regressors: int, stay_s: float) -> Float:
 
 
 def probabilities(weights: Float, regressors: Float) -> Float:
-    """(..., K, K) transition probabilities for regressors phi (..., R); time is the last axis in memory."""
+    """(..., K, K) transition probabilities for regressors phi (..., R). Time is the last axis in memory."""
     k, size = weights.shape[:2], weights.shape[-1]
     logits = weights.reshape(-1, size) @ regressors.reshape(-1, size).T
     p = np.moveaxis(softmax(logits.reshape(*k, -1), axis=1), -1, 0)
@@ -68,7 +68,7 @@ def improve(weights: Float, prior: Float, regressors: Float, joint: Float, steps
 def _newton(
     row: Float, prior: Float, others: NDArray[np.intp], phi: Float, squares: Float, target: Float, ridge: Float
 ) -> Float:  # fmt: skip
-    """A step (n, R) for the weights (K, R) of the others; phi (R, W), its squares (R (R + 1) / 2, W), target (K, W)."""
+    """A step (n, R) for weights (K, R) of the others. phi (R, W), its squares (R (R + 1) / 2, W), target (K, W)."""
     mass = target.sum(axis=0)
     p = softmax(row @ phi, axis=0)[others]
     pull = mass * p

@@ -52,7 +52,7 @@ class ZvcSettings:
 
 
 def fit(demonstrations: Sequence[Demonstration], phases: int | None, settings: Mapping[str, Any]) -> Document:
-    """`phase_model` and `demonstrations` of a policy file; see `SegmenterType.fit`."""
+    """`phase_model` and `demonstrations` of a policy file (see `SegmenterType.fit`)."""
     chosen = build(ZvcSettings, settings, "--set")
     cut, point = cut_all(demonstrations, chosen.at, chosen.axes)
     labels = [_labels(w, chosen, phases) for w in cut]

@@ -93,7 +93,7 @@ def insert(
 
 
 def rows_of(result: ArmsResult, robot: RobotModel, tilt_deg: np.ndarray, friction: np.ndarray) -> list[Row]:
-    """The result as rows; tilts about the fixture's y axis."""
+    """The result as rows. Tilts are about the fixture's y axis."""
     axis = rotate(nominal_fixture(robot).rotation, np.array([0.0, 1.0, 0.0]))
     outcome = classify(result, np.radians(tilt_deg), axis)
     path, turned = result.joint_path_rad.sum(-1), np.degrees(result.turned_rad @ axis)
@@ -109,7 +109,7 @@ def rows_of(result: ArmsResult, robot: RobotModel, tilt_deg: np.ndarray, frictio
 
 
 def largest(rows: Sequence[Row], sign: int, friction: float) -> float:
-    """Largest tilt [deg] of a sign up to which every insertion succeeds; 0 if the smallest one fails."""
+    """Largest tilt [deg] of a sign up to which every insertion succeeds, or 0 if the smallest one fails."""
     reached = 0.0
     for row in sorted(rows, key=lambda r: abs(r.tilt_deg)):
         if row.joint_friction == friction and row.tilt_deg * sign > 0.0:
