@@ -18,7 +18,14 @@ from skillframe.robot.guesses import guess_note
 from skillframe.robot.model import RobotModel
 from skillframe.skill import Status
 from skillframe.teaching.blind import LEVER, BlindSettings, BlindTeacher
-from skillframe.teaching.sessions import MOST_ATTEMPTS, Recording, Watch, beginning, demonstration_from, told_of
+from skillframe.teaching.sessions import (
+    MOST_ATTEMPTS,
+    Recording,
+    Watch,
+    beginning,
+    demonstration_from,
+    progress_callback,
+)
 from skillframe.world.scene import Scene
 from skillframe.world.sensors import SensorSettings
 
@@ -105,7 +112,7 @@ def _attempt(
     rngs = [np.random.default_rng([seed, slot, attempt]) for slot in slots]
     teacher = BlindTeacher(np.array(scene.task.direction), settings)
     longest = settings.time_s + 1.0
-    told = told_of(watch, longest)
+    told = progress_callback(watch, longest)
     return simulate(teacher, setup, columns, rngs, duration_s=longest, trace_hz=rate_hz, progress=told), handle
 
 

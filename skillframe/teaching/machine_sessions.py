@@ -25,7 +25,7 @@ from skillframe.machine.law.hydraulic import plane_axes
 from skillframe.robot.chain import ClosedChain
 from skillframe.robot.model import RobotModel
 from skillframe.skill import Status
-from skillframe.teaching.sessions import Recording, Watch, collect, demonstration_from, start_columns, told_of
+from skillframe.teaching.sessions import Recording, Watch, collect, demonstration_from, progress_callback, start_columns
 from skillframe.teaching.teleoperation import Operator, OperatorSettings, require_stable_loop
 from skillframe.world.placement import fixture_poses
 from skillframe.world.scene import Scene
@@ -97,7 +97,7 @@ def operate(
     _require_direction(scene)
     operator = Operator(scene.task, fixture_poses(robot, draws, len(rngs)), settings)
     setup = Setup(robot=robot, scene=scene, stop_when=scene.task.done or scene.goal)
-    told = told_of(watch, duration_s)
+    told = progress_callback(watch, duration_s)
     result = simulate(operator, setup, draws, rngs, duration_s=duration_s, trace_hz=rate_hz, progress=told)
     done = result.status == Status.SUCCESS
     return replace(result, success=done, failure=np.where(done, "", result.failure))

@@ -188,12 +188,12 @@ def _attempt(
         sensors=sensors or SensorSettings(), filter_wrench=False, stop_when=last.done or scene.goal,
     )  # fmt: skip
     rngs = [np.random.default_rng([seed, slot, attempt]) for slot in slots]
-    told = told_of(watch, duration_s)
+    told = progress_callback(watch, duration_s)
     return simulate(teacher, setup, columns, rngs, duration_s=duration_s, trace_hz=rate_hz, progress=told)
 
 
-def told_of(watch: Watch | None, duration_s: float) -> Callable[[float], None] | None:
-    """What a simulation of so many seconds at most tells; None where nobody watches."""
+def progress_callback(watch: Watch | None, duration_s: float) -> Callable[[float], None] | None:
+    """Progress of a simulation for `watch`: simulated time and longest duration [s]. None without a watch."""
     return None if watch is None else lambda now: watch(now, duration_s)
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from math import degrees
+from math import acos, degrees, pi
+from typing import Any
 
 import numpy as np
 
@@ -72,7 +73,11 @@ def _direction(part: Part) -> str:
     angle, area = part.evidence.get("pyramid_angle_rad"), part.evidence.get("feasible_solid_angle_sr")
     if angle is None or area is None:
         return text
-    return f"{text} (hand taken to waver by {degrees(angle):.0f} degrees; {area:.2f} sr of directions explain all)"
+    known = degrees(acos(max(1.0 - area / (2.0 * pi), -1.0)))  # half the opening of a cone of that solid angle
+    return (
+        f"{text} (consistent if the hand was off by up to {degrees(angle):.0f} degrees; "
+        f"the direction is known to about {known:.0f} degrees)"
+    )
 
 
 def _free(part: Part) -> list[str]:

@@ -27,7 +27,7 @@ MOST_DRAWN = 30
 ONE_WAY, CONTRADICTS = radians(10.0), radians(20.0)  # mean ways this near each other; a push this far from them all
 
 
-def of(part: Learned, settings: Settings) -> dict[str, Any]:
+def as_document(part: Learned, settings: Settings) -> dict[str, Any]:
     """The evidence of one part as plain JSON values."""
     choice, done = part.choice, part.work
     open_direction = is_ambiguous(part)
@@ -117,7 +117,7 @@ def _no_direction_message(part: Learned, choice: Choice, settings: Settings) -> 
     digits = 1 if round(angle) == round(allowed) else 0  # 25.3 and not 25 degrees, where 25 are allowed
     taken = f"{angle:.{digits}f} degrees" if angle < 90.0 else "more than 90 degrees"
     text = (
-        f"no one {_push(part)} explains what was seen: the hand would have had to waver by {taken}, and {allowed:.0f} "
+        f"no one {_push(part)} explains what was seen: the hand would have been off by {taken}, and {allowed:.0f} "
         "are allowed"
     )
     if not any(given.contact.any() for given in part.given):

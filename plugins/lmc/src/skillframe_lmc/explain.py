@@ -58,7 +58,7 @@ def _directions(name: str, part: Part, axes: str) -> Illustration:
     what, load = ("push", "force") if name == "translation" else ("turning push", "torque")
     if part.desired_direction is None:
         end = (
-            f"The hand would have had to waver by {opening} before one direction explained everything, so no desired "
+            f"The hand would have been off by {opening} before one direction explained everything, so no desired "
             "direction exists."
         )
     else:

@@ -169,7 +169,7 @@ def _standing(
         force = np.median([p.force for p in found])
         raise InputError(
             "learn", f"the tool was pressed with {force:.0f} N where it stood, along the way it had come, and no one "
-            f"push explains it (the hand would have had to waver by {np.degrees(choice.pyramid_angle):.0f} degrees)",
+            f"push explains it (the hand would have been off by {np.degrees(choice.pyramid_angle):.0f} degrees)",
             "cut the recordings into phases (skillframe segment), or demonstrate the press the same way each time",
         )  # fmt: skip
     return _Standing(found, done, choice)
@@ -258,5 +258,5 @@ def _part(part: Learned, speed: float, k: float, inertia: float, floor: float, s
         "fully_compliant": part.fully_compliant,
         "stiffness": stiffness.tolist(),
         "damping": damping.tolist(),
-        "evidence": evidence.of(part, settings),
+        "evidence": evidence.as_document(part, settings),
     }
