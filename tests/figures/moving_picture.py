@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 from contourpy import contour_generator
 
-from skillframe.report.markup import escape
-from skillframe.report.raster import blank, paint
-from skillframe.report.shapes import merge
-from skillframe.report.stage import stage_of
-from skillframe.run.trace import Trace
+from skillframe.execution.trace import Trace
+from skillframe.reports.markup import escape
+from skillframe.reports.raster import blank, paint
+from skillframe.reports.shapes import merge
+from skillframe.reports.stage import stage_of
 
 FRAMES, HOLD = 36, 14
 """Frames of the motion, and how many frames long its end stays."""
