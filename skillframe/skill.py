@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from skillframe.frames import Float, Pose
 
 Reasons = NDArray[np.object_]
-Scalar = TypeVar("Scalar", bound=np.generic)
+_Scalar = TypeVar("_Scalar", bound=np.generic)
 
 
 class Status(IntEnum):
@@ -179,7 +179,7 @@ def rows_of(observation: Observation, rows: slice | NDArray[np.intp]) -> Observa
 def stack_commands(commands: Sequence[Command]) -> Command:
     """One command out of commands of single trials."""
 
-    def each(pick: Callable[[Command], NDArray[Scalar]]) -> NDArray[Scalar]:
+    def each(pick: Callable[[Command], NDArray[_Scalar]]) -> NDArray[_Scalar]:
         return np.concatenate([pick(c) for c in commands])
 
     def matrices(pick: Callable[[Command], Float | None]) -> Float | None:

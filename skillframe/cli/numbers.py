@@ -36,10 +36,16 @@ class _Whole(click.IntRange):
 
 
 NUMBER = _Finite()
+"""Any finite number."""
 POSITIVE = _Finite(min=0.0, min_open=True)
+"""A finite number above zero."""
 NOT_NEGATIVE = _Finite(min=0.0)
+"""A finite number of zero or more."""
 WHOLE = _Whole()
+"""A whole number."""
 NATURAL = _Whole(min=0)
+"""A whole number of zero or more."""
 COUNT = _Whole(min=1, max=1_000_000)
 """How many of something: more than a million of anything here is a typing mistake (our choice)."""
 SEED = NATURAL
+"""A seed of everything random."""

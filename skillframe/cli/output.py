@@ -22,11 +22,11 @@ def emit_json(value: Any) -> None:
     click.echo(json.dumps(value, indent=2, sort_keys=True, allow_nan=False, ensure_ascii=False))
 
 
-F = TypeVar("F", bound=Callable[..., Any])
+_F = TypeVar("_F", bound=Callable[..., Any])
 QUIET = "skillframe.quiet"
 
 
-def quiet_option(function: F) -> F:
+def quiet_option(function: _F) -> _F:
     """`-q`: no progress and no notes; see `is_quiet`."""
     option = click.option(
         "-q", "--quiet", is_flag=True, expose_value=False, callback=_silence,
