@@ -78,19 +78,31 @@ def pictures(
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "scene.npz"
         _write_scene(file, stage, samples, cameras, height)
-        child = subprocess.Popen(
-            [sys.executable, "-m", WORKER, str(file)], env=_environment(name), stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
+        words = Path(folder) / "words.txt"
+        with words.open("wb") as said:
+            child = subprocess.Popen(
+                [sys.executable, "-m", WORKER, str(file)], env=_environment(name), stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE, stderr=said,
+            )  # fmt: skip
         try:
             for _ in samples:
-                yield [_picture(child, width, height) for _, width in cameras]
+                pair = [_picture(child, width, height) for _, width in cameras]
+                if any(picture is None for picture in pair):
+                    raise NoPicture(f"OpenGL stopped drawing{_why(words)}")
+                yield [picture for picture in pair if picture is not None]
         finally:
             child.kill()
             child.communicate()
 
 
-def _picture(child: subprocess.Popen[bytes], width: int, height: int) -> Image:
+def _why(words: Path) -> str:
+    """What the child said of its error, in brackets; "" if nothing."""
+    lines = words.read_text("utf-8", "replace").splitlines()
+    error = next((line.strip() for line in reversed(lines) if "Error: " in line), "")
+    return f" ({error})" if error else ""
+
+
+def _picture(child: subprocess.Popen[bytes], width: int, height: int) -> Image | None:
     assert child.stdout is not None
     deadline = threading.Timer(PATIENCE_S, child.kill)
     deadline.start()
@@ -99,7 +111,7 @@ def _picture(child: subprocess.Popen[bytes], width: int, height: int) -> Image:
     finally:
         deadline.cancel()
     if len(content) < width * height * 3:
-        raise NoPicture("OpenGL stopped drawing")
+        return None
     return np.frombuffer(content, dtype=np.uint8).reshape(height, width, 3)
 
 

@@ -39,7 +39,9 @@ def scene_model(meshes: list[dict[str, Any]], size: tuple[int, int], field_of_vi
     sun = spec.worldbody.add_light(pos=[0.5, -1.0, 2.5], dir=[-0.2, 0.4, -1.0], diffuse=[0.35] * 3, castshadow=False)
     sun.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
     for i, mesh in enumerate(meshes):
-        body = spec.worldbody.add_body(name=f"{i}", mocap=True)
+        body = spec.worldbody.add_body(  # its inertia is never used, and a flat piece of a cut has none
+            name=f"{i}", mocap=True, explicitinertial=True, mass=1.0, inertia=[1.0, 1.0, 1.0]
+        )  # fmt: skip
         asset = spec.add_mesh(name=f"{i}", inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
         asset.uservert, asset.userface = mesh["vertices"].ravel(), mesh["faces"].ravel()
         asset.usernormal = mesh["normals"].ravel()

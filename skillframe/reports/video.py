@@ -30,7 +30,7 @@ SUFFIXES = (".mp4", ".m4v", ".mov")
 INK, FAINT, FORCE = (38, 46, 56), (176, 184, 194), (204, 60, 46)
 LEFT = 16  # of the force curve [pixels]
 OWN = "skillframe's own renderer, because OpenGL draws nothing here (skillframe doctor)"
-STOPPED = "skillframe's own renderer, because OpenGL stopped drawing"
+STOPPED = "skillframe's own renderer, because "
 
 
 class Film(NamedTuple):
@@ -85,8 +85,8 @@ def write_film(trace: Trace, path: Path, tell: Callable[[int, int], None] = lamb
             with writing_whole(path) as temporary:
                 _encode(_composed(trace, samples, _by_opengl(stage, samples, backend), tell), temporary)
             return Film(len(samples), f"MuJoCo's renderer (OpenGL by {backend})")
-        except opengl.NoPicture:
-            renderer = STOPPED
+        except opengl.NoPicture as stopped:
+            renderer = f"{STOPPED}{stopped}"
     with writing_whole(path) as temporary:
         _encode(_composed(trace, samples, _by_hand(stage, samples), tell), temporary)
     return Film(len(samples), renderer)

@@ -11,6 +11,7 @@ from report_fakes import trace
 
 from skillframe.reports import opengl, video
 from skillframe.reports.opengl import NoPicture, backend, pictures
+from skillframe.reports.opengl_worker import scene_model
 from skillframe.reports.shapes import Mesh
 from skillframe.reports.stage import stage_of
 
@@ -57,6 +58,25 @@ def test_a_child_that_ends_is_no_picture(child, code):
     with pytest.raises(NoPicture, match="stopped drawing"):
         list(pictures(stage(), [0, 1], video._views(stage()), 480, "egl"))
     assert started[0].poll() is not None
+
+
+def test_what_the_child_says_of_its_error_is_told(child):
+    child("raise ValueError('Error: no such card')")
+    with pytest.raises(NoPicture, match=r"stopped drawing \(ValueError: Error: no such card\)$"):
+        list(pictures(stage(), [0], video._views(stage()), 480, "egl"))
+
+
+def test_the_flat_pieces_of_a_cut_are_a_scene():
+    """A + B = C holds for the inertia of what is flat, and rounding decides whether MuJoCo takes it for impossible."""
+    rng = np.random.default_rng(3)
+    angles = np.sort(rng.uniform(0.0, 2.0 * np.pi, (20, 12)), axis=1)
+    rims = np.stack([0.04 * np.cos(angles), np.full_like(angles, 2.3e-5), 0.03 * np.sin(angles)], axis=-1)
+    faces = np.array([[0, i, i + 1] for i in range(1, 11)])
+    pieces = [
+        {"vertices": rim, "normals": np.tile([0.0, -1.0, 0.0], (12, 1)), "faces": faces, "rgba": np.ones(4)}
+        for rim in rims
+    ]
+    assert scene_model(pieces, (40, 30), 0.5).ngeom == 20
 
 
 def test_a_child_that_hangs_is_ended(child):

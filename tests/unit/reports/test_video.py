@@ -68,6 +68,6 @@ def test_where_opengl_stops_half_way_the_whole_film_is_drawn_again_and_that_is_s
     assert write_film(run, tmp_path / "own.mp4").renderer == OWN
     monkeypatch.setattr(opengl, "backend", lambda: "egl")
     monkeypatch.setattr(opengl, "pictures", dies)
-    assert write_film(run, tmp_path / "run.mp4") == (3, STOPPED)
+    assert write_film(run, tmp_path / "run.mp4") == (3, f"{STOPPED}OpenGL stopped drawing")
     assert np.array_equal(frames(tmp_path / "run.mp4"), frames(tmp_path / "own.mp4"))
     assert sorted(p.name for p in tmp_path.iterdir()) == ["own.mp4", "run.mp4"]
