@@ -198,3 +198,10 @@ def test_demonstrations_of_one_phase_and_skills_that_play_a_motion_back_hear_not
     assert run(["learn", *demos, "--out", str(tmp_path / "s.json")]) == 0
     assert run(["learn", two_phases(tmp_path / "a.npz"), "--skill", "replay", "--out", str(tmp_path / "r.json")]) == 0
     assert "phases" not in capsys.readouterr().err
+
+
+def test_half_of_a_set_that_looks_like_several_phases_says_nothing(
+    demos: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["learn", demos[0], two_phases(tmp_path / "a.npz"), "--out", str(tmp_path / "s.json")]) == 0
+    assert "phases" not in capsys.readouterr().err
