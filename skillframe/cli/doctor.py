@@ -154,8 +154,10 @@ def _renderer() -> Check:
     """What draws videos: found out by drawing."""
     from skillframe.reports.opengl import backend
 
-    found = backend()
-    fix = "" if found else "sudo apt install libosmesa6 (videos are drawn by skillframe's own renderer until then)"
+    there = find_spec("mujoco") is not None
+    found = backend() if there else None
+    how = "sudo apt install libosmesa6" if there else f"{sys.executable} -m pip install 'skillframe[sim]'"
+    fix = "" if found else f"{how} (videos are drawn by skillframe's own renderer until then)"
     return Check(name="OpenGL", found=found or "", needed_for="run --video with MuJoCo's renderer", fix=fix)
 
 

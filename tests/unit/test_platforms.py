@@ -47,6 +47,8 @@ assert count > 250, count
 WORK = """
 from pathlib import Path
 from skillframe.cli.main import run
+from skillframe.report import opengl
+opengl.backend = lambda: None  # it starts a process, for which Python itself needs on Linux what is hidden here
 assert run(["doctor", "--json"]) == 0
 where = ["--world", "valley", "--robot", "free_tool"]
 assert run(["demonstration", "record", *where, "--count", "2", "--seed", "1", "--out", "demo.npz"]) == 0

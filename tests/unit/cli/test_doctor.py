@@ -127,3 +127,6 @@ def test_the_renderer_of_videos_is_told_or_how_to_get_one(capsys, monkeypatch, f
     monkeypatch.setattr("skillframe.reports.opengl.backend", lambda: found)
     row = findings(capsys)["OpenGL"]
     assert row["found"] == (found or "") and ("libosmesa6" in row["fix"]) == (found is None) and not row["required"]
+    monkeypatch.setattr(doctor, "find_spec", lambda name: None)
+    row = findings(capsys)["OpenGL"]
+    assert row["found"] == "" and "pip install 'skillframe[sim]'" in row["fix"]
