@@ -79,12 +79,12 @@ def where(condition: Any, one: Any, other: Any) -> Any:
 
 
 def maximum(x: Any, y: Any) -> Any:
-    """The larger; x where x is not a number."""
+    """The larger, or x where x is not a number."""
     return ca.if_else(x < y, y, x) if isinstance(x, ca.SX) or isinstance(y, ca.SX) else np.maximum(x, y)
 
 
 def minimum(x: Any, y: Any) -> Any:
-    """The smaller; x where x is not a number."""
+    """The smaller, or x where x is not a number."""
     return ca.if_else(y < x, y, x) if isinstance(x, ca.SX) or isinstance(y, ca.SX) else np.minimum(x, y)
 
 
@@ -94,7 +94,7 @@ def clip(x: Any, low: Any, high: Any) -> Any:
 
 
 def stack(parts: Sequence[Any]) -> Any:
-    """One row for each part; a part that is one number serves all columns."""
+    """One row for each part. A part that is one number serves all columns."""
     if any(isinstance(part, ca.SX) for part in parts):
         return ca.vertcat(*parts)
     result = np.empty((len(parts), *np.broadcast(*parts).shape))

@@ -59,7 +59,7 @@ class InputError(SkillframeError):
 
 
 class UnknownName(SkillframeError):
-    """A name that nothing is registered under; lists what there is and suggests the nearest.
+    """Nothing is registered under a name. The text lists what there is and suggests the nearest.
 
     Attributes:
         kind: what was looked for ("world", "skill", "key" ...).
@@ -80,7 +80,7 @@ class UnknownName(SkillframeError):
 
 
 class MissingDependency(SkillframeError):
-    """An optional library is needed for this; says the command that installs it."""
+    """An optional library is needed for this. The text has the command that installs it."""
 
     def __init__(self, library: str, purpose: str, command: str) -> None:
         self.library, self.purpose, self.command = library, purpose, command

@@ -51,7 +51,7 @@ def rotate(rotation: Float, vector: Float) -> Float:
 
 
 def cross(a: Float, b: Float) -> Float:
-    """Cross product of (..., 3) arrays; ten times faster than `np.cross` on small ones."""
+    """Cross product of (..., 3) arrays. Ten times faster than `np.cross` on small ones."""
     result: Float = a.take(_NEXT, -1) * b.take(_AFTER, -1) - a.take(_AFTER, -1) * b.take(_NEXT, -1)
     return result
 
@@ -72,7 +72,7 @@ def norm(v: Float) -> Float:
 
 
 def unit(v: Float) -> Float:
-    """Unit vectors over the last axis; a zero vector stays zero."""
+    """Unit vectors over the last axis. A zero vector stays zero."""
     length = norm(v)[..., None]
     result: Float = v / np.where(length > 0.0, length, 1.0)
     return result

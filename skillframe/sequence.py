@@ -46,7 +46,7 @@ class Part(NamedTuple):
 
 
 class Composition(Skill):
-    """N trials, each in one of several parts; what follows what is the subclass's business.
+    """N trials, each in one of several parts. What follows what is the subclass's business.
 
     Args:
         parts: at least one.
@@ -154,7 +154,7 @@ class Composition(Skill):
 
 
 class Sequence(Composition):
-    """One part after another; the first failure is the whole's."""
+    """One part after another. The first failure is the whole's."""
 
     def follows(self, row: int, part: int, status: int, reason: str) -> tuple[int, int, str]:
         """The next part after a success."""
@@ -164,7 +164,7 @@ class Sequence(Composition):
 
 
 class Fallback(Composition):
-    """The first part that succeeds is enough; a part is tried when those before it have failed."""
+    """The first part that succeeds is enough. A part is tried when those before it have failed."""
 
     def follows(self, row: int, part: int, status: int, reason: str) -> tuple[int, int, str]:
         """The next part after a failure."""

@@ -251,7 +251,7 @@ class SectionConformance(RecordConformance):
 
 
 class HoldSkill(Skill):
-    """Holds the pose it started in, for a while or for ever; as a coordinator, the poses of all arms.
+    """Holds the pose it started in, for a while or for ever. A coordinator holds the poses of all arms.
 
     Args:
         stiffness: of translation [N/m] and of rotation [Nm/rad].

@@ -117,11 +117,11 @@ class ClusterPool(Generic[WorkT]):
 
     @property
     def size(self) -> int:
-        """How many jobs may be in flight; before the first look, as many as there are workers."""
+        """How many jobs may be in flight. Before the first look, as many as there are workers."""
         return self._crew.size if self._crew.present else max(1, self._planned)
 
     def _make_room(self) -> None:
-        """An empty folder for the workers' files; what a killed session left there goes, and no link is followed."""
+        """An empty folder for the workers' files. What a killed session left there goes, and no link is followed."""
         if not self._watch.is_symlink():
             shutil.rmtree(self._watch, ignore_errors=True)
         try:
@@ -221,7 +221,7 @@ class ClusterPool(Generic[WorkT]):
                 return task.job, answer
 
     def _wait(self) -> Any:
-        """A job's future that has ended; meanwhile look after the workers, and tell how far those in flight are."""
+        """A job's future that has ended. Meanwhile look after the workers, and tell how far those in flight are."""
         due = time.monotonic() + TELL_S
         while True:
             self._ended.clear()
@@ -306,7 +306,7 @@ class ClusterPool(Generic[WorkT]):
 
 
 def _share(watch: Path) -> float:
-    """How far a job says that it is; nothing said yet, or half a number, is no progress."""
+    """How far a job says that it is. Nothing said yet, or half a number, is no progress."""
     try:
         return float(share_file(watch).read_text(encoding="utf-8"))
     except (OSError, ValueError):

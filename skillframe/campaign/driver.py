@@ -28,7 +28,7 @@ WHY = {"killed": "was killed", "time limit": "made no progress for too long", "m
 
 
 class Died(NamedTuple):
-    """The worker went away under the job; cause is "killed", "time limit" (it made no progress) or "memory"."""
+    """The worker went away under the job. Cause is "killed", "time limit" (it made no progress) or "memory"."""
 
     cause: str
 

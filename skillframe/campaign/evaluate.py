@@ -38,7 +38,7 @@ ANALYTIC_SAMPLES = 33
 
 
 def evaluate(job: ChunkJob) -> list[Row]:
-    """Simulate a chunk; rows in the order of its trials.
+    """Simulate a chunk. Rows are in the order of its trials.
 
     Raises:
         Unusable: the skill, the robot or the world cannot be loaded here.
@@ -59,7 +59,7 @@ def evaluate(job: ChunkJob) -> list[Row]:
 
 
 def describe(spec: CampaignSpec) -> dict[str, Any]:
-    """The nominal scene as plain JSON values for scene.json; refuses what would not run.
+    """The nominal scene as plain JSON values for scene.json. Refuses what would not run.
 
     Raises:
         SkillframeError: a skill, the robot, or a quantity at one of its declared values cannot be used.

@@ -1,4 +1,4 @@
-"""A campaign's folder: all that the campaign needs is copied in; reports, resumes and replays need nothing else.
+"""A campaign's folder: all that the campaign needs is copied in. Reports, resumes and replays need nothing else.
 
     campaign.toml   as run: world parameters in full, paths into this folder
     skills/ robots/ copies of what ran
@@ -127,7 +127,7 @@ def _copy_skills(spec: CampaignSpec, target: Path) -> tuple[str, ...]:
 
 
 def _copy_robot(spec: CampaignSpec, target: Path) -> str:
-    """Copy the robot's description; meshes are for looks and stay behind."""
+    """Copy the robot's description. Meshes are for looks and stay behind."""
     given = spec.folder / spec.robot
     if given.is_dir() and (given / "robot.toml").is_file():
         given = given / "robot.toml"
@@ -213,5 +213,5 @@ def _key(name: str) -> str:
 
 
 def _text(text: str) -> str:
-    """A TOML basic string; JSON's escapes are a subset of TOML's."""
+    """A TOML basic string. JSON's escapes are a subset of TOML's."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -38,7 +38,7 @@ class Identity(NamedTuple):
 
 
 def identity(plugins: bool = True) -> Identity:
-    """What this process is; with plug-ins it loads their entry modules, as any run does."""
+    """What this process is. With plug-ins it loads their entry modules, as any run does."""
     if not plugins:
         return Identity(environment(), platform.machine(), {}, {})
     from skillframe.extend.registry import registry
@@ -72,7 +72,7 @@ def needed_plugins(spec: CampaignSpec, ours: Identity) -> set[str]:
 
 
 def _document(path: Path) -> Any:
-    """A skill file's content; nothing of one that cannot be read, which the workers will say."""
+    """A skill file's content. Nothing if it cannot be read, which the workers will say."""
     try:
         return json.loads(path.read_bytes())
     except (OSError, ValueError, RecursionError):
@@ -88,7 +88,7 @@ def _words(value: Any) -> Iterator[str]:
 
 
 class Comparison(NamedTuple):
-    """How a worker differs from us: in what keeps it from work, and in what is only worth saying; in words."""
+    """How a worker differs from us: in what keeps it from work, and in what is only worth saying, in words."""
 
     refused: list[str]
     noted: list[str]

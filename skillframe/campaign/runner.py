@@ -63,7 +63,7 @@ class Progress(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
-    """How a campaign runs; none of this changes its rows.
+    """How a campaign runs. Nothing here changes its rows.
 
     Attributes:
         workers: local processes; None runs in this one.
@@ -148,7 +148,7 @@ class _Session:
         return remarks(self.spec.folder, rows, unchecked=log.unchecked, environments=log.environments, summary=None)
 
     def _conclude(self, start: float) -> dict[str, Any]:
-        """Note the time and write the tables; into no folder that is not there any more."""
+        """Note the time and write the tables, but never into a folder that has gone."""
         self._check_in_place()
         self.log.note({"wall_s": time.perf_counter() - start})
         return self._write()
@@ -214,7 +214,7 @@ class _Session:
         self.notify(Progress(done, self.total, note, self.furthest - done, usual))
 
     def _tell_share(self, under_way: float) -> None:
-        """Between chunks; the traces at the end are no rows."""
+        """Between chunks. The traces at the end are no rows."""
         if len(self.log.done) < self.total:
             self._tell(under_way=under_way)
 
@@ -247,7 +247,7 @@ class _Session:
         return ordered(self.spec, self.log.done.values(), self.rule.after)
 
     def _environments(self, rows: list[Row]) -> list[dict[str, Any]]:
-        """Where rows ran, and how many; those of skillframe 0.1 do not say."""
+        """Where rows ran, and how many. Those of skillframe 0.1 do not say."""
         counts = Counter(self.log.ran_on.get((row["trial"], row["skill"])) for row in rows)
         noted = enumerate(self.log.environments)
         return [{"rows": counts[n], "versions": dict(environment)} for n, environment in noted if counts[n]]

@@ -115,7 +115,7 @@ class CampaignSpec:
 
     @property
     def cells(self) -> int:
-        """Number of cells of the grid; 1 without grid axes."""
+        """Number of cells of the grid, or 1 without grid axes."""
         return cells_of(self.vary)
 
     @property

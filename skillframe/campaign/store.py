@@ -65,7 +65,7 @@ class Content:
 
 
 class RowLog:
-    """The open `rows.jsonl` of a campaign; use as a context manager, under the folder's lock.
+    """The open `rows.jsonl` of a campaign. Use it as a context manager, under the folder's lock.
 
     Attributes:
         done: the stored rows by (trial, skill).
@@ -89,7 +89,7 @@ class RowLog:
             self._write([{"format": FORMAT, "version": ROWS_VERSION, "campaign": campaign}])
 
     def append(self, rows: Iterable[Row], environment: Environment | None = None) -> list[Row]:
-        """Store rows, and where they ran; returns those that are new (a stored trial keeps its first row)."""
+        """Store rows, and where they ran. Returns those that are new (a stored trial keeps its first row)."""
         fresh = [row for row in rows if (row["trial"], row["skill"]) not in self.done]
         where = {} if environment is None or not fresh else {RAN_ON: self._number(environment)}
         self._write([{key: encode(value) for key, value in row.items()} | where for row in fresh])
@@ -100,7 +100,7 @@ class RowLog:
         return fresh
 
     def _number(self, environment: Environment) -> int:
-        """The number under which an environment is noted; noted now if it is new."""
+        """The number under which an environment is noted. A new one is noted now."""
         if environment not in self.environments:
             self.note({RAN_ON: dict(environment)})
             self.environments.append(environment)
@@ -113,7 +113,7 @@ class RowLog:
         self._sync()
 
     def _write(self, records: Sequence[Mapping[str, Any]]) -> None:
-        """Append lines; where that fails, the file is as it was.
+        """Append lines. Where that fails, the file is as it was.
 
         Raises:
             OSError: `filename` is the file.
@@ -162,7 +162,7 @@ def repair_tail(path: Path) -> None:
 
 
 def read_content(folder: Path, campaign: str | None = None, spec: CampaignSpec | None = None) -> Content:
-    """What `rows.jsonl` holds; a torn last line is left out.
+    """What `rows.jsonl` holds. A torn last line is left out.
 
     Args:
         folder: the campaign's folder.
@@ -272,7 +272,7 @@ def _check_header(path: Path, header: Row, campaign: str | None) -> int:
 
 
 def ordered(spec: CampaignSpec, rows: Iterable[Row], stop_after: int | None = None) -> list[Row]:
-    """Rows by trial, then by skill; without those after the trial at which the campaign stopped."""
+    """Rows by trial, then by skill, without those after the trial at which the campaign stopped."""
     order = {label: i for i, label in enumerate(spec.labels)}
     kept = (row for row in rows if stop_after is None or row["trial"] <= stop_after)
     return sorted(kept, key=lambda row: (row["trial"], order[row["skill"]]))

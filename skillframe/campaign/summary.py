@@ -85,7 +85,7 @@ def _spread(rows: Sequence[Row], name: str) -> dict[str, float | int | None]:
 
 
 def comparisons(spec: CampaignSpec, rows: Sequence[Row], complete: bool) -> list[dict[str, Any]]:
-    """Every pair of skills on the trials that both ran; `p_value` is corrected for the number of pairs."""
+    """Every pair of skills on the trials that both ran. `p_value` is corrected for the number of pairs."""
     validity = validity_of(spec.plan, complete=complete)
     outcome = {label: {r["trial"]: r["success"] for r in _of(rows, label, complete)} for label in spec.labels}
     pairs = [_comparison(a, b, outcome, validity) for a, b in combinations(spec.labels, 2)]

@@ -101,7 +101,7 @@ def said(error: BaseException) -> str:
 
 
 def is_trouble(error: BaseException) -> bool:
-    """Whether an error is one of the environment; see the module."""
+    """Whether an error is one of the environment (see the module)."""
     from skillframe.fmu.toolchain import CompilerFailed
 
     always = (MemoryError, OSError, ImportError, UnknownName, MissingDependency, BadPlugin, PluginConflict, Unusable)

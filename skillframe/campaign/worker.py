@@ -70,7 +70,7 @@ def share_file(watch: Path) -> Path:
 
 
 def _pulse(path: Path, seconds: float, file: TextIO) -> Listener:
-    """Winds the watchdog and writes how far the job is, now and then; that it cannot write is no reason to stop."""
+    """Winds the watchdog and writes how far the job is, now and then. A failed write does not stop it."""
     every = min(PULSE_S, seconds / 4.0)
     due, furthest = time.monotonic() + every, 0.0
 

@@ -1,4 +1,4 @@
-"""What a ROS bag holds: its topics, their messages by header stamp, its transforms; damage in one sentence.
+"""What a ROS bag holds: its topics, their messages by header stamp, its transforms, and damage in one sentence.
 
 Read through `rosbags`, which needs no ROS. Whatever that library raises on foreign bytes becomes an `InputError`.
 """
@@ -44,7 +44,7 @@ def parts_note(path: Path) -> list[str]:
 
 
 def refuse_other_files(path: Path) -> None:
-    """Refuse what is not a bag by its first bytes, before any library is asked; a folder is a bag of ROS 2."""
+    """Refuse what is not a bag by its first bytes, before any library is asked. A folder is a bag of ROS 2."""
     if path.is_dir():
         return
     magic = MAGIC[path.suffix.lower()]
@@ -62,7 +62,7 @@ def refuse_other_files(path: Path) -> None:
 
 
 def checksum_notes(path: Path) -> list[str]:
-    """Verify the checksums of every MCAP file of a bag; notes on those that carry none.
+    """Verify the checksums of every MCAP file of a bag. Returns notes on those that carry none.
 
     Raises:
         InputError: damage.
@@ -134,7 +134,7 @@ def topics_of(path: Path, bag: Any) -> dict[str, str]:
 
 
 def read_topic(path: Path, bag: Any, topic: str, kind: str, notes: list[str]) -> Recorded:
-    """All messages of a topic, sorted by their headers' stamps; adds a note if that was needed.
+    """All messages of a topic, sorted by their headers' stamps. Adds a note if that was needed.
 
     Raises:
         InputError: there are none, or they are damaged.

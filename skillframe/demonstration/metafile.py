@@ -20,7 +20,7 @@ def meta_path(path: Path) -> Path:
 
 
 def read_meta(path: Path) -> dict[str, Any]:
-    """Metadata beside a text file; empty where there is none.
+    """Metadata beside a text file, or empty where there is none.
 
     Raises:
         InputError: it is there, but is not TOML.
@@ -71,7 +71,7 @@ def check_meta(source: str, meta: Mapping[str, Any]) -> None:
 
 
 def _check_noise(source: str, sensor: object) -> None:
-    """Stated noise must be numbers that a filter can be made for; 0 says that nobody knows."""
+    """Stated noise must be numbers that a filter can be made for. 0 says that nobody knows."""
     for name in ("force_noise", "torque_noise"):
         value = sensor.get(name) if isinstance(sensor, Mapping) else None
         if value is not None and not (_is_number(value) and value >= 0.0):
@@ -102,7 +102,7 @@ def _is_number(value: Any) -> bool:
 
 
 def toml_text(meta: Mapping[str, Any]) -> str:
-    """Metadata as TOML; values that are None are left out, since TOML has none. Numbers round-trip exactly."""
+    """Metadata as TOML. Values that are None are left out, since TOML has none. Numbers round-trip exactly."""
     lines = [f"{_key(k)} = {_value(v)}" for k, v in meta.items() if v is not None and not isinstance(v, Mapping)]
     for key, value in meta.items():
         if isinstance(value, Mapping):

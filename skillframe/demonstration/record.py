@@ -77,7 +77,7 @@ class Demonstration:
         return float(1.0 / np.median(np.diff(self.time)))
 
     def between(self, start: float | None = None, stop: float | None = None) -> Demonstration:
-        """The part with start <= t <= stop [s]; the clock is kept.
+        """The part with start <= t <= stop [s]. The clock is kept.
 
         Raises:
             InputError: fewer than two samples remain.

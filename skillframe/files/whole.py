@@ -23,7 +23,7 @@ _TEMPORARY = re.compile(rf"\..+\.[0-9a-f]{{{2 * RANDOM_BYTES}}}")
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file, whole or not at all; its folder is created if need be.
+    """Write a file, whole or not at all. Its folder is created if need be.
 
     Args:
         path: the file; one that is there is replaced, a link is replaced and not followed.
@@ -38,7 +38,7 @@ def write_whole(path: Path, content: bytes) -> None:
 
 @contextmanager
 def writing_whole(path: Path) -> Iterator[Path]:
-    """An empty temporary file, to be filled by its path; takes the target's place when the block ends without error.
+    """An empty temporary file, to be filled by its path. It takes the target's place when the block ends without error.
 
     Raises:
         InputError: the place cannot be written to, or is full; names the target.

@@ -66,7 +66,7 @@ class SandboxLimits:
 
 
 class ChildLost(SkillframeError):
-    """A child process crashed, hung, or left; the sentence says which, and how much memory it used."""
+    """A child process crashed, hung or left. The sentence says which, and how much memory it used."""
 
 
 class Child:
@@ -103,7 +103,7 @@ class Child:
         self._asked = monotonic()
 
     def send(self, letter: bytes, payload: bytes = b"") -> None:
-        """Send a request; a child that has gone or does not read is found out by `receive`."""
+        """Send a request. A child that has gone or does not read is found out by `receive`."""
         self._asked = monotonic()
         with suppress(OSError):
             self._channel.send(letter + payload, self.limits.start_s)
@@ -139,7 +139,7 @@ class Child:
         return self.liar("an answer of no known kind", what)
 
     def liar(self, sent: str, what: str) -> ChildLost:
-        """End a child that sent what is no answer; the error to raise."""
+        """End a child that sent what is no answer. Returns the error to raise."""
         self.kill()
         return ChildLost(f"{self._who()} sent {sent} instead of an answer while {what}; it was stopped")
 
@@ -148,12 +148,12 @@ class Child:
         self.send(letter, json.dumps(value).encode())
 
     def ask(self, letter: bytes, value: Any, limit_s: float, what: str, most: int = LONGEST) -> Any:
-        """A request and its answer, both JSON; raises as `receive`."""
+        """A request and its answer, both JSON. Raises as `receive`."""
         self.tell(letter, value)
         return self.heard(limit_s, what, most)
 
     def heard(self, limit_s: float, what: str, most: int = LONGEST) -> Any:
-        """An answer in JSON; raises as `receive`."""
+        """An answer in JSON. Raises as `receive`."""
         answer = self.receive(limit_s, what, most)
         try:
             return json.loads(answer) if answer else None
@@ -180,7 +180,7 @@ class Child:
     _peak_kb = 0
 
     def _waited(self, limit_s: float) -> int | None:
-        """Exit code of the keeper, which is the worker's, within a time; None if it is still there."""
+        """Exit code of the keeper, which is the worker's, within a time, or None if it is still there."""
         until, pause = monotonic() + limit_s, 0.0005
         while self._process.returncode is None:
             try:

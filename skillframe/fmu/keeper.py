@@ -36,7 +36,7 @@ PATIENCE_S = 5.0
 
 
 def keep(given: dict[str, Any]) -> NoReturn:
-    """Start the worker, wait for its end or ours; `given` is what `Child` wrote."""
+    """Start the worker, wait for its end or ours. `given` is what `Child` wrote."""
     use = set(given["use"])
     confined: dict[str, Any] = {"namespace": confine.NAMESPACE in use and confine.own_namespaces()}
     reaper = _first(given["fd"]) if confined["namespace"] else 0
@@ -93,7 +93,7 @@ def _wait(worker: int, wake: int) -> None:
 
 
 def _end_all(reaper: int, worker: int) -> int:
-    """Kill the worker, its group, and whatever it has started, until nothing is left; the worker's wait status."""
+    """Kill the worker, its group, and whatever it has started, until nothing is left. Returns its wait status."""
     for kill, pid in ((os.kill, reaper), (os.killpg, worker), (os.kill, worker)):
         with suppress(OSError):
             if pid:
@@ -163,7 +163,7 @@ def _limit(kind: int, value: int) -> None:
 
 
 def _lifted(fd: int) -> int:
-    """The socket on a high descriptor; all others are closed, and 0, 1 and 2 lead nowhere."""
+    """The socket on a high descriptor. All others are closed, and 0, 1 and 2 lead nowhere."""
     most = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
     most = HIGH + 1 if most == resource.RLIM_INFINITY else min(most, HIGH + 1)
     _limit(resource.RLIMIT_NOFILE, most)

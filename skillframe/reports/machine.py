@@ -24,7 +24,7 @@ BILL_CAPTION = (
 
 
 def machine_plots(trace: Trace) -> list[Markup]:
-    """Plots of what a machine's trace holds besides a robot's; none for other robots."""
+    """Plots of what a machine's trace holds besides a robot's, or none for other robots."""
     data = trace.machine
     if not data:
         return []

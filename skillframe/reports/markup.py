@@ -23,7 +23,7 @@ class Markup(str):
 
 
 def escape(value: object) -> Markup:
-    """Any value as text inside HTML; `Markup` passes."""
+    """Any value as text inside HTML. `Markup` passes."""
     return value if isinstance(value, Markup) else Markup(html.escape(str(value), quote=True))
 
 
@@ -50,7 +50,7 @@ def _attribute(key: str, value: object) -> str:
 
 
 def json_script(identifier: str, value: object) -> Markup:
-    """Data for the page's script; "<" is written as an escape so that no text can close the element."""
+    """Data for the page's script. "<" is written as an escape so that no text can close the element."""
     text = json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     return Markup(f'<script type="application/json" id="{html.escape(identifier)}">{text}</script>')
 
@@ -74,7 +74,7 @@ def image(title: str, caption: object, svg: str) -> Markup:
 
 
 def table(head: Iterable[object], rows: Iterable[Iterable[object]], *, class_: str = "", numeric: int = 1) -> Markup:
-    """A table; columns from index `numeric` on are set as figures."""
+    """A table. Columns from index `numeric` on are set as figures."""
 
     def cells(name: str, row: Iterable[object]) -> Markup:
         return join(tag(name, cell, class_="num" if i >= numeric else None) for i, cell in enumerate(row))
@@ -104,7 +104,7 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def percent(value: float) -> str:
-    """A share as a percentage, with a decimal below 1 and above 99; 0 % and 100 % only where it is exactly that."""
+    """A share as a percentage, with a decimal below 1 and above 99. 0 % and 100 % only where it is exactly that."""
     if not math.isfinite(value):
         return "–"
     if value in (0.0, 1.0):

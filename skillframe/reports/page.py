@@ -51,7 +51,7 @@ def write_chapters(chapters: Sequence[Chapter], out: Path) -> int:
 
 
 def render(chapters: Sequence[Chapter]) -> str:
-    """The whole document; the same chapters give the same text.
+    """The whole document. The same chapters give the same text.
 
     Raises:
         InputError: there are no chapters.

@@ -54,7 +54,7 @@ def time_plot(
     title: str, unit: str, time: Float, curves: Sequence[Curve], *, caption: str = "",
     limit: float | None = None, events: Sequence[tuple[float, str]] = (), width: float = 460.0,
 ) -> Markup:  # fmt: skip
-    """A plot over time; a limit is drawn when it is near enough to matter."""
+    """A plot over time. A limit is drawn when it is near enough to matter."""
     axes = Axes(
         width=width, x=_time_range(time), y=_value_range(curves, unit, limit), x_label="time [s]", y_label=f"[{unit}]"
     )
@@ -95,7 +95,7 @@ def _limit_line(axes: Axes, limit: float | None, unit: str) -> Markup:
 
 
 def _event_marks(axes: Axes, events: Sequence[tuple[float, str]]) -> Markup:
-    """Numbered lines at events; numbers that would overlap are written together."""
+    """Numbered lines at events. Numbers that would overlap are written together."""
     lines: list[Markup] = []
     labels: list[tuple[float, str]] = []
     first, last = axes.x
@@ -142,7 +142,7 @@ def _read_off(trace: Trace) -> list[tuple[float, str]]:
 
 
 def run_plots(trace: Trace, force_limit: float | None = None) -> list[Markup]:
-    """Force, position, attitude and torque of a run; the force limit [N] if the trace does not know it.
+    """Force, position, attitude and torque of a run. `force_limit` [N] is for a trace without its own.
 
     A hydraulic machine's estimate knows no torque, and its tool's attitude follows from the joints: both are left out.
     """

@@ -1,4 +1,4 @@
-"""A picture of meshes without any graphics library: z-buffer, two lights, dark outlines; numpy only.
+"""A picture of meshes without any graphics library: z-buffer, two lights, dark outlines, in numpy only.
 
 Each triangle is filled where its three edge functions are positive (Pineda 1988), depth and brightness interpolated by
 the same barycentric weights (1/z-linear depth is not needed at these angles of view). Outlines are drawn where the body
@@ -40,7 +40,7 @@ class Canvas(NamedTuple):
 
 
 def draw(meshes: Sequence[Mesh], camera: Camera, width: int, height: int) -> Image:
-    """A picture (height, width, 4) of meshes in base; clear where nothing is, every mesh with its outline."""
+    """A picture (height, width, 4) of meshes in base, clear where nothing is, every mesh with its outline."""
     return picture(paint(blank(width, height), dict(enumerate(meshes)), camera))
 
 
@@ -58,7 +58,7 @@ def paint(canvas: Canvas, meshes: Mapping[int, Mesh], camera: Camera) -> Canvas:
 
 
 def picture(canvas: Canvas) -> Image:
-    """The picture (height, width, 4) of a canvas, with outlines; the canvas keeps its colours."""
+    """The picture (height, width, 4) of a canvas, with outlines. The canvas keeps its colours."""
     edge = _outline(canvas.depth, canvas.owner)
     color = canvas.color.copy()
     color[edge] = INK
@@ -66,7 +66,7 @@ def picture(canvas: Canvas) -> Image:
 
 
 def _reduced(color: Float, solid: NDArray[np.bool_]) -> Image:
-    """Colour (zero where nothing is) and opacity averaged over the finer grid; colour counts where something is."""
+    """Colour (zero where nothing is) and opacity averaged over the finer grid. Colour counts where something is."""
     places = [(slice(i, None, OVERSAMPLE), slice(j, None, OVERSAMPLE)) for i, j in np.ndindex(OVERSAMPLE, OVERSAMPLE)]
     count = np.sum([solid[place] for place in places], axis=0)
     result: Image = np.empty((*count.shape, 4), dtype=np.uint8)

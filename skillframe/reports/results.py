@@ -1,4 +1,4 @@
-"""A campaign's table `results.csv`: one row a trial and skill, checked; what varied is what the contract leaves open.
+"""A campaign's table `results.csv`: one row a trial and skill, checked. What varied is what the contract leaves open.
 
 Figures are counted from the rows, never taken over from a summary. Which interval and which test they get, and when
 they get none, is decided as for summary.json (`campaign.validity`). Of an unfinished campaign a skill's rows count up
@@ -30,7 +30,7 @@ TRUTH = {"1": True, "true": True, "1.0": True, "0": False, "false": False, "0.0"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResultRow:
-    """One trial of one skill; `values` holds every other numeric column, NaN where it is empty or text."""
+    """One trial of one skill. `values` holds every other numeric column, NaN where it is empty or text."""
 
     trial: int
     skill: str
@@ -40,7 +40,7 @@ class ResultRow:
 
 
 class Rate(NamedTuple):
-    """How often it worked, with its 95 % interval; None where there is none."""
+    """How often it worked, with its 95 % interval, or None where there is none."""
 
     successes: int
     trials: int
@@ -53,7 +53,7 @@ class Rate(NamedTuple):
 
     @property
     def span(self) -> str:
-        """The interval in words; "" where there is none."""
+        """The interval in words, or "" where there is none."""
         return "" if self.interval is None else f"{percent(self.interval.low)} to {percent(self.interval.high)}"
 
 
@@ -105,7 +105,7 @@ class Results:
 
     @property
     def interval_name(self) -> str:
-        """What the intervals are, in words; "no interval" where there are none."""
+        """What the intervals are, in words, or "no interval"."""
         if self.validity.basis is Basis.NONE:
             return "no interval"
         fixed = self.validity.basis is Basis.FIXED
@@ -113,7 +113,7 @@ class Results:
 
     @property
     def condition(self) -> str:
-        """What the intervals assume and nobody has shown; "" if there is nothing."""
+        """What the intervals assume and nobody has shown, or "" if there is nothing."""
         assumed = " if the trials are independent and their number was fixed beforehand" if self.assumed else ""
         return assumed + (" as of independent draws" if self.validity.note else "")
 
@@ -132,7 +132,7 @@ class Results:
         return list(holm(known)) if len(known) == len(single) else list(single)
 
     def compared_by(self, pairs: int) -> str:
-        """The test and the correction for the number of pairs, in words; or why there are no p-values."""
+        """The test and the correction for the number of pairs, in words, or why there are no p-values."""
         if self.validity.basis is Basis.NONE:
             return self.validity.test_method
         fixed = self.validity.basis is Basis.FIXED
@@ -203,7 +203,7 @@ def _left_out(count: int) -> list[str]:
 def _whole_rows(
     path: Path, table: list[list[str]], width: int, text: str
 ) -> tuple[list[tuple[int, list[str]]], list[str]]:
-    """Numbered rows of full width; a last line that a kill cut short is left out and said."""
+    """Numbered rows of full width. A last line that a kill cut short is left out and said."""
     body = [(number, cells) for number, cells in enumerate(table, start=2) if cells]
     torn = bool(body) and (len(body[-1][1]) < width or not text.endswith("\n"))
     notes = ["The last row of results.csv was cut short and is left out."] if torn and len(body[-1][1]) < width else []

@@ -1,4 +1,4 @@
-"""One run after the other: the 3-D replay, stills, events and plots; and the demonstrations it was learned from."""
+"""One run after the other: the 3-D replay, stills, events, plots, and the demonstrations it was learned from."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def _story(meta: Mapping[str, Any]) -> str:
 
 
 def _figure(value: float) -> str:
-    """A measured figure; below a hundredth of a millimetre, of a second or of a newton nothing is known."""
+    """A measured figure. Below a hundredth of a millimetre, of a second or of a newton nothing is known."""
     return number(value) if value >= 0.01 or not math.isfinite(value) else "< 0.01"
 
 

@@ -77,7 +77,7 @@ class Chapter:
 
 
 def scenes(chapter: Chapter) -> list[tuple[str, str]]:
-    """(robot, world) of what a chapter shows, each pair once; without what its files do not say."""
+    """(robot, world) of what a chapter shows, each pair once, without what its files do not say."""
     found = [(chapter.spec or chapter.summary)] + [run.trace.meta for run in chapter.runs]
     pairs = [(str(f.get("robot") or ""), str(f.get("world") or "")) for f in found]
     named = [(name_of(robot), world) for robot, world in pairs]
@@ -85,7 +85,7 @@ def scenes(chapter: Chapter) -> list[tuple[str, str]]:
 
 
 def read_chapters(inputs: Sequence[Path]) -> list[Chapter]:
-    """Chapters in the order of the arguments; loose traces are gathered in one of their own at the end.
+    """Chapters in the order of the arguments. Loose traces are gathered in one of their own at the end.
 
     Raises:
         InputError: a path that is missing, a folder without results, a file that is no trace.
@@ -100,7 +100,7 @@ def read_chapters(inputs: Sequence[Path]) -> list[Chapter]:
 
 
 def _folders(path: Path) -> list[Path]:
-    """A campaign's folder itself; else the campaigns in it, which may share demonstrations; else what has any part."""
+    """A campaign's folder itself, else the campaigns in it (they may share demonstrations), else what has any part."""
     inner = sorted(f for f in path.iterdir() if f.is_dir())
     for parts in (CAMPAIGN, PARTS):
         if _holds(path, parts):
@@ -115,7 +115,7 @@ def _holds(folder: Path, parts: Sequence[str]) -> bool:
 
 
 def read_traces(paths: Sequence[Path]) -> Chapter:
-    """A chapter of trace files; every one of them must be readable."""
+    """A chapter of trace files. Every one of them must be readable."""
     chapter = Chapter(name="Single runs", traces=len(paths))
     for path in paths:
         chapter.runs.append(Run(path.name, load_trace(path)))
@@ -172,7 +172,7 @@ def _force_limit(folder: Path) -> float | None:
 
 
 def _declared(spec: dict[str, Any]) -> tuple[list[str], Plan | None]:
-    """Varied quantities, and what was fixed before the first trial; None if the file does not tell."""
+    """Varied quantities, and what was fixed before the first trial, or None if the file does not tell."""
     vary, stop, trials, skills = (spec.get(key) for key in ("vary", "stop", "trials", "skills"))
     vary = vary if isinstance(vary, dict) else {}
     may_stop = isinstance(stop, dict) and stop.get("interval_width") is not None

@@ -1,4 +1,4 @@
-"""A robot in words and figures a person can read, degrees only there and with their unit; and the same as JSON."""
+"""A robot in words and figures a person can read, degrees only there and with their unit, and the same as JSON."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def describe(robot: RobotModel) -> str:
 
 
 def _closed(robot: RobotModel) -> RobotModel:
-    """The robot with the joints of its loops where they stand at home; as it is where the loops do not close."""
+    """The robot with the joints of its loops where they stand at home, or as it is where the loops do not close."""
     if not robot.spec.loop:
         return robot
     try:
@@ -54,7 +54,7 @@ def _closed(robot: RobotModel) -> RobotModel:
 
 
 def _machine(robot: RobotModel) -> list[str]:
-    """Lines on loops, actuators, what it measures with, and payload; none for a robot without them."""
+    """Lines on loops, actuators, what it measures with, and payload, or none for a robot without them."""
     spec = robot.spec
     lines = [f"  loop: {loop.frame_a} meets {loop.frame_b}" for loop in spec.loop]
     lines += [f"  {a.joint} is driven by {a.fmu}{_how(a, spec)}" for a in spec.actuation]
@@ -78,7 +78,7 @@ def _how(actuation: Actuation, spec: RobotSpec) -> str:
 
 
 def as_json(robot: RobotModel) -> dict[str, Any]:
-    """The same for scripts, in SI units and radians; null where there is no limit, or no home of its own."""
+    """The same for scripts, in SI units and radians. Null where there is no limit, or no home of its own."""
     robot = _closed(robot)
     spec, model = robot.spec, robot.model
     return {
@@ -135,7 +135,7 @@ def _moving(robot: RobotModel) -> int:
 
 
 def _home(robot: RobotModel, joint: pin.JointModel) -> float:
-    """Value of a joint of one freedom at home [rad or m]; a continuous one holds cosine and sine."""
+    """Value of a joint of one freedom at home [rad or m]. A continuous one holds cosine and sine."""
     if joint.nq == 2:
         return float(np.arctan2(robot.home[joint.idx_q + 1], robot.home[joint.idx_q]))
     return float(robot.home[joint.idx_q])

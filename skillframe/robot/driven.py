@@ -83,7 +83,7 @@ class MachineNoise:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gains:
-    """Gains of the law of a hydraulic machine that are the same for all of it; ours.
+    """Gains of the law of a hydraulic machine that are the same for all of it (ours).
 
     Attributes:
         body: K_A of every body [N s/m, N m s/rad]; the published 5 damps nothing, and a tool that lands on something

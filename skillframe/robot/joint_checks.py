@@ -1,4 +1,4 @@
-"""What is worth knowing about a robot's joints and meshes; nothing here makes it unusable."""
+"""What is worth knowing about a robot's joints and meshes. Nothing here makes it unusable."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`RobotSpec`: what robot.toml says about a robot, checked; no library of robot dynamics is needed to read it.
+"""`RobotSpec`: what robot.toml says about a robot, checked. No library of robot dynamics is needed to read it.
 
 A robot is a name under a `robots/` folder (shipped, or in `$SKILLFRAME_PATH`), a folder, a robot.toml, or, to be
 checked, a bare URDF, which stands on a fixed base and has no arm until a robot.toml names one.
@@ -46,7 +46,7 @@ class Control:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """Limits that stop a run; None switches one off.
+    """Limits that stop a run. None switches one off.
 
     Attributes:
         force_n: contact force at the tool [N]; torque_n_m: contact torque at the tool [N m].

@@ -184,7 +184,7 @@ class WrenchFilter:
         return self._over(time, wrench, smooth=False)
 
     def smooth(self, time: Float, wrench: Float) -> Float:
-        """Smoothed wrench (T, 6): forward filter, then Rauch-Tung-Striebel backwards; no lag."""
+        """Smoothed wrench (T, 6): forward filter, then Rauch-Tung-Striebel backwards, without lag."""
         return self._over(time, wrench, smooth=True)
 
     def _over(self, time: Float, wrench: Float, smooth: bool) -> Float:

@@ -16,7 +16,7 @@ def rate_after(value: Any, rate: Any, shown: Any, w: Any, dt: Any) -> tuple[Any,
 
 
 class RateFilter:
-    """The filter w^2 / (s + w)^2, element by element; semi-implicit Euler, stable below w dt = 2 (sqrt(2) - 1).
+    """The filter w^2 / (s + w)^2, element by element, by semi-implicit Euler, stable below w dt = 2 (sqrt(2) - 1).
 
     Args:
         corner: w / 2 pi [Hz]; dt: [s].

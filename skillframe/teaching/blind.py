@@ -38,7 +38,7 @@ LEAN_S, LEAN_M = 0.2, 0.004  # how fast, and how far at most, the hand leans on
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BlindSettings:
-    """How a blindfolded person searches; see the module's text.
+    """How a blindfolded person searches (see the module's text).
 
     Attributes:
         believed: standard deviations of goal minus start: two along the surface [m], one about its normal [rad].
@@ -128,7 +128,7 @@ class BlindTeacher(Skill):
         self._level, self._lean = np.full(len(rngs), np.nan), np.zeros((len(rngs), 2))
 
     def step(self, observation: Observation) -> Command:
-        """Follow the script; end where the part has fallen in."""
+        """Follow the script. End where the part has fallen in."""
         tick = min(self._tick, self._place.shape[1] - 1)
         place, rate, force = self._place[:, tick], self._rate[:, tick], self._force[:, tick]
         self._tick += 1
@@ -190,7 +190,7 @@ def _via(settings: BlindSettings, rng: np.random.Generator, here: Float) -> Floa
 
 
 def _felt(wanted: Float, settings: BlindSettings, rng: np.random.Generator, dt: float) -> Float:
-    """The push [N]: what is wanted, noise of 0.5 s, and no sudden change; it grows from nothing over the rest."""
+    """The push [N]: what is wanted, noise of 0.5 s, and no sudden change. It grows from nothing over the rest."""
     noise, level = rng.standard_normal(len(wanted)), 0.0
     push, felt = np.empty(len(wanted)), 0.0
     for k, target in enumerate(wanted.tolist()):

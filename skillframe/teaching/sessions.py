@@ -94,7 +94,7 @@ def record(
     progress: Callable[[str], None] | None = None,
     watch: Watch | None = None,
 ) -> Recording:
-    """Demonstrate a scene `count` times; the starts of the scene's task are taken in turn.
+    """Demonstrate a scene `count` times. The starts of the scene's task are taken in turn.
 
     Args:
         robot: who is taught.
@@ -212,7 +212,7 @@ def demonstration_from(
     sensors: SensorSettings | None = None,
     **provenance: int,
 ) -> Demonstration:  # fmt: skip
-    """A demonstration at the tool point out of a trace taken at the handle; the wrench is as sensed, not filtered."""
+    """A demonstration at the tool point out of a trace taken at the handle. The wrench is as sensed, not filtered."""
     pose = Pose(trace.position, matrix_from_quaternion(trace.quaternion))
     handle: Float = np.array(trace.meta["center_of_compliance"])
     noise = sensors or SensorSettings()

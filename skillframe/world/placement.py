@@ -56,7 +56,7 @@ def check_quantities(draws: Mapping[str, Float], robot: RobotModel | None = None
 
 
 def _lacking(key: str, robot: RobotModel) -> str:
-    """Why a quantity would do nothing on this robot; "" if it does something."""
+    """Why a quantity would do nothing on this robot, or "" if it does something."""
     if not robot.spec.actuation:
         return "has no actuators of its own" if key in (*_ACTUATOR, "robot.nominal_payload") else ""
     if robot.spec.servo:

@@ -1,4 +1,4 @@
-"""Short ways to the trials of `skillframe_search.trials`, shared by the tests; robots and scenes are loaded once."""
+"""Short ways to the trials of `skillframe_search.trials`, shared by the tests. Robots and scenes are loaded once."""
 
 from functools import cache
 

@@ -51,7 +51,7 @@ class Unfit(NamedTuple):
 
 
 def unfit_figures(actuation: Actuation) -> list[Unfit]:
-    """What is missing or impossible among a cylinder's figures; empty if a run may begin."""
+    """What is missing or impossible among a cylinder's figures, or empty if a run may begin."""
     found = [*_missing(actuation), *_slips(actuation)]
     found += [*_impossible(actuation, "parameters"), *_impossible(actuation, "nominal")]
     return found or list(_contradictions(actuation))
@@ -91,7 +91,7 @@ def _missing(actuation: Actuation) -> Iterator[Unfit]:
 
 
 def _slips(actuation: Actuation) -> Iterator[Unfit]:
-    """Names that hydraulic_cylinder does not have; those of another maker's parameters are its own."""
+    """Names that hydraulic_cylinder does not have. Those of another maker's parameters are its own."""
     known = _of_fmu()
     for table in ("parameters", "nominal") if actuation.fmu == CYLINDER else ("nominal",):
         for name in getattr(actuation, table) if known else ():
@@ -101,13 +101,13 @@ def _slips(actuation: Actuation) -> Iterator[Unfit]:
 
 
 def _of_fmu() -> tuple[str, ...]:
-    """Parameters of hydraulic_cylinder, as its table names them; none where its sources are not at hand."""
+    """Parameters of hydraulic_cylinder, as its table names them, or none where its sources are not at hand."""
     tables = (folder / CYLINDER / "fmu.toml" for folder in data_dirs("fmus"))
     return next((tuple(read_toml(path)["parameter"]) for path in tables if path.is_file()), ())
 
 
 def _impossible(actuation: Actuation, table: str) -> Iterator[Unfit]:
-    """Figures that cannot be; `parameters` of another maker's FMU are its own wherever `nominal` says ours."""
+    """Impossible figures. `parameters` of another maker's FMU are its own wherever `nominal` says ours."""
     values: Mapping[str, Any] = getattr(actuation, table)
     foreign = table == "parameters" and actuation.fmu != CYLINDER
     for name, value in values.items():

@@ -18,7 +18,7 @@ from skillframe.robot.spec import RobotSpec
 
 
 def banks(spec: RobotSpec, trials: int) -> Actuators:
-    """A bank of a robot's actuators for so many trials; the same one again if it was the last asked for.
+    """A bank of a robot's actuators for so many trials. It is the same one again if it was the last asked for.
 
     Opening FMUs takes some tenths of a second, resetting them none to speak of, so a campaign's chunks share a bank.
 

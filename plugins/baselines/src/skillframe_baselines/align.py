@@ -75,7 +75,7 @@ def recorded(demonstrations: Sequence[Demonstration], at: Float) -> Recorded:
 
 
 def aligned(recordings: Recorded) -> Aligned:
-    """All demonstrations warped onto the one of median length; the clock runs for their mean duration."""
+    """All demonstrations warped onto the one of median length. The clock runs for their mean duration."""
     order = np.argsort([len(state) for state in recordings.state], kind="stable")
     reference = int(order[len(order) // 2])
     features = _features(recordings)

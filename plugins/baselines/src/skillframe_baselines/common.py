@@ -31,7 +31,7 @@ LEARN_AGAIN = "learn the skill again"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Following:
-    """How a learned motion is followed; settings of every learner here.
+    """How a learned motion is followed: settings of every learner here.
 
     Attributes:
         stiffness_translation: [N/m].
@@ -48,7 +48,7 @@ class Following:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Phase:
-    """The one phase of a document; the fields are those of `Following`."""
+    """The one phase of a document. The fields are those of `Following`."""
 
     name: Literal["dmp", "gmr", "seds"]
     stiffness: Stiffness

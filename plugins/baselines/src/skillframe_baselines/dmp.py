@@ -228,7 +228,7 @@ def build(document: Document) -> Skill:
 
 
 def check(document: Document) -> None:
-    """Refuse a document that cannot be built, naming the key; raises `InputError`."""
+    """Refuse a document that cannot be built, naming the key. Raises `InputError`."""
     build(document)
 
 

@@ -60,7 +60,7 @@ class Stop:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Phase:
-    """The one phase of a replay's document; the fields are those of `ReplaySettings`."""
+    """The one phase of a replay's document. The fields are those of `ReplaySettings`."""
 
     name: str = "replay"
     mode: Literal["shifted", "absolute"]

@@ -182,5 +182,5 @@ def build(document: Document) -> Skill:
 
 
 def check(document: Document) -> None:
-    """Refuse a document that cannot be built, naming the key; raises `InputError`."""
+    """Refuse a document that cannot be built, naming the key. Raises `InputError`."""
     build(document)

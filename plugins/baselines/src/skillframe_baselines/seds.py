@@ -225,7 +225,7 @@ def build(document: Document) -> Seds:
 
 
 def check(document: Document) -> None:
-    """Refuse a document that cannot be built, naming the key; raises `InputError`."""
+    """Refuse a document that cannot be built, naming the key. Raises `InputError`."""
     build(document)
 
 

@@ -101,7 +101,7 @@ def configured(phase: Phase, name: str, frames: dict[str, Vector]) -> Phase:
 
 
 def relative(phase: Phase) -> Phase:
-    """The relative task: both arms give way where either did; who moves stays as it is."""
+    """The relative task: both arms give way where either did. Who moves stays as it is."""
     parts = tuple(part for part in PARTS if any(part in arm.compliant for arm in phase.arms))
     first, second = (replace(arm, compliant=parts) for arm in phase.arms)
     return replace(phase, arms=(first, second), mode="relative")

@@ -26,7 +26,7 @@ PRIMITIVE = "lmc"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """What `learn --set` can change; the other keys go to the learner of the primitive.
+    """What `learn --set` can change. The other keys go to the learner of the primitive.
 
     Attributes:
         configuration: "A" to "E", which arm gives way in what: A the first about its wrist, B the first about the tip,

@@ -153,7 +153,7 @@ class _Standing(NamedTuple):
 def _standing(
     name: Name, tracks: Sequence[Track], motions: Sequence[Motion], moving: Sequence[Motion], settings: Settings
 ) -> _Standing | None:
-    """What the standing force says where the motion alone gives no direction; None unless all were pressed.
+    """What the standing force says where the motion alone gives no direction, or None unless all were pressed.
 
     Raises:
         InputError: they were pressed along their way, and no push explains it: what is left is a skill that gives way

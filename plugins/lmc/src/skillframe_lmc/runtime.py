@@ -123,7 +123,7 @@ class LmcSkill(Skill):
         return rotation_matrix(angle[:, None] * self._turn.direction) @ self._home.rotation
 
     def _judge(self, observation: Observation, travel: Float, pushing: NDArray[np.bool_]) -> None:
-        """End the trials that have stalled or met a limit; the first reason stays."""
+        """End the trials that have stalled or met a limit. The first reason stays."""
         stop, elapsed = self._stop, observation.time - self._began
         stalled = self._stall.look(observation, pushing)
         force = observation.wrench[:, :3]
@@ -173,7 +173,7 @@ class _Advance:
         self._limit = push / stiffness if stiffness > 0.0 else np.inf
 
     def advance(self, dt: float | Float, reached: Float) -> NDArray[np.bool_]:
-        """Move on, but not ahead of what is `reached` (N,) by more than the limit; says who is pushing."""
+        """Move on, but not ahead of what is `reached` (N,) by more than the limit. Says who is pushing."""
         if not self.exists:
             return np.zeros(len(self.progress), dtype=bool)
         self.progress = np.minimum(self.progress + self.speed * dt, reached + self._limit)

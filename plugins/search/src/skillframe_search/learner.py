@@ -26,7 +26,7 @@ KEPT = 300  # places in the evidence, for the picture
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """What can be set for learning; None leaves it to the demonstrations.
+    """What can be set for learning. None leaves it to the demonstrations.
 
     Attributes:
         algorithm: "sampling" or "ergodic", the two published; a baseline has its own.
@@ -57,7 +57,7 @@ class Settings:
 
 
 def learn(demonstrations: Sequence[Demonstration], options: LearnOptions, kind: str = "search") -> Document:
-    """The body of a search document; `kind` is "search", "spiral" or "random_walk".
+    """The body of a search document. `kind` is "search", "spiral" or "random_walk".
 
     Raises:
         InputError: no demonstration, one that never touches a surface or searches nothing, or an unknown setting.

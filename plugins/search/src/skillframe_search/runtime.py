@@ -151,7 +151,7 @@ class SearchSkill(Skill):
         return _at_center(place, self._lever), rate + _swept(rate, self._lever), move_wrench(wrench, self._lever)
 
     def _judge(self, observation: Observation, searching: NDArray[np.bool_], fallen: NDArray[np.bool_]) -> None:
-        """End the trials that have fallen in or met a limit; the first reason stays."""
+        """End the trials that have fallen in or met a limit. The first reason stays."""
         stop, force = self._stop, observation.wrench[:, :3]
         squared = force[:, 0] ** 2 + force[:, 1] ** 2 + force[:, 2] ** 2
         over = squared > stop.force_limit_n**2

@@ -82,7 +82,7 @@ class Policy(Composition):
         return command
 
     def follows(self, row: int, part: int, status: int, reason: str) -> tuple[int, int, str]:
-        """What followed most often after a success; after a failure, what the wrench asks for."""
+        """What followed most often after a success, or after a failure what the wrench asks for."""
         if status == Status.SUCCESS:
             following = int(self._policy.successors[part].argmax())
             if following == len(self.parts):

@@ -103,7 +103,7 @@ def _continuous(quaternion: Float) -> Float:
 
 
 def _bin_means(index: Float, values: Float, count: int) -> Float:
-    """Means of the samples in each of `count` bins; a bin without samples (a gap, a slow clock) is interpolated."""
+    """Means of the samples in each of `count` bins. A bin without samples (a gap, a slow clock) is interpolated."""
     kept = (index >= 0) & (index < count)
     chosen: NDArray[np.intp] = index[kept].astype(np.intp)
     starts = np.concatenate([[0], np.flatnonzero(np.diff(chosen)) + 1])
