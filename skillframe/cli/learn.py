@@ -59,8 +59,10 @@ def command(
     from skillframe.api.learning import learn_with
     from skillframe.config import parse_setting
     from skillframe.extend.records import LearnOptions
+    from skillframe.extend.registry import registry
 
     options = LearnOptions(at=at, hand=hand, axes=axes, settings=dict(parse_setting(text) for text in settings))
+    registry().behaviour(skill)  # an unknown one is told before any file is read
     demonstrations = demonstrations_of(files)
     with warned():
         learned = learn_with(demonstrations, skill, options)

@@ -126,6 +126,7 @@ def shown():
             yield place, line
 
 
+@pytest.mark.needs_plugins
 def test_every_command_line_that_is_shown_names_a_command_and_options_that_exist():
     known = commands()
     assert not [f"{place}: {problem}" for place, line in shown() if (problem := problem_of(line.split(), known))]

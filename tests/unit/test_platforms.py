@@ -47,7 +47,7 @@ assert count > 250, count
 WORK = """
 from pathlib import Path
 from skillframe.cli.main import run
-from skillframe.report import opengl
+from skillframe.reports import opengl
 opengl.backend = lambda: None  # it starts a process, for which Python itself needs on Linux what is hidden here
 assert run(["doctor", "--json"]) == 0
 where = ["--world", "valley", "--robot", "free_tool"]
