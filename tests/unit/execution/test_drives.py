@@ -136,7 +136,7 @@ def test_no_class_inherits_from_the_loop_and_it_imports_no_arm_and_no_oil():
         for base in map(ast.unparse, node.bases)
     }
     assert not {base for base in bases if base.split(".")[-1] == "Loop"}
-    tree = ast.parse((PACKAGE / "run" / "executor.py").read_text(encoding="utf-8"))
+    tree = ast.parse((PACKAGE / "execution" / "executor.py").read_text(encoding="utf-8"))
     taken = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     assert {m for m in taken if m.startswith("skillframe.execution.drives")} == {"skillframe.execution.drives.choose"}
     rooms = {m.split(".")[1] for m in taken if m.startswith("skillframe.")}
