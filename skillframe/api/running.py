@@ -17,7 +17,7 @@ from skillframe.demonstration.record import resolve_point
 from skillframe.errors import InputError, SkillframeError
 from skillframe.execution.arms import ArmsResult
 from skillframe.execution.executor import Setup, simulate
-from skillframe.execution.prepare import prepare
+from skillframe.execution.prepare import drive_maker, prepare
 from skillframe.execution.scores import ScoreFailed, about, score_notes, scores_of
 from skillframe.execution.trace import Trace
 from skillframe.files import write_whole
@@ -249,7 +249,8 @@ def _score(trace: Trace, names: Sequence[str]) -> SkillframeError | None:
 
 def _setup(robot: RobotModel, scene: Scene, coc: str | None) -> Setup:
     """The set-up of a skill that steps itself; it says nothing of where it was learned."""
-    return Setup(robot=robot, scene=scene, center_of_compliance=resolve_point(coc, scene.tool.frames))
+    center = resolve_point(coc, scene.tool.frames)
+    return Setup(robot=robot, scene=scene, center_of_compliance=center, make_drive=drive_maker(robot))
 
 
 def _command(

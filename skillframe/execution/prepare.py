@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -87,11 +87,23 @@ def load_robot_model(robot: str | Path | RobotSpec) -> RobotModel:
     """
     spec = robot if isinstance(robot, RobotSpec) else load_robot(robot)
     spec.require_simulated()
-    if spec.servo:
+    if spec.other_drive:
+        registry().drive(spec.other_drive)
+    elif spec.servo:
         require_servos(spec)
     else:
         require_figures(spec)
     return load_model(spec)
+
+
+def drive_maker(robot: RobotModel) -> Callable[..., Any] | None:
+    """What makes the drive that robot.toml names and a plug-in brings; None where it names none.
+
+    Raises:
+        UnknownName: there is no such drive.
+    """
+    name = robot.spec.other_drive
+    return registry().drive(name).make if name else None
 
 
 def center_of_compliance(document: Document, scene: Scene, coc: str | None) -> Float:
@@ -112,11 +124,12 @@ def prepare(robot: RobotModel, scene: Scene, document: Document, coc: str | None
         InputError: the skill says where it goes, and that is outside the robot's workspace.
     """
     kind = registry().behaviour(document["type"])
-    what = f"the {kind.name} skill"
+    what, made = f"the {kind.name} skill", drive_maker(robot)
     if isinstance(kind, CoordinatorType):
         with understood(what):
             coordinator = kind.build(document)
-        return coordinator, Setup(robot=robot, scene=scene, center_of_compliance=_centers(kind, document, scene, coc))
+        centers = _centers(kind, document, scene, coc)
+        return coordinator, Setup(robot=robot, scene=scene, center_of_compliance=centers, make_drive=made)
     center = center_of_compliance(document, scene, coc)
     placed = with_center(document, center.tolist())
     with understood(what):
@@ -124,7 +137,7 @@ def prepare(robot: RobotModel, scene: Scene, document: Document, coc: str | None
         area = None if kind.area is None else kind.area(document)
     if area is not None:
         _check_area(robot, scene, document, area)
-    return skill, Setup(robot=robot, scene=scene, center_of_compliance=center)
+    return skill, Setup(robot=robot, scene=scene, center_of_compliance=center, make_drive=made)
 
 
 def _centers(kind: CoordinatorType, document: Document, scene: Scene, coc: str | None) -> Float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ class Setup:
         center_of_compliance: (3,) point of the tool frame that the skill sees and steers; (arms, 3) for several arms.
         sensors: noise of the sensors.
         filter_wrench: False hands the raw wrench to the skill and the limits.
+        make_drive: makes a plug-in's drive, `make_drive(setup, draws, rngs)`; None takes one of skillframe's own.
         stop_when: ends a trial as done, looked at every 10 ms; None leaves the end to the skill.
     """
 
@@ -33,6 +35,7 @@ class Setup:
     center_of_compliance: Float = field(default_factory=lambda: np.zeros(3))
     sensors: SensorSettings = field(default_factory=SensorSettings)
     filter_wrench: bool = True
+    make_drive: Callable[..., Any] | None = None
     stop_when: Callable[[State], NDArray[np.bool_]] | None = None
 
     @property

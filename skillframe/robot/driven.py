@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 LEAST_CORNER, LARGEST_CORNER = 5.0, 0.08
 """Of filters: [Hz]; share of the control rate (from 0.13 on a `RateFilter` is unstable). Ours: 5 Hz lag by 64 ms."""
@@ -21,9 +21,13 @@ class LoopClosure:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeclaredDrive:
-    """What kind of actuators `[[actuation]]` names: hydraulic cylinders, or electric servos."""
+    """What stands between the control law and the joints.
 
-    kind: Literal["hydraulic", "servo"] = "hydraulic"
+    Attributes:
+        kind: "hydraulic" cylinders or electric "servo"s, which `[[actuation]]` names, or the name of a plug-in's drive.
+    """
+
+    kind: str = "hydraulic"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

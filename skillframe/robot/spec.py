@@ -25,6 +25,7 @@ from skillframe.robot.driven import (
 )
 from skillframe.robot.numbers import LARGEST
 
+OWN_DRIVES = ("hydraulic", "servo")
 Vector = tuple[float, float, float]
 _URDF_SUFFIXES = (".urdf", ".xml", ".xacro", ".sdf")
 
@@ -157,7 +158,12 @@ class RobotSpec:
     @property
     def servo(self) -> bool:
         """Whether electric servos drive it."""
-        return bool(self.actuation) and not self.hydraulic
+        return bool(self.actuation) and self.drive is not None and self.drive.kind == "servo"
+
+    @property
+    def other_drive(self) -> str:
+        """Name of the plug-in's drive that it has; "" for those of skillframe."""
+        return "" if self.drive is None or self.drive.kind in OWN_DRIVES else self.drive.kind
 
     def require_simulated(self) -> None:
         """Refuse to be simulated where that would be wrong.
@@ -287,16 +293,16 @@ def _check_values(declared: RobotFile, where: str) -> None:
 def _check_machine(declared: RobotFile, where: str) -> None:
     """Sensors and gains of a hydraulic machine, and of nothing else."""
     kind = None if declared.drive is None else declared.drive.kind
-    if kind is not None and not declared.actuation:
+    if kind in OWN_DRIVES and not declared.actuation:
         raise InputError(f"{where}: drive", "there is no [[actuation]] that it could be the kind of", "leave it out")
     if kind == "servo" and (declared.loop or len(declared.arm) > 1):
         what = "closed loops" if declared.loop else "several arms"
         raise InputError(f"{where}: drive", f"servos drive one open arm, and this robot has {what}", "leave it out")
-    if declared.actuation and kind != "servo":
+    if declared.actuation and kind in (None, "hydraulic"):
         for key, problem, fix in impossible(declared.actuation, declared.sensors, declared.gains):
             raise InputError(f"{where}: {key}", problem, fix)
     elif (declared.sensors, declared.gains) != (MachineNoise(), Gains()):
-        none = "its actuators are servos" if declared.actuation else "there is no [[actuation]]"
+        none = f"its drive is {kind!r}" if declared.actuation else "there is no [[actuation]]"
         text = f"[sensors] and [gains] are those of a machine with actuators, and {none}"
         raise InputError(where, text, "leave them out; a wrist sensor's noise is varied as `sensor.*` in a campaign")
 

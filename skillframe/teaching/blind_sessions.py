@@ -14,6 +14,7 @@ import numpy as np
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError, SkillframeError
 from skillframe.execution.executor import Result, Setup, simulate
+from skillframe.execution.prepare import drive_maker
 from skillframe.robot.guesses import guess_note
 from skillframe.robot.model import RobotModel
 from skillframe.skill import Status
@@ -107,7 +108,7 @@ def _attempt(
     handle = HANDLE if HANDLE in scene.tool.frames else scene.tool.hand
     setup = Setup(
         robot=robot, scene=scene, center_of_compliance=np.array(scene.tool.frames[handle]),
-        sensors=sensors or SensorSettings(), filter_wrench=False,
+        sensors=sensors or SensorSettings(), filter_wrench=False, make_drive=drive_maker(robot),
     )  # fmt: skip
     rngs = [np.random.default_rng([seed, slot, attempt]) for slot in slots]
     teacher = BlindTeacher(np.array(scene.task.direction), settings)

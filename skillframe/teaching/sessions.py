@@ -17,6 +17,7 @@ from skillframe.demonstration.convention import STANDARD
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import SkillframeError
 from skillframe.execution.executor import Result, Setup, simulate
+from skillframe.execution.prepare import drive_maker
 from skillframe.execution.trace import Trace
 from skillframe.extend.reading import write_demonstration
 from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, rotate
@@ -186,6 +187,7 @@ def _attempt(
     setup = Setup(
         robot=robot, scene=scene, center_of_compliance=np.array(scene.tool.frames[scene.tool.hand]),
         sensors=sensors or SensorSettings(), filter_wrench=False, stop_when=last.done or scene.goal,
+        make_drive=drive_maker(robot),
     )  # fmt: skip
     rngs = [np.random.default_rng([seed, slot, attempt]) for slot in slots]
     told = progress_callback(watch, duration_s)

@@ -15,6 +15,9 @@ from skillframe.world.convert import held
 from skillframe.world.placement import check_quantities
 from skillframe.world.plant import Draws
 
+VERBS = sorted(name for name in (*vars(Drive), *Drive.__annotations__) if not name.startswith("_"))
+"""What a drive must have."""
+
 
 def chosen_drive(skill: Skill, setup: Setup, draws: Draws, rngs: Sequence[np.random.Generator]) -> tuple[Skill, Drive]:
     """The drive of len(rngs) trials, at their starts, and the skill as that drive needs it.
@@ -29,6 +32,8 @@ def chosen_drive(skill: Skill, setup: Setup, draws: Draws, rngs: Sequence[np.ran
         InputError, SkillframeError: the robot cannot run so; as `skillframe.execution.executor.simulate`.
     """
     check_quantities(draws, setup.robot)
+    if setup.make_drive is not None or setup.robot.spec.other_drive:
+        return skill, _foreign(setup, draws, rngs)
     if held(setup.robot, setup.scene) or np.ndim(setup.center_of_compliance) > 1:
         from skillframe.execution.drives.arms import ArmsDrive
 
@@ -48,6 +53,20 @@ def chosen_drive(skill: Skill, setup: Setup, draws: Draws, rngs: Sequence[np.ran
     from skillframe.execution.drives.torque import OneArm, TorqueDrive
 
     return skill, TorqueDrive(setup, OneArm(setup, draws, rngs))
+
+
+def _foreign(setup: Setup, draws: Draws, rngs: Sequence[np.random.Generator]) -> Drive:
+    """The drive that a plug-in brings."""
+    name = setup.robot.spec.other_drive
+    where = f"robot {setup.robot.spec.name}: drive"
+    if setup.make_drive is None:
+        raise InputError(where, f"{name!r} is a plug-in's", "hand its `make` to the set-up, as `prepare` does")
+    drive: Drive = setup.make_drive(setup, draws, rngs)
+    lacking = [verb for verb in VERBS if not hasattr(drive, verb)]
+    if lacking:
+        text = f"is made as a {type(drive).__name__}, which is no drive: it lacks {', '.join(lacking)}"
+        raise InputError(where, text, "tell its author")
+    return drive
 
 
 def require_arms(setup: Setup) -> None:

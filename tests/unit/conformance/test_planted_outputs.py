@@ -10,15 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from skillframe.conformance import check_drive, check_exporter, check_robot, check_score, check_section
+from skillframe.conformance import check_exporter, check_robot, check_score, check_section
 from skillframe.errors import InputError
 from skillframe.execution.trace import Trace
 from skillframe.extend.records import (
-    DriveType,
     ExporterType,
     Grid,
     Illustration,
-    Lazy,
     RobotType,
     ScoreType,
     SectionType,
@@ -254,26 +252,6 @@ def test_a_robot_that_cannot_bear_its_own_weight_is_named(robot):
 @pytest.mark.parametrize("name", ["free_tool", "panda", "dual_panda", "hiab_xs031"])
 def test_every_shipped_robot_passes(name):
     assert check_robot(registry().robot(name)) == []
-
-
-# -- drives
-
-
-@pytest.mark.parametrize(
-    ("make", "said"),
-    [
-        (Lazy("skillframe.no_such_module:Drive"), "raised ModuleNotFoundError"),
-        (Lazy("skillframe.skill:no_such_name"), "raised AttributeError"),
-        (Lazy("skillframe.skill:__name__"), "which cannot be called"),
-        (None, "which cannot be called"),
-    ],
-)
-def test_a_drive_that_nothing_makes_is_named(make, said):
-    assert said in "\n".join(check_drive(DriveType(name="mine", summary="a drive", make=make)))
-
-
-def test_a_drive_that_something_makes_passes():
-    assert check_drive(DriveType(name="mine", summary="a drive", make=Lazy("skillframe.skill:Skill"))) == []
 
 
 # -- sections

@@ -1,0 +1,74 @@
+"""A drive that a plug-in brings, named in robot.toml, drives the robot in a run and in a recording."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from skillframe.cli.main import run
+from skillframe.errors import InputError, UnknownName
+from skillframe.execution.drives import choose
+from skillframe.execution.executor import Setup, simulate
+from skillframe.execution.prepare import drive_maker, load_robot_model, load_world
+from skillframe.robot.spec import robot_folder
+from skillframe.testing import HoldSkill
+
+CODE = """
+from skillframe import hookimpl
+from skillframe.extend.records import DriveType
+
+skillframe_contract = "0.2"
+
+
+def make(setup, draws, rngs):
+    from skillframe.execution.drives.torque import OneArm, TorqueDrive
+
+    return TorqueDrive(setup, OneArm(setup, draws, rngs))
+
+
+@hookimpl
+def skillframe_drives():
+    yield DriveType(name="bus", summary="torques over a bus", contract="0.2", make=make)
+"""
+
+
+@pytest.fixture
+def robot(tmp_path, install):
+    """A panda whose robot.toml names the drive of a plug-in."""
+    install("bus_plugin", CODE)
+    folder = tmp_path / "panda_on_a_bus"
+    shutil.copytree(robot_folder("panda"), folder)
+    text = (folder / "robot.toml").read_text(encoding="utf-8")
+    (folder / "robot.toml").write_text(text + '\n[drive]\nkind = "bus"\n', encoding="utf-8")
+    return folder
+
+
+def test_the_drive_of_a_plugin_gives_the_same_run_as_the_one_that_it_wraps(robot):
+    def held(model):
+        setup = Setup(robot=model, scene=load_world("free", {}), make_drive=drive_maker(model))
+        return simulate(HoldSkill(duration=0.05), setup, {}, [np.random.default_rng(0)], trace_hz=1000.0)
+
+    own, other = held(load_robot_model("panda")), held(load_robot_model(str(robot)))
+    assert drive_maker(load_robot_model("panda")) is None and drive_maker(load_robot_model(str(robot))) is not None
+    np.testing.assert_array_equal(own.traces[0].position, other.traces[0].position)
+
+
+def test_an_unknown_drive_is_named_when_the_robot_is_loaded(robot):
+    text = (robot / "robot.toml").read_text(encoding="utf-8")
+    (robot / "robot.toml").write_text(text.replace('kind = "bus"', 'kind = "buss"'), encoding="utf-8")
+    with pytest.raises(UnknownName, match="'buss'; did you mean 'bus'"):
+        load_robot_model(str(robot))
+
+
+def test_a_set_up_without_the_maker_of_a_plugin_s_drive_is_refused(robot):
+    setup = Setup(robot=load_robot_model(str(robot)), scene=load_world("free", {}))
+    with pytest.raises(InputError, match="'bus' is a plug-in's; hand its `make` to the set-up"):
+        simulate(HoldSkill(duration=0.05), setup, {}, [np.random.default_rng(0)])
+
+
+def test_a_recording_is_driven_by_it(robot, tmp_path, capsys, monkeypatch):
+    made, own = [], choose._foreign
+    monkeypatch.setattr(choose, "_foreign", lambda *given: made.append(1) or own(*given))
+    words = ["demonstration", "record", "--world", "free", "--robot", str(robot), "--out", str(tmp_path / "demo.npz")]
+    assert run(words) == 0, capsys.readouterr().err
+    assert made
