@@ -10,6 +10,7 @@ from skillframe.errors import InputError, UnknownName
 from skillframe.execution.drives import choose
 from skillframe.execution.executor import Setup, simulate
 from skillframe.execution.prepare import drive_maker, load_robot_model, load_world
+from skillframe.extend.registry import registry
 from skillframe.robot.spec import robot_folder
 from skillframe.testing import HoldSkill
 
@@ -36,11 +37,13 @@ def skillframe_drives():
 def robot(tmp_path, install):
     """A panda whose robot.toml names the drive of a plug-in."""
     install("bus_plugin", CODE)
+    registry.cache_clear()
     folder = tmp_path / "panda_on_a_bus"
     shutil.copytree(robot_folder("panda"), folder)
     text = (folder / "robot.toml").read_text(encoding="utf-8")
     (folder / "robot.toml").write_text(text + '\n[drive]\nkind = "bus"\n', encoding="utf-8")
-    return folder
+    yield folder
+    registry.cache_clear()
 
 
 def test_the_drive_of_a_plugin_gives_the_same_run_as_the_one_that_it_wraps(robot):
