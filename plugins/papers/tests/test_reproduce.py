@@ -21,7 +21,7 @@ from skillframe_papers.runner import Outcome
 from skillframe.cli.main import run
 from skillframe.cli.output import PAGE_WIDTH
 from skillframe.extend.records import Illustration, RowResult, RowType
-from skillframe.extend.registry import Plugin, Registry
+from skillframe.extend.registry import Plugin, Registry, registry
 
 PLUGIN = """
     import os, pathlib, time
@@ -83,6 +83,20 @@ def reproduce(*words):
     return subprocess.run(
         [sys.executable, "-m", "skillframe.cli.main", "reproduce", *map(str, words)], capture_output=True, text=True
     )
+
+
+@pytest.mark.parametrize(
+    "change", [{"head": None}, {"values": {"a": "0.1"}}, {"wall_s": [1]}, {"ours": "0.2"}, {"cpu_s": float("inf")}]
+)
+def test_a_kept_row_that_somebody_changed_is_computed_again(tmp_path, change):
+    job = jobs_of(registry(), ["1"], {}, seed=0, quick=True)[0]
+    result = RowResult(ours="0.1", values={"a": 0.1}, head=("a", "b"), rows=(("1", "2"),))
+    store.keep(tmp_path, store.entry(registry().row("1"), job, result, 1.0, 1.0))
+    found = store.kept(tmp_path, job)
+    assert found["ours"] == "0.1" and "sum" not in found
+    path = store.path_of(tmp_path, "1")
+    path.write_text(json.dumps({**json.loads(path.read_text(encoding="utf-8")), **change}), encoding="utf-8")
+    assert store.kept(tmp_path, job) is None
 
 
 def test_a_row_is_computed_shown_and_kept_and_computed_once(rows, tmp_path):

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,7 +17,7 @@ from skillframe.files import write_whole
 from skillframe.files.documents import read_json
 from skillframe_papers.jobs import Job
 
-ROWS, TABLE = "rows", "reproduce.json"
+ROWS, TABLE, SUM = "rows", "reproduce.json", "sum"
 
 
 def entry(row: RowType, job: Job, result: RowResult, wall_s: float, cpu_s: float) -> dict[str, Any]:
@@ -49,8 +50,8 @@ def verdict(row: RowType, result: RowResult) -> str:
 
 
 def keep(folder: Path, found: Mapping[str, Any]) -> None:
-    """Write one row's file, whole or not at all."""
-    write_whole(path_of(folder, found["row"]), _text(found))
+    """Write one row's file, whole or not at all, with a checksum of what it says."""
+    write_whole(path_of(folder, found["row"]), _text({**found, SUM: _sum(found)}))
 
 
 def path_of(folder: Path, row: str) -> Path:
@@ -59,12 +60,15 @@ def path_of(folder: Path, row: str) -> Path:
 
 
 def kept(folder: Path, job: Job) -> dict[str, Any] | None:
-    """A row computed earlier by an equal job, or None; one that an older version kept without `cpu_s` is none."""
+    """A row computed earlier by an equal job, or None. A file that is not as `keep` wrote it is none."""
     try:
         found = read_json(path_of(folder, job.row), "compute the row again")
     except InputError:
         return None
-    return found if isinstance(found, dict) and found.get("key") == job.key and "cpu_s" in found else None
+    if not isinstance(found, dict) or found.get("key") != job.key:
+        return None
+    written = found.pop(SUM, None)
+    return found if written == _sum(found) else None
 
 
 def write_table(folder: Path, entries: Sequence[Mapping[str, Any]]) -> None:
@@ -79,3 +83,8 @@ def table(entries: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 def _text(value: Any) -> bytes:
     return (json.dumps(value, indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False) + "\n").encode()
+
+
+def _sum(found: Mapping[str, Any]) -> str:
+    """Of a row as plain values; damage may have put in what `keep` never writes."""
+    return hashlib.sha256(json.dumps(found, sort_keys=True).encode()).hexdigest()[:16]
