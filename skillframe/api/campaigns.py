@@ -16,9 +16,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.api.inputs import File, Robot
+from skillframe.api.inputs import File
 from skillframe.api.learning import LearnedSkill, Skills, skill_of
 from skillframe.api.running import SingleRun
+from skillframe.api.tasks import Robot
 from skillframe.campaign import evaluate
 from skillframe.campaign.folder import campaign_hash, load, prepare
 from skillframe.campaign.replay import pick_label

@@ -7,18 +7,20 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from skillframe.api.inputs import Demonstrations, File, Robot, Settings, World, demonstrations_of, robot_of, scene_of
+from skillframe.api.inputs import Demonstrations, File, demonstrations_of
 from skillframe.conditioning.audit import audit, compared
 from skillframe.demonstration.record import Demonstration
 from skillframe.document import file, source
 from skillframe.errors import InputError, SkillframeWarning
-from skillframe.execution.prepare import prepare
 from skillframe.extend.records import Document, Illustration, LearnOptions, SkillType
 from skillframe.extend.registry import registry
 from skillframe.files import write_whole
 from skillframe.skill import Skill
+
+if TYPE_CHECKING:  # what needs no simulator learns
+    from skillframe.api.tasks import Robot, Settings, World
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
@@ -112,6 +114,9 @@ class LearnedSkill:
             InputError: the skill says where it goes, and that is outside the robot's workspace.
             UnknownName: no such world, robot, frame or setting.
         """
+        from skillframe.api.tasks import robot_of, scene_of
+        from skillframe.execution.prepare import prepare
+
         scene, _ = scene_of(world, set, depth=2)
         return prepare(robot_of(robot), scene, self.document, coc)[0]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from skillframe.api.inputs import Robot, Settings, World, robot_of, scene_of
+from skillframe.api.tasks import Robot, Settings, World, robot_of, scene_of
 from skillframe.errors import InputError, UnknownName
 from skillframe.robot.model import RobotModel
 from skillframe.teaching import sessions

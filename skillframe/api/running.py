@@ -11,8 +11,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from skillframe.api.inputs import File, Robot, Settings, World, robot_of, scene_of
+from skillframe.api.inputs import File
 from skillframe.api.learning import LearnedSkill, Skills, skill_of
+from skillframe.api.tasks import Robot, Settings, World, robot_of, scene_of
 from skillframe.demonstration.record import resolve_point
 from skillframe.errors import InputError, SkillframeError
 from skillframe.execution.arms import ArmsResult

@@ -86,8 +86,8 @@ def command(
       skillframe demonstration record --world pallets --robot hiab_xs031 --teacher teleoperation --delay 0.15 \\
         --angle -40 --count 2 --out push.npz
     """
-    from skillframe.api.inputs import robot_of, scene_of
     from skillframe.api.recording import record
+    from skillframe.api.tasks import robot_of, scene_of
     from skillframe.config import parse_setting
     from skillframe.extend.reading import check_writable
 

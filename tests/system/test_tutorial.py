@@ -45,7 +45,7 @@ def test_the_commands_of_the_tutorial_print_what_it_shows(tmp_path, monkeypatch,
 @pytest.mark.needs_plugins
 def test_the_tilt_at_which_the_tutorial_fails_does_fail(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    tilt = re.search(r"with `--set (fixture\.tilt_y=[\d.]+)`", TYPED)[1]
+    tilt = re.search(r"[Ww]ith `--set (fixture\.tilt_y=[\d.]+)`", TYPED)[1]
     record, _, learn, _, attempt, _ = COMMANDS
     assert (run(record), run(learn)) == (0, 0)
     assert run([*attempt, "--set", tilt]) == 1

@@ -154,7 +154,7 @@ def test_the_quickstart_works_in_an_empty_folder_from_wheels_alone(typed, tmp_pa
 
 
 def test_the_installed_package_finds_its_robots_and_its_fmus(typed):
-    for words, names in ((["robots"], {"panda", "hiab_xs031"}), (["fmu"], {"hydraulic_cylinder"})):
-        code, said, told = typed("-m", "skillframe.cli.main", *words, "list", "--json")
+    for words, names in ((["robots"], ["panda", "hiab_xs031"]), (["fmu"], ["hydraulic_cylinder", "electric_servo"])):
+        code, said, told = typed("-m", "skillframe.cli.main", *words, "list")  # FMUs, built or not
         assert code == 0, told
-        assert names <= {row["name"] for row in json.loads(said)}
+        assert all(name in said for name in names)

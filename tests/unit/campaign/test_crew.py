@@ -9,6 +9,7 @@ from pathlib import Path
 import campaign_fakes as fakes
 import pytest
 
+import skillframe
 from skillframe.campaign.crew import Crew, SchedulerError
 from skillframe.campaign.identity import Identity, compared, identity, needed_plugins
 from skillframe.campaign.spec import CampaignSpec
@@ -176,5 +177,5 @@ def test_of_two_workers_the_one_without_the_plugin_gets_no_work(campaign, tmp_pa
             process.wait(timeout=20)
     assert (out / "results.csv").read_bytes() == (same / "results.csv").read_bytes()
     notes = [note for note in told if note]
-    words = ("gets no work", "plug-in skillframe-lmc absent there, 0.1.0 here")
+    words = ("gets no work", f"plug-in skillframe-lmc absent there, {skillframe.__version__} here")
     assert any(all(part in note for part in words) for note in notes), notes
