@@ -28,7 +28,7 @@ from skillframe.frames import Float, Pose
 from skillframe.machine.checks.figures import require_figures
 from skillframe.robot.kinematics import UnreachablePose, inverse_kinematics
 from skillframe.robot.model import RobotModel, load_model
-from skillframe.robot.spec import RobotSpec, load_robot
+from skillframe.robot.spec import OWN_DRIVES, RobotSpec, load_robot
 from skillframe.skill import Skill
 from skillframe.world.placement import start_poses
 from skillframe.world.quantities import QUANTITIES, UNITS
@@ -87,11 +87,12 @@ def load_robot_model(robot: str | Path | RobotSpec) -> RobotModel:
     """
     spec = robot if isinstance(robot, RobotSpec) else load_robot(robot)
     spec.require_simulated()
-    if spec.other_drive:
-        registry().drive(spec.other_drive)
-    elif spec.servo:
+    if (name := spec.other_drive) and name not in registry().names("drive"):
+        known = [*OWN_DRIVES, *registry().names("drive")]
+        raise InputError(f"{spec.folder / 'robot.toml'}: drive.kind", str(UnknownName("drive", name, known)))
+    if spec.servo:
         require_servos(spec)
-    else:
+    elif not name:
         require_figures(spec)
     return load_model(spec)
 

@@ -302,7 +302,8 @@ def _check_machine(declared: RobotFile, where: str) -> None:
         for key, problem, fix in impossible(declared.actuation, declared.sensors, declared.gains):
             raise InputError(f"{where}: {key}", problem, fix)
     elif (declared.sensors, declared.gains) != (MachineNoise(), Gains()):
-        none = f"its drive is {kind!r}" if declared.actuation else "there is no [[actuation]]"
+        what = "actuators are servos" if kind == "servo" else f"drive is {kind!r}"
+        none = f"its {what}" if declared.actuation else "there is no [[actuation]]"
         text = f"[sensors] and [gains] are those of a machine with actuators, and {none}"
         raise InputError(where, text, "leave them out; a wrist sensor's noise is varied as `sensor.*` in a campaign")
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from skillframe.cli.main import run
-from skillframe.errors import InputError, UnknownName
+from skillframe.errors import InputError
 from skillframe.execution.drives import choose
 from skillframe.execution.executor import Setup, simulate
 from skillframe.execution.prepare import drive_maker, load_robot_model, load_world
@@ -59,7 +59,7 @@ def test_the_drive_of_a_plugin_gives_the_same_run_as_the_one_that_it_wraps(robot
 def test_an_unknown_drive_is_named_when_the_robot_is_loaded(robot):
     text = (robot / "robot.toml").read_text(encoding="utf-8")
     (robot / "robot.toml").write_text(text.replace('kind = "bus"', 'kind = "buss"'), encoding="utf-8")
-    with pytest.raises(UnknownName, match="'buss'; did you mean 'bus'"):
+    with pytest.raises(InputError, match="'buss'; did you mean 'bus'"):
         load_robot_model(str(robot))
 
 

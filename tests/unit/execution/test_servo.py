@@ -258,7 +258,7 @@ def test_without_a_kind_actuators_are_cylinders_and_what_they_lack_names_the_cur
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
-        ('kind = "servo"', 'kind = "servos"', "servos"),
+        ('kind = "servo"', 'kind = "servos"', r"drive\.kind: unknown drive 'servos'; did you mean 'servo'"),
         ("[drive]", "[gains]\nbody = 2.0\n[drive]", r"\[sensors\] and \[gains\] .* its actuators are servos"),
         ("[drive]", '[[loop]]\nframe_a = "a"\nframe_b = "b"\n[drive]', "servos drive one open arm"),
     ],
@@ -266,7 +266,7 @@ def test_without_a_kind_actuators_are_cylinders_and_what_they_lack_names_the_cur
 def test_a_drive_that_cannot_be_meant_is_refused(tmp_path, old, new, sentence):
     text = (robot_names()["panda_servo"] / "robot.toml").read_text().replace(old, new, 1)
     with pytest.raises(InputError, match=sentence):
-        load_robot(written(tmp_path, text))
+        load_robot_model(str(written(tmp_path, text)))
 
 
 def test_a_kind_without_actuators_is_refused(tmp_path):
