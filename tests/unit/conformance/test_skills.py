@@ -122,6 +122,7 @@ def refused(document):
     raise InputError("demonstration", "does not suit", "give another")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
