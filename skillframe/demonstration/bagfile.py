@@ -144,7 +144,7 @@ def read_topic(path: Path, bag: Any, topic: str, kind: str, notes: list[str]) ->
         messages = [bag.deserialize(raw, c.msgtype) for c, _, raw in bag.messages(connections)]
     if not messages:
         raise InputError(f"{path}: {topic}", "holds no messages", "choose another topic, or record it again")
-    if not all(hasattr(m, "header") for m in messages):
+    if not all(hasattr(getattr(m, "header", None), "stamp") for m in messages):
         raise InputError(f"{path}: {topic}", "holds messages without a header", "choose another topic")
     stamps = np.array([m.header.stamp.sec * 1_000_000_000 + m.header.stamp.nanosec for m in messages], dtype=np.int64)
     frame = str(messages[0].header.frame_id)
