@@ -162,7 +162,7 @@ def test_of_two_workers_the_one_without_the_plugin_gets_no_work(campaign, tmp_pa
         processes.append(subprocess.Popen(command, env=environment, **quiet))
 
     def join(progress):
-        if len(processes) == 2:  # it joins while the campaign runs
+        if len(processes) == 2 and progress.done:  # it joins while the other works, however slowly that one began
             begin([*worker, str(tmp_path / "b")], lacking)
         told.append(progress.note)
 
