@@ -146,7 +146,7 @@ def test_where_no_worker_may_work_the_campaign_stops_and_says_why():
 @pytest.mark.slow
 @pytest.mark.needs_plugins
 def test_of_two_workers_the_one_without_the_plugin_gets_no_work(campaign, tmp_path):
-    path = campaign()
+    path = campaign(trials=64)
     (path.parent / "a.skill.json").write_text('{"type": "lmc"}')
     out, same = fakes.start(path, tmp_path / "out"), fakes.start(path, tmp_path / "same")
     fakes.run(same, traces=0)
