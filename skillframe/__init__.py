@@ -12,8 +12,8 @@
     print(results)
     report(results, "peg.html")
 
-The method in seven files: `skillframe.demonstration.record`, the LMC plug-in's learner and runtime,
-`skillframe.skill`, `skillframe.control.controller`, `skillframe.world.scene`, `skillframe.execution.executor`.
+The method in seven files: `skillframe.demonstration.record`, the segmenter's emission, the LMC plug-in's learner and
+runtime, `skillframe.skill`, `skillframe.control.controller`, `skillframe.execution.executor`.
 Importing the package loads none of the scientific libraries.
 """
 

@@ -182,6 +182,18 @@ def test_contributing_says_what_every_room_is_for():
     assert said == FLOORS
 
 
+def test_seven_files_explain_the_method():
+    """Those that CONTRIBUTING names hold under 1,300 lines together, and each of the equations (1) to (5)."""
+    text = (ROOT / "CONTRIBUTING.md").read_text()
+    story = text[text.index("Read seven files") : text.index("What the loop steps")]
+    names = re.findall(r"`([\w/]+\.py)`", story)
+    texts = [(ROOT / name).read_text() for name in names]
+    assert len(names) == 7
+    assert sum(text.count("\n") for text in texts) < 1300
+    equation = r"^ .*[=~].*\({}\)"  # indented, with its number behind it
+    assert all(any(re.search(equation.format(n), text, re.M) for text in texts) for n in range(1, 6))
+
+
 def test_there_are_few_rooms():
     rooms = {top(p) for p in core_files()} - FREE
     assert len(rooms) <= MOST_ROOMS, f"{len(rooms)} rooms"

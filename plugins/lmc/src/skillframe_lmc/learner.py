@@ -3,7 +3,8 @@ r"""The flow of learning (Fig. 6 of the overview paper).
 First the pitch, then for translation and rotation alike
 
     moved at all?      no: held stiff
-    who moved it?      the environment: three-degree-of-freedom compliance, equation (3)       [work]
+    who moved it?      W = F_m . dx, or T_m . dbeta at the hand                     (3)        [work]
+                       the environment, if W > 0 prevails: three compliant degrees of freedom
     where to push?     intersection of the pyramids; may not exist                     [sectors, directions, heading]
     where to give?     principal axes of the motion that the push does not explain              [axes]
     how stiff?         zero along compliant axes, k elsewhere                                   [gains]

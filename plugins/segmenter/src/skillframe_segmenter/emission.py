@@ -1,18 +1,25 @@
-r"""How a phase moves: along its desired direction, as far as the contact lets it.
+r"""How a phase moves: along its desired direction, as far as the contact lets it. Equations (4) and (5).
 
-The contact normal is the contact direction a without the part along the motion, which is friction,
+The overview paper models phase rho of a demonstration as linear-Gaussian, driven by the interaction a, the wrench with
+a 1 at its end, and lets the interaction decide, too, when a phase gives way to another (its Fig. 9):
 
-    n = a - (a.u) u / max(|u|^2, 1/4),      M = I - n n^T,      u ~ N(M d_k, Sigma_k / eta)                   (1)
+    s_t+1 ~ N(A_rho s_t + B_rho a_t, Sigma_rho)                                                                (4)
+    p(rho_t+1 = j | rho_t = i, a_t) = softmax_j(w_ij . a_t)      in `transitions`                              (5)
 
-for translation and rotation alike. d_k is the desired direction of phase k, close to zero for a phase at rest. It is
-the papers' linear-Gaussian form: increments as state (A = I), and B acting on [vech(n n^T); 1] through one shared d_k,
-6 parameters instead of 42. A free B lets friction explain a slide, and then one phase explains everything (our
-finding); contact normals cannot. M depends on u, so (1) tests a direction, it does not simulate a motion.
+The number (5) and the softmax are ours; the paper prints the dependence. Here the state is the motion u of a window
+(A = I), and B acts on [vech(n n^T); 1] through one desired direction d_k, 6 parameters instead of 42:
+
+    n = a - (a.u) u / max(|u|^2, 1/4),      M = I - n n^T,      u ~ N(M d_k, Sigma_k / eta)                   (4')
+
+for translation and rotation alike. The contact normal n is the contact direction a without the part along the motion,
+which is friction. d_k is close to zero for a phase at rest. A free B lets friction explain a slide, and then one phase
+explains everything (our finding); contact normals cannot. M depends on u, so (4') tests a direction, it does not
+simulate a motion.
 
 Given responsibilities g, with N_k their sum, N the number of windows and m = 6,
 
     d_k = (sum g M + 0.01 N_k I)^-1 sum g M u,
-    S_k = (sum g e e^T + 2 m s I) / (N_k + 2 m) + s_0 I,   Sigma_k = (N_k S_k + (N/K) S) / (N_k + N/K)           (2)
+    S_k = (sum g e e^T + 2 m s I) / (N_k + 2 m) + s_0 I,   Sigma_k = (N_k S_k + (N/K) S) / (N_k + N/K)          (4'')
 
 with e = u - M d_k and S the mean of all S_k: shrinking halfway to it leaves no phase so wide that it swallows what the
 others do not want.
@@ -40,7 +47,7 @@ class Phases(NamedTuple):
 
 
 class Observed(NamedTuple):
-    """W windows ready for (1). Views of arrays whose last axis, in memory, is time: K is small, W is not.
+    """W windows ready for (4'). Views of arrays whose last axis, in memory, is time: K is small, W is not.
 
     Attributes:
         motion: (W, 6) u.
@@ -75,7 +82,7 @@ def _residuals(seen: Observed, direction: Float) -> Float:
 
 
 def log_likelihood(seen: Observed, phases: Phases, residual: Float | None = None) -> Float:
-    """Log density (W, K) of (1) with eta = 1. Residuals (K, 6, W) as `fitted` gives them, if they are at hand."""
+    """Log density (W, K) of (4') with eta = 1. Residuals (K, 6, W) as `fitted` gives them, if they are at hand."""
     lower = np.linalg.cholesky(phases.covariance)
     white = np.linalg.inv(lower) @ (_residuals(seen, phases.direction) if residual is None else residual)
     log_det = np.log(np.einsum("kii->ki", lower)).sum(-1)
@@ -85,12 +92,12 @@ def log_likelihood(seen: Observed, phases: Phases, residual: Float | None = None
 
 
 def fit(seen: Observed, weight: Float) -> Phases:
-    """Phases that (2) gives for responsibilities (W, K)."""
+    """Phases that (4'') gives for responsibilities (W, K)."""
     return fitted(seen, weight)[0]
 
 
 def fitted(seen: Observed, weight: Float) -> tuple[Phases, Float]:
-    """Phases that (2) gives for responsibilities (W, K), and what they leave of the motions: (K, 6, W)."""
+    """Phases that (4'') gives for responsibilities (W, K), and what they leave of the motions: (K, 6, W)."""
     direction = _directions(seen, weight)
     residual = _residuals(seen, direction)
     size = weight.sum(axis=0)

@@ -1,4 +1,4 @@
-r"""What makes a phase give way to the next: the contact wrench, p(j | i, phi_t) = softmax_j(w_ij . phi_t).
+r"""What makes a phase give way to the next: the contact wrench, p(j | i, phi_t) = softmax_j(w_ij . phi_t), (5).
 
 The wrench of the new window drives the transition into it (interaction-driven transitions: Hagos, Suomalainen, Kyrki,
 IROS 2018; the softmax per pair is the form of Kroemer et al. 2015). A phase keeps itself with logit 0, and
