@@ -22,8 +22,10 @@ Row = dict[str, Any]
 MEASURES = ("duration_s", "peak_force_n", "final_error_m", "final_error_rad")
 OUTCOME = ("success", "failure", *MEASURES)
 JUDGED_MEASURES = ("peak_force_filtered_n", "peak_torque_share", "peak_speed_share", "peak_force_10ms_n")
-JUDGED = (*JUDGED_MEASURES[:3], "ended_by", JUDGED_MEASURES[3])
-"""What came with version 0.2: what the estimate read, what motors were asked for, and what ended the trial."""
+ENDS = ("goal_reached", "ended_itself")
+"""The two halves of an end: the goal held, and the skill itself ended the trial."""
+JUDGED = (*JUDGED_MEASURES[:3], "ended_by", JUDGED_MEASURES[3], *ENDS)
+"""What came after version 0.1: what the estimate read, what motors were asked for, and what ended the trial."""
 EXTRA = ("status", "reason")
 SCORE = "score."
 """Begins the columns of scores."""
@@ -98,6 +100,7 @@ def dead_row(spec: CampaignSpec, skill: int, trial: int, failure: str) -> Row:
     """The row of a trial that left no outcome."""
     measures = {name: [math.nan] for name in (*MEASURES, *JUDGED_MEASURES, *score_columns(spec))}
     outcome = {"success": [False], "failure": [failure], "ended_by": ["lost"], **measures}
+    outcome |= {name: [False] for name in ENDS}
     return rows_of(spec, skill, (trial,), outcome)[0]
 
 
@@ -129,10 +132,13 @@ def cell(value: Any) -> str:
     return repr(value) if isinstance(value, float) else str(value)
 
 
-def differences(first: Row, second: Row) -> dict[str, tuple[Any, Any]]:
-    """Columns in which two rows are not bit-identical; two NaN are the same."""
-    names = [n for n in {**first, **second} if n != TRACE]
-    return {n: (first.get(n), second.get(n)) for n in names if not _same(first.get(n), second.get(n))}
+def differences(stored: Row, again: Row) -> dict[str, tuple[Any, Any]]:
+    """Columns of a stored row that are not bit-identical when it runs again; two NaN are the same.
+
+    Columns that the stored row lacks came with a later version.
+    """
+    names = [n for n in stored if n != TRACE]
+    return {n: (stored[n], again.get(n)) for n in names if not _same(stored[n], again.get(n))}
 
 
 def _same(a: Any, b: Any) -> bool:

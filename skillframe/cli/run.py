@@ -16,7 +16,10 @@ from skillframe.cli.numbers import POSITIVE, SEED
 from skillframe.cli.output import note, quiet_option
 
 LONGEST_S, RATE_HZ = 20.0, 100.0
-JUDGED = ("peak_force_filtered_n", "peak_force_10ms_n", "peak_torque_share", "peak_speed_share", "ended_by")
+JUDGED = (
+    "peak_force_filtered_n", "peak_force_10ms_n", "peak_torque_share", "peak_speed_share", "ended_by", "goal_reached",
+    "ended_itself",
+)  # fmt: skip
 QUIET_S = 5.0  # a run that is over by then needs no progress
 
 

@@ -32,6 +32,7 @@ from skillframe.world.rates import ratio
 __all__ = ["QUANTITIES", "Loop", "Result", "Setup", "begin", "simulate"]
 
 RAMP_S = 0.05
+NOT_BY_ITSELF = "the goal is reached, but the skill had not ended by itself when the time was up"
 
 
 def simulate(
@@ -226,7 +227,7 @@ class Loop:
         success = self.goal & ~self.limited & (self.status != Status.FAILURE)
         failure = no_reasons(self.count)
         for i in np.flatnonzero(~success):
-            failure[i] = self.reason[i] if self.limited[i] else f"goal not reached: {self.reason[i]}"
+            failure[i] = self._failure(i)
         traces = None
         if self.recorder is not None:
             traces = [
@@ -237,14 +238,23 @@ class Loop:
             peak_force_n=self.contact.peak, final_error_m=self.errors[:, 0], final_error_rad=self.errors[:, 1],
             energy_j=self.energy, peak_force_filtered_n=self.filtered, peak_force_10ms_n=self.contact.mean,
             peak_torque_share=self.torque_share, peak_speed_share=self.speed_share, ended_by=self.ended_by,
-            traces=traces, interrupted=self.interrupted,
+            goal_reached=self.goal, ended_itself=self.ended_by == Ended.SKILL.value, traces=traces,
+            interrupted=self.interrupted,
         )  # fmt: skip
         return self.drive.outcome(result)
+
+    def _failure(self, i: int) -> str:
+        """Why trial i is no success, in words."""
+        if self.limited[i]:
+            return str(self.reason[i])
+        lacks = "the skill gave up, though the goal is reached" if self.goal[i] else "goal not reached"
+        return f"{lacks}: {self.reason[i]}"
 
     def _notes(self, i: int, success: bool) -> list[str]:
         """Sentences about what a result holds and leaves out."""
         mark = over(float(self.contact.peak[i]), self.setup.robot.spec.limits.force_n) if success else ""
-        return [*([mark] if mark else []), *self.drive.notes(i)]
+        late = NOT_BY_ITSELF if success and self.ended_by[i] == Ended.TIME else ""
+        return [*(text for text in (late, mark) if text), *self.drive.notes(i)]
 
     def _meta(self, i: int, success: bool, failure: str) -> dict[str, Any]:
         scene, actuators = self.setup.scene, list(self.drive.actuators)
@@ -257,6 +267,7 @@ class Loop:
             "peak_force_n": float(self.contact.peak[i]), "peak_force_filtered_n": float(self.filtered[i]),
             "peak_force_10ms_n": float(self.contact.mean[i]), "peak_torque_share": _known(self.torque_share[i]),
             "peak_speed_share": _known(self.speed_share[i]), "ended_by": self.ended_by[i],
+            "goal_reached": bool(self.goal[i]), "ended_itself": self.ended_by[i] == Ended.SKILL,
             "notes": self._notes(i, success), "final_error_m": float(self.errors[i, 0]),
             "final_error_rad": float(self.errors[i, 1]), "analytic": scene.analytic,
             "progress": None if scene.way is None else scene.way.told(_known(self.way[i])),

@@ -16,12 +16,16 @@ def _none() -> Float:
     return np.zeros(0)
 
 
+def _never() -> NDArray[np.bool_]:
+    return np.zeros(0, dtype=bool)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
     """What became of N trials; every array has N rows.
 
     Attributes:
-        success: the scene's goal was reached and no limit was broken.
+        success: the scene's goal was reached, no limit was broken, and the skill did not say that it failed.
         failure: why not, in words; "" for a success.
         status: of the skill at its end (`Status`).
         reason: why the trial ended, in words.
@@ -34,6 +38,8 @@ class Result:
         peak_torque_share: largest torque that the law asked a joint for, over its effort; NaN where none is given.
         peak_speed_share: largest speed of a joint over its velocity limit; NaN where none is given.
         ended_by: code of what ended the trial (`Ended`).
+        goal_reached: the scene's goal held when the trial ended, whatever ended it.
+        ended_itself: the skill itself ended the trial, not the clock, a limit or a fault.
         traces: one per trial if asked for.
         interrupted: Ctrl-C came before the end; what was running is closed as it stood.
     """
@@ -52,6 +58,8 @@ class Result:
     peak_torque_share: Float = field(default_factory=_none)
     peak_speed_share: Float = field(default_factory=_none)
     ended_by: Reasons = field(default_factory=lambda: no_reasons(0))
+    goal_reached: NDArray[np.bool_] = field(default_factory=_never)
+    ended_itself: NDArray[np.bool_] = field(default_factory=_never)
     traces: list[Trace] | None = None
     interrupted: bool = False
 

@@ -20,6 +20,7 @@ KINDS: dict[str, type | tuple[type, ...]] = {
     **dict.fromkeys(("peak_force_filtered_n", "peak_force_10ms_n"), (int, float)),
     **dict.fromkeys(("peak_torque_share", "peak_speed_share"), (int, float)),
     "ended_by": str,
+    **dict.fromkeys(("goal_reached", "ended_itself"), bool),
 }
 SIZES = {"box": 3, "sphere": 1, "capsule": 1, "cylinder": 2}
 """Numbers that the size of a drawn kind needs at least; a plane needs none."""

@@ -108,6 +108,35 @@ def test_a_skill_s_success_counts_only_at_the_goal():
     assert elsewhere.status[0] == Status.SUCCESS
 
 
+def both_halves(result):
+    return bool(result.goal_reached[0]), bool(result.ended_itself[0])
+
+
+def test_that_the_goal_is_reached_and_that_the_skill_ended_by_itself_are_told_apart():
+    """The goal of "free" holds everywhere, that of "valley" does not hold at the start."""
+    said = (0.01, Status.SUCCESS, "")
+    assert both_halves(run(Hold(VALLEY, end=said), setup(world="free"), duration_s=0.1)) == (True, True)
+    assert both_halves(run(Hold(VALLEY, end=said), setup(world="valley"), duration_s=0.1)) == (False, True)
+    assert both_halves(run(Hold(VALLEY), setup(world="free"), duration_s=0.05)) == (True, False)
+    assert both_halves(run(Hold(VALLEY), setup(world="valley"), duration_s=0.05)) == (False, False)
+
+
+def test_a_skill_that_gives_up_at_the_goal_is_not_said_to_have_missed_it():
+    result = run(Hold(VALLEY, end=(0.01, Status.FAILURE, "gave up")), setup(world="free"), duration_s=0.1)
+    assert result.failure[0] == "the skill gave up, though the goal is reached: gave up"
+    assert both_halves(result) == (True, True)
+
+
+def test_a_trace_says_both_halves_of_its_end_and_what_a_success_lacks():
+    def meta(**end):
+        return run(Hold(VALLEY, **end), setup(world="free"), duration_s=0.05, trace_hz=100).traces[0].meta
+
+    late, ended = meta(), meta(end=(0.01, Status.SUCCESS, ""))
+    assert (late["goal_reached"], late["ended_itself"]) == (True, False)
+    assert any("had not ended by itself" in text for text in late["notes"])
+    assert (ended["goal_reached"], ended["ended_itself"], ended["notes"]) == (True, True, [])
+
+
 def test_stop_when_ends_a_trial_as_done_and_the_others_go_on():
     def far_right(state):
         return state.tip.position[:, 0] > 0.0105
