@@ -15,6 +15,7 @@ from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.statistics import correction, holm
 from skillframe.campaign.store import FORMAT, VERSION
 from skillframe.campaign.validity import Basis, Validity, unbroken, validity_of
+from skillframe.campaign.verdict import judged
 from skillframe.errors import InputError
 from skillframe.execution.scores import about
 from skillframe.files import write_whole
@@ -129,6 +130,7 @@ def summarize(
     """
     opened = [session for session in sessions if "environment" in session]
     last = opened[-1] if opened else {}
+    figures = rates(spec, rows, complete)
     return {
         "format": FORMAT,
         "version": VERSION,
@@ -139,7 +141,8 @@ def summarize(
         "planned_trials": spec.trials,
         "complete": complete,
         "stopped_after_trial": stop_after,
-        "skills": rates(spec, rows, complete),
+        "skills": figures,
+        **_verdict(spec, figures, complete),
         "comparisons": comparisons(spec, rows, complete),
         **({"scores": scores(spec, rows, complete)} if spec.scores else {}),
         "wall_s": sum(s.get("wall_s", 0.0) for s in sessions),
@@ -148,6 +151,15 @@ def summarize(
         "sessions": len(opened),
         "hashes": dict(hashes),
     }
+
+
+def _verdict(spec: CampaignSpec, figures: Mapping[str, Mapping[str, Any]], complete: bool) -> dict[str, Any]:
+    """`verdict`, where the campaign requires something: of which skill, what, and what came of it."""
+    if spec.expect.rate is None:
+        return {}
+    label = spec.expect.skill or spec.labels[0]
+    word, why = judged(spec.expect.rate, figures[label], complete=complete)
+    return {"verdict": {"skill": label, "required_rate": spec.expect.rate, "verdict": word, "why": why}}
 
 
 def write_summary(folder: Path, summary: Mapping[str, Any]) -> None:

@@ -46,6 +46,9 @@ def _tell(folder: Path, spec: CampaignSpec, summary: dict[str, Any]) -> None:
         click.echo(f"  {_p_value(pair)}{pair['method']}")
     if summary["stopped_after_trial"] is not None:
         click.echo(f"stopped early after trial {summary['stopped_after_trial']}: the intervals are narrow enough")
+    if (found := summary.get("verdict")) is not None:
+        asked = f"{found['skill']} to succeed in at least {100.0 * found['required_rate']:g} % of trials"
+        click.echo(f"required: {asked}; verdict: {found['verdict']} ({found['why']})")
     click.echo(f"results: {folder / 'results.csv'}")
 
 
