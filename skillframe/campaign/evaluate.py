@@ -21,6 +21,7 @@ from skillframe.campaign.rows import EXTRA, JUDGED, OUTCOME, SCORE, TRACE, Chunk
 from skillframe.campaign.sampling import draws, trial_rngs
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.trouble import needed
+from skillframe.control.motors import unstated
 from skillframe.document.source import load_skill
 from skillframe.execution.executor import QUANTITIES, simulate
 from skillframe.execution.prepare import load_robot_model, load_world, prepare
@@ -83,7 +84,13 @@ def describe(spec: CampaignSpec) -> dict[str, Any]:
         "analytic_over": _analytic_over(spec),
         "fixture": [geom_json(g) for g in (*scene.fixture, *(g for part in scene.sprung for g in part.geoms))],
         "tool": tool,
+        **({"notes": notes} if (notes := _robot_notes(robot)) else {}),
     }  # fmt: skip
+
+
+def _robot_notes(robot: RobotModel) -> list[str]:
+    """Sentences on what the robot's description leaves out; what drives of machines and plug-ins say is theirs."""
+    return [] if robot.spec.hydraulic or robot.spec.other_drive else unstated(robot)
 
 
 def _analytic_over(spec: CampaignSpec) -> dict[str, dict[str, list[float]]]:

@@ -29,6 +29,7 @@ from skillframe.config import build, read_toml
 from skillframe.document.source import parse_source
 from skillframe.errors import InputError
 from skillframe.files import remove_temporary, sync_folder, write_whole
+from skillframe.files.documents import read_json
 from skillframe.robot.spec import robot_folder
 
 CAMPAIGN, SCENE = "campaign.toml", "scene.json"
@@ -93,6 +94,14 @@ def load(folder: Path, params: type | None = None) -> CampaignSpec:
             folder, "is not a campaign's folder", "start one with skillframe campaign run FILE.toml --out DIR"
         )
     return CampaignSpec.from_toml(folder / CAMPAIGN, params)
+
+
+def robot_notes(folder: Path) -> list[str]:
+    """Sentences on what the robot's description leaves out, as scene.json of a prepared folder holds them."""
+    path = folder / SCENE
+    told = read_json(path, f"start the campaign again, or remove {path}") if path.is_file() else {}
+    notes = told.get("notes") if isinstance(told, dict) else None
+    return [str(text) for text in notes] if isinstance(notes, list) else []
 
 
 def campaign_hash(spec: CampaignSpec) -> str:

@@ -16,15 +16,18 @@ import numpy as np
 
 from skillframe.campaign.sampling import draws
 from skillframe.campaign.spec import CampaignSpec
+from skillframe.execution.tracemeta import SHARE_JOINTS
 from skillframe.files.documents import shown
 
 Row = dict[str, Any]
 MEASURES = ("duration_s", "peak_force_n", "final_error_m", "final_error_rad")
 OUTCOME = ("success", "failure", *MEASURES)
-JUDGED_MEASURES = ("peak_force_filtered_n", "peak_torque_share", "peak_speed_share", "peak_force_10ms_n")
+JUDGED_MEASURES = (
+    "peak_force_filtered_n", "peak_torque_share", "peak_speed_share", "peak_force_10ms_n", "peak_range_share",
+)  # fmt: skip
 ENDS = ("goal_reached", "ended_itself")
 """The two halves of an end: the goal held, and the skill itself ended the trial."""
-JUDGED = (*JUDGED_MEASURES[:3], "ended_by", JUDGED_MEASURES[3], *ENDS)
+JUDGED = (*JUDGED_MEASURES[:3], "ended_by", *JUDGED_MEASURES[3:], *SHARE_JOINTS, *ENDS)
 """What came after version 0.1: what the estimate read, what motors were asked for, and what ended the trial."""
 EXTRA = ("status", "reason")
 SCORE = "score."

@@ -18,11 +18,12 @@ from skillframe.campaign.validity import Basis, Validity, unbroken, validity_of
 from skillframe.campaign.verdict import judged
 from skillframe.errors import InputError
 from skillframe.execution.scores import about
+from skillframe.execution.tracemeta import SHARES
 from skillframe.files import write_whole
 from skillframe.files.documents import read_json
 
 SUMMARY = "summary.json"
-PEAKS = ("peak_force_n", "peak_force_10ms_n", "peak_force_filtered_n", "peak_torque_share", "peak_speed_share")
+PEAKS = ("peak_force_n", "peak_force_10ms_n", "peak_force_filtered_n", *SHARES)
 
 
 def rates(spec: CampaignSpec, rows: Sequence[Row], complete: bool) -> dict[str, dict[str, Any]]:

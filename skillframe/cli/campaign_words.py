@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 def conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any], as_json: bool) -> int:
     """Tell the outcome of a campaign that has ended. Returns its exit code."""
+    from skillframe.campaign.folder import robot_notes
     from skillframe.campaign.summary import below_bar
     from skillframe.robot.guesses import guess_note
     from skillframe.robot.spec import load_robot
@@ -30,6 +31,8 @@ def conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any], as_json:
         _tell(folder, spec, summary)
     failed = any(skill["failures"] for skill in summary["skills"].values())
     if failed and (text := guess_note(load_robot(str(spec.folder / spec.robot)))):
+        note(f"note: {text}")
+    for text in robot_notes(folder):
         note(f"note: {text}")
     short = below_bar(spec, summary)
     if short:

@@ -16,10 +16,7 @@ from skillframe.cli.numbers import POSITIVE, SEED
 from skillframe.cli.output import note, quiet_option
 
 LONGEST_S, RATE_HZ = 20.0, 100.0
-JUDGED = (
-    "peak_force_filtered_n", "peak_force_10ms_n", "peak_torque_share", "peak_speed_share", "ended_by", "goal_reached",
-    "ended_itself",
-)  # fmt: skip
+FORCES = ("peak_force_filtered_n", "peak_force_10ms_n", "ended_by", "goal_reached", "ended_itself")
 QUIET_S = 5.0  # a run that is over by then needs no progress
 
 
@@ -108,12 +105,6 @@ def _hundredths(value: float) -> str:
     return f"{value:.2f}" if value >= 0.01 else "less than 0.01"
 
 
-def _shares(meta: dict[str, Any]) -> str:
-    """What the motors were asked for, of what they can give."""
-    parts = [("torque", meta["peak_torque_share"]), ("speed", meta["peak_speed_share"])]
-    return ", ".join(f"{what} at most {share:.0%} of its limit" for what, share in parts if share is not None)
-
-
 def _scene(meta: dict[str, Any]) -> str:
     """Who did it where, and how far it got, where the world can say that."""
     where, way = f"{meta['robot']} in {meta['world']}", meta["progress"]
@@ -124,17 +115,21 @@ def _scene(meta: dict[str, Any]) -> str:
 
 
 def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) -> None:
+    from skillframe.execution.tracemeta import SHARE_JOINTS, SHARES
+    from skillframe.reports.motors import said_of_motors
+
     keys = ["success", "failure", "reason", "duration_s", "peak_force_n", "final_error_m", "final_error_rad"]
     outcome = {key: _known(meta[key]) for key in keys}
-    judged = {key: _known(meta[key]) for key in JUDGED}
-    for text in meta.get("notes") or []:
+    judged = {key: _known(meta[key]) for key in (*FORCES, *SHARES, *SHARE_JOINTS)}
+    notes = list(meta.get("notes") or [])
+    for text in notes:
         note(f"note: {text}")
     if not any(files.values()):
         note("not saved; add --out run.npz")
     if as_json:
         named = {what: str(path) if path else None for what, path in files.items()}
         where = {"robot": meta["robot"], "world": meta["world"], "progress": meta["progress"]}
-        where["scores"] = meta.get("scores") or {}
+        where |= {"scores": meta.get("scores") or {}, "notes": notes}
         click.echo(json.dumps({**outcome, **judged, **where, **named}, sort_keys=True))
         return
     click.echo(f"success: {_scene(meta)}" if meta["success"] else f"failure: {meta['failure']}\n  {_scene(meta)}")
@@ -146,8 +141,8 @@ def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) ->
             f"{meta['peak_force_filtered_n']:.1f} N; {missed} mm and {turned} degrees from the goal"
         )
     click.echo(ended)
-    if meta["peak_torque_share"] is not None or meta["peak_speed_share"] is not None:
-        click.echo(f"  motors: {_shares(meta)}")
+    if motors := said_of_motors(meta):
+        click.echo(f"  motors: {', '.join(motors)}")
     for name, score in (meta.get("scores") or {}).items():
         figure = "none" if score["value"] is None else f"{score['value']:.4g} {score['unit']}"
         click.echo(f"  score {name}: {figure}")

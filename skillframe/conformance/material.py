@@ -96,7 +96,8 @@ def _outcome(success: bool, duration_s: float, force: float) -> dict[str, Any]:
         "success": success, "failure": "" if success else "stuck", "duration_s": duration_s, "peak_force_n": force,
         "final_error_m": 0.0005 if success else 0.04, "final_error_rad": 0.001, "peak_force_filtered_n": force,
         "peak_torque_share": 0.3, "peak_speed_share": 0.1, "ended_by": "skill",
-        "peak_force_10ms_n": force, "goal_reached": success, "ended_itself": True,
+        "peak_force_10ms_n": force, "peak_range_share": 0.6, "peak_torque_joint": "joint2",
+        "peak_speed_joint": "joint6", "peak_range_joint": "joint4", "goal_reached": success, "ended_itself": True,
     }  # fmt: skip
 
 

@@ -9,8 +9,11 @@ The law's torques (with gravity, which a motor has to carry as well) are held to
   as long; range: a joint of the arm pressed `RANGE_SLACK` into the end of its range for as long. Drives bear a peak of
   torque or speed for a moment; a tenth of a second is ten times an impact.
 
-Zero, or nothing, in a URDF's `effort` or `velocity` means that it is not given, and no limit; `silent` names such
+Zero, or nothing, in a URDF's `effort` or `velocity` means that it is not given, and no limit; `unstated` names such
 joints, so that a result can say so. A free-flying base has no motors.
+
+Of each limit the largest share used so far is kept, for the joint that used most: torque asked for over `effort`, speed
+over `velocity`, and of the range the distance from its middle over half of it: 0 in the middle, 1 at an end.
 """
 
 from __future__ import annotations
@@ -25,6 +28,7 @@ from skillframe.control.endings import Broken, Ended
 from skillframe.frames import Float
 from skillframe.robot.model import RobotModel
 from skillframe.robot.numbers import numbers
+from skillframe.robot.urdf import Joint
 
 RATE_PERSISTENCE = 20  # an impact keeps the limiter busy for 5 to 10 ms; twice that is a law gone wrong
 MOTOR_S, RANGE_SLACK = 0.1, 1e-3  # s; rad or m, more than rounding and noise, less than any use
@@ -38,6 +42,7 @@ class JointLimits(NamedTuple):
         sliding: (nv) prismatic joints.
         effort: (nv,) [N m or N]; velocity: (nv,) [rad/s or m/s].
         lower, upper: (nv,) [rad or m].
+        ranged: (nv,) 1 where the URDF gives the range, 0 where lower and upper are ours or there are none.
     """
 
     names: tuple[str, ...]
@@ -46,12 +51,7 @@ class JointLimits(NamedTuple):
     velocity: Float
     lower: Float
     upper: Float
-
-    @property
-    def silent(self) -> tuple[str, ...]:
-        """Joints whose effort or velocity the URDF does not give."""
-        unknown = np.isinf(self.effort) | np.isinf(self.velocity)
-        return tuple(name for name, missing in zip(self.names, unknown, strict=True) if name and missing)
+    ranged: Float
 
 
 def joint_limits(robot: RobotModel, engine: Any, arms: Sequence[NDArray[np.int64]] | None = None) -> list[JointLimits]:
@@ -67,26 +67,61 @@ def joint_limits(robot: RobotModel, engine: Any, arms: Sequence[NDArray[np.int64
     model, nv = robot.model, int(engine.nv)
     names, sliding = [""] * nv, [False] * nv
     effort, velocity, lower, upper = (np.full(nv, sign * np.inf) for sign in (1, 1, -1, 1))
+    ranged = np.zeros(nv)
     carrying = {int(j) for f in robot.tool_frames for j in model.supports[model.frames[f].parentJoint]}
     for index in range(1, model.njoints):
         joint, urdf = model.joints[index], robot.urdf.joints.get(model.names[index])
         if urdf is None or joint.nv != 1:
             continue
-        i, limit = int(engine.joint(model.names[index]).dofadr[0]), urdf.element.find("limit")
+        i, given = int(engine.joint(model.names[index]).dofadr[0]), _given(urdf)
         names[i], sliding[i] = model.names[index], urdf.type == "prismatic"
-        given = (numbers(limit, what, 1, (0.0,))[0] for what in ("effort", "velocity"))
-        effort[i], velocity[i] = (value if value > 0.0 else np.inf for value in given)
+        effort[i], velocity[i] = given.effort, given.velocity
         if joint.nq == 1 and index in carrying:
             lower[i], upper[i] = (end[joint.idx_q] for end in (model.lowerPositionLimit, model.upperPositionLimit))
+            ranged[i] = given.ranged
     if not any(names):
         return []
     chosen = [np.arange(nv)] if arms is None else arms
     return [
         JointLimits(tuple(names[i] for i in dofs), tuple(sliding[i] for i in dofs), *(
-            part[dofs] for part in (effort, velocity, lower, upper)
+            part[dofs] for part in (effort, velocity, lower, upper, ranged)
         ))
         for dofs in chosen
     ]  # fmt: skip
+
+
+class _Given(NamedTuple):
+    """What a URDF says of a joint: effort and velocity, infinite where not given, and whether it gives a range."""
+
+    effort: float
+    velocity: float
+    ranged: bool
+
+
+def _given(joint: Joint) -> _Given:
+    limit = joint.element.find("limit")
+    effort, velocity, lower, upper = (
+        numbers(limit, what, 1, (0.0,))[0] for what in ("effort", "velocity", "lower", "upper")
+    )
+    return _Given(effort if effort > 0.0 else np.inf, velocity if velocity > 0.0 else np.inf, lower < upper)
+
+
+def unstated(robot: RobotModel) -> list[str]:
+    """Sentences on joints whose effort, velocity or range the URDF does not give. None if it gives them all."""
+    model = robot.model
+    moving = [robot.urdf.joints.get(model.names[i]) for i in range(1, model.njoints) if model.joints[i].nv == 1]
+    given = {joint.name: (_given(joint), joint.type) for joint in moving if joint is not None}
+    motors = [name for name, (limits, _) in given.items() if np.isinf(limits.effort) or np.isinf(limits.velocity)]
+    ranges = [name for name, (limits, kind) in given.items() if not limits.ranged and kind != "continuous"]
+    said = (
+        (motors, "the URDF gives no effort or no velocity for {}; what it does not give counts as unlimited"),
+        (ranges, "the URDF gives no range for {}; it counts as free within +-2 pi rad or +-10 m"),
+    )
+    return [text.format(_few(names)) for names, text in said if names]
+
+
+def _few(names: list[str]) -> str:
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
 
 
 class Motors:
@@ -103,11 +138,12 @@ class Motors:
         self._limits, self._rate, self._dt = limits, rate, dt
         nv, turns = len(limits[0].names), count // len(limits)
         stacked = [np.tile([getattr(one, what) for one in limits], (turns, 1)) for what in JointLimits._fields[2:]]
-        self._effort, velocity, lower, upper = stacked
+        self._effort, velocity, lower, upper, ranged = stacked
         bounded = np.isfinite(lower) & np.isfinite(upper)
         lower, upper = np.where(bounded, lower, -1.0), np.where(bounded, upper, 1.0)
         self._middle = 0.5 * (lower + upper)
         half = np.where(bounded, 0.5 * (upper - lower) + RANGE_SLACK, np.inf)
+        self._whole = np.stack([self._effort, velocity, np.where(ranged > 0.0, half - RANGE_SLACK, np.inf)], axis=1)
         step = np.full((count, nv), np.inf if rate is None else rate * dt)
         self._most = np.concatenate([step, self._effort, velocity, half], axis=-1)
         self._now = np.zeros((count, 4 * nv))
@@ -189,22 +225,18 @@ class Motors:
         end = self._middle[i, joint] + np.copysign(most - RANGE_SLACK, self._now[i, 3 * nv + joint])
         return Broken(i, Ended.RANGE, f"joint range: {name} pressed against its end at {end:.3g} {unit} {spell}")
 
-    def silent(self) -> str:
-        """Whose motors count as unlimited, as a sentence, or ""."""
-        names = [name for one in self._limits for name in one.silent]
-        if not names:
-            return ""
-        few = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
-        return f"the URDF gives no effort or no velocity for {few}; what it does not give counts as unlimited"
+    def shares(self) -> tuple[Float, NDArray[np.object_]]:
+        """Largest shares so far of torque, speed and range (3, N), and the joints' names (3, N).
 
-    def shares(self) -> tuple[Float, Float]:
-        """(N,) largest torque asked for over effort so far, and largest speed over velocity. NaN where none is given.
-
-        The torque is what the law asks for, so that a share above 1 tells how much a motor was short of.
+        NaN and "" where no limit is given. The torque is what the law asks for, so that a share above 1 tells how much
+        a motor was short of.
         """
-        nv = self._effort.shape[1]
-        share = self._peak[:, nv : 3 * nv] / self._most[:, nv : 3 * nv]
-        known = np.isfinite(self._most[:, nv : 3 * nv])
-        share = np.where(known, share, -1.0)
-        torque, speed = share[:, :nv].max(-1), share[:, nv:].max(-1)
-        return np.where(torque < 0.0, np.nan, torque), np.where(speed < 0.0, np.nan, speed)
+        rows, _, nv = self._whole.shape
+        share = self._peak[:, nv:].reshape(rows, 3, nv) / self._whole
+        share[np.isinf(self._whole)] = -1.0
+        worst = np.argmax(share, axis=-1)
+        most = np.take_along_axis(share, worst[..., None], axis=-1)[..., 0]
+        names = np.array([one.names for one in self._limits], dtype=object)
+        joints = names[(np.arange(rows) % len(names))[:, None], worst]
+        known = most >= 0.0  # nor of a trial that diverged
+        return np.where(known, most, np.nan).T, np.where(known, joints, "").T

@@ -31,11 +31,16 @@ class Shares(NamedTuple):
         energy: (N,) work of the controller on the tool [J].
         torque: (N,) of the worst joint: what the law asked for, over the joint's effort; NaN where none is given.
         speed: (N,) of the worst joint: its speed over its velocity limit; NaN where none is given.
+        range: (N,) of the worst joint: its distance from the middle of its range over half the range; NaN where none
+            is given, None where a drive does not tell.
+        joints: (3, N) names of the worst joints of torque, speed and range; None where a drive does not tell.
     """
 
     energy: Float
     torque: Float
     speed: Float
+    range: Float | None = None
+    joints: NDArray[np.object_] | None = None
 
 
 class TrialRecorder(Protocol):

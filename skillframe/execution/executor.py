@@ -22,6 +22,7 @@ from skillframe.execution.drive import Drive
 from skillframe.execution.drives.choose import chosen_drive
 from skillframe.execution.result import Result
 from skillframe.execution.setup import Setup
+from skillframe.execution.tracemeta import SHARE_JOINTS, SHARES
 from skillframe.frames import Float
 from skillframe.handover import SLOW_TICKS, CommandCheck, Fault, asked, shown, unknown_end
 from skillframe.skill import Command, Observation, Skill, Status, no_reasons
@@ -106,7 +107,9 @@ class Loop:
         self.reason, self.status = no_reasons(count), np.zeros(count, dtype=np.int64)
         self.limited = np.zeros(count, dtype=bool)
         self.duration, self.ended_by = np.zeros(count), no_reasons(count)
-        self.filtered, self.torque_share, self.speed_share, self.way = (np.full(count, np.nan) for _ in range(4))
+        self.filtered, self.way = np.full(count, np.nan), np.full(count, np.nan)
+        self.shares = np.full((3, count), np.nan)
+        self.joints = np.full((3, count), "", dtype=object)  # of torque, speed and range, as the shares
         self.goal, self.errors, self.energy = np.zeros(count, dtype=bool), np.zeros((count, 2)), np.zeros(count)
         rate = setup.robot.spec.control.rate_hz
         self.recorder = None if trace_hz is None else drive.recording(ratio(rate, trace_hz, "control", "the trace"))
@@ -211,7 +214,11 @@ class Loop:
         self.duration[rows], self.limited[rows] = time, limit
         shares = self.drive.shares()
         self.energy[rows] = shares.energy[rows]
-        self.torque_share[rows], self.speed_share[rows] = shares.torque[rows], shares.speed[rows]
+        for kind, part in enumerate((shares.torque, shares.speed, shares.range)):
+            if part is not None:
+                self.shares[kind, rows] = part[rows]
+        if shares.joints is not None:
+            self.joints[:, rows] = shares.joints[:, rows]
         self.filtered[rows] = self.contact.estimate[rows]
         if limit:
             self.status[rows] = Status.FAILURE
@@ -237,9 +244,10 @@ class Loop:
             success=success, failure=failure, status=self.status, reason=self.reason, duration_s=self.duration,
             peak_force_n=self.contact.peak, final_error_m=self.errors[:, 0], final_error_rad=self.errors[:, 1],
             energy_j=self.energy, peak_force_filtered_n=self.filtered, peak_force_10ms_n=self.contact.mean,
-            peak_torque_share=self.torque_share, peak_speed_share=self.speed_share, ended_by=self.ended_by,
-            goal_reached=self.goal, ended_itself=self.ended_by == Ended.SKILL.value, traces=traces,
-            interrupted=self.interrupted,
+            ended_by=self.ended_by, **dict(zip(SHARES, self.shares, strict=True)),
+            **dict(zip(SHARE_JOINTS, self.joints, strict=True)),
+            goal_reached=self.goal, ended_itself=self.ended_by == Ended.SKILL.value,
+            traces=traces, interrupted=self.interrupted,
         )  # fmt: skip
         return self.drive.outcome(result)
 
@@ -265,8 +273,9 @@ class Loop:
             "hand": scene.tool.hand, "success": success, "failure": failure, "reason": str(self.reason[i]),
             "status": Status(int(self.status[i])).name, "duration_s": float(self.duration[i]),
             "peak_force_n": float(self.contact.peak[i]), "peak_force_filtered_n": float(self.filtered[i]),
-            "peak_force_10ms_n": float(self.contact.mean[i]), "peak_torque_share": _known(self.torque_share[i]),
-            "peak_speed_share": _known(self.speed_share[i]), "ended_by": self.ended_by[i],
+            "peak_force_10ms_n": float(self.contact.mean[i]), "ended_by": self.ended_by[i],
+            **{name: _known(share) for name, share in zip(SHARES, self.shares[:, i], strict=True)},
+            **dict(zip(SHARE_JOINTS, self.joints[:, i], strict=True)),
             "goal_reached": bool(self.goal[i]), "ended_itself": self.ended_by[i] == Ended.SKILL,
             "notes": self._notes(i, success), "final_error_m": float(self.errors[i, 0]),
             "final_error_rad": float(self.errors[i, 1]), "analytic": scene.analytic,

@@ -37,6 +37,9 @@ class Result:
         peak_force_10ms_n: largest mean of the true contact force over 10 ms, which is held to the limit.
         peak_torque_share: largest torque that the law asked a joint for, over its effort; NaN where none is given.
         peak_speed_share: largest speed of a joint over its velocity limit; NaN where none is given.
+        peak_range_share: largest distance of a joint from the middle of its range, over half the range: 0 in the
+            middle, 1 at an end; NaN where none is given.
+        peak_torque_joint, peak_speed_joint, peak_range_joint: names of the joints that these are of; "" where unknown.
         ended_by: code of what ended the trial (`Ended`).
         goal_reached: the scene's goal held when the trial ended, whatever ended it.
         ended_itself: the skill itself ended the trial, not the clock, a limit or a fault.
@@ -57,6 +60,10 @@ class Result:
     peak_force_10ms_n: Float = field(default_factory=_none)
     peak_torque_share: Float = field(default_factory=_none)
     peak_speed_share: Float = field(default_factory=_none)
+    peak_range_share: Float = field(default_factory=_none)
+    peak_torque_joint: Reasons = field(default_factory=lambda: no_reasons(0))
+    peak_speed_joint: Reasons = field(default_factory=lambda: no_reasons(0))
+    peak_range_joint: Reasons = field(default_factory=lambda: no_reasons(0))
     ended_by: Reasons = field(default_factory=lambda: no_reasons(0))
     goal_reached: NDArray[np.bool_] = field(default_factory=_never)
     ended_itself: NDArray[np.bool_] = field(default_factory=_never)

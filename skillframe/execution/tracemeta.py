@@ -12,14 +12,17 @@ from typing import Any
 
 from skillframe.errors import InputError
 
+SHARES = ("peak_torque_share", "peak_speed_share", "peak_range_share")
+SHARE_JOINTS = ("peak_torque_joint", "peak_speed_joint", "peak_range_joint")
+"""Names of what joints used of their limits at most, and of the joints."""
 LARGEST = 1e100  # beyond it squares overflow
 KINDS: dict[str, type | tuple[type, ...]] = {
     **dict.fromkeys(("analytic", "draws", "frames", "limits", "params", "progress", "scores"), dict),
     **dict.fromkeys(("actuators", "bodies", "center_of_compliance", "events", "notes"), list),
     **dict.fromkeys(("duration_s", "peak_force_n", "final_error_m", "final_error_rad"), (int, float)),
     **dict.fromkeys(("peak_force_filtered_n", "peak_force_10ms_n"), (int, float)),
-    **dict.fromkeys(("peak_torque_share", "peak_speed_share"), (int, float)),
-    "ended_by": str,
+    **dict.fromkeys(SHARES, (int, float)),
+    **dict.fromkeys(("ended_by", *SHARE_JOINTS), str),
     **dict.fromkeys(("goal_reached", "ended_itself"), bool),
 }
 SIZES = {"box": 3, "sphere": 1, "capsule": 1, "cylinder": 2}

@@ -13,7 +13,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,6 +21,7 @@ from skillframe.campaign.rows import JUDGED, OUTCOME, SCORE
 from skillframe.campaign.statistics import Interval, correction, holm
 from skillframe.campaign.validity import Basis, Plan, Validity, unbroken, validity_of
 from skillframe.errors import InputError
+from skillframe.execution.tracemeta import SHARE_JOINTS
 from skillframe.reports.markup import percent
 
 REQUIRED = ("trial", "skill", "success")
@@ -30,13 +31,19 @@ TRUTH = {"1": True, "true": True, "1.0": True, "0": False, "false": False, "0.0"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResultRow:
-    """One trial of one skill. `values` holds every other numeric column, NaN where it is empty or text."""
+    """One trial of one skill.
+
+    Attributes:
+        values: every other column as a number, NaN where it is empty or text.
+        words: the columns that name joints.
+    """
 
     trial: int
     skill: str
     success: bool
     failure: str
     values: Mapping[str, float]
+    words: Mapping[str, str] = field(default_factory=dict)
 
 
 class Rate(NamedTuple):
@@ -224,8 +231,9 @@ def _row(path: Path, number: int, cells: dict[str, str]) -> ResultRow:
         raise InputError(f"{path}: row {number}: success", f"is {cells['success']!r}", "give 1 or 0")
     values = {key: _float(cell) for key, cell in cells.items() if key not in ("trial", "skill", "success", "failure")}
     return ResultRow(
-        trial=trial, skill=cells["skill"], success=success, failure=cells.get("failure", ""), values=values
-    )
+        trial=trial, skill=cells["skill"], success=success, failure=cells.get("failure", ""), values=values,
+        words={key: cells[key] for key in SHARE_JOINTS if key in cells},
+    )  # fmt: skip
 
 
 def _float(cell: str) -> float:

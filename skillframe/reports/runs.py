@@ -8,6 +8,7 @@ from typing import Any
 
 from skillframe.reports.machine import machine_plots
 from skillframe.reports.markup import Markup, data_uri, figure, join, json_script, note, number, table, tag
+from skillframe.reports.motors import said_of_motors
 from skillframe.reports.plots import demonstration_plots, events_of, run_plots
 from skillframe.reports.quantities import quantity
 from skillframe.reports.raster import Image, draw, png
@@ -78,7 +79,7 @@ def _story(meta: Mapping[str, Any]) -> str:
     ):
         if isinstance(meta.get(key), int | float):
             facts.append(f"{what} {_figure(float(meta[key]) * factor)} {unit}")
-    facts += said_of(meta)
+    facts += [*said_of_motors(meta), *said_of(meta)]
     drawn = [_draw_text(name, value) for name, value in sorted((meta.get("draws") or {}).items())]
     how = "Set for this run" if meta.get("trial") is None else "Drawn for this trial"
     return "; ".join(f for f in facts if f) + "." + (f" {how}: {', '.join(drawn)}." if drawn else "")

@@ -12,6 +12,7 @@ from skillframe.campaign.validity import Basis
 from skillframe.frames import Float
 from skillframe.reports.convergence import MOST_CURVES, cell_map, influence, rate_curves
 from skillframe.reports.markup import Markup, figure, join, note, number, percent, table, tag
+from skillframe.reports.motors import motors_table
 from skillframe.reports.quantities import quantity
 from skillframe.reports.results import Results
 from skillframe.reports.scores import scores_table
@@ -36,6 +37,7 @@ def trust_section(chapter: Chapter) -> Markup:
             _comparison(results),
             _failures(results, chapter.folder),
             _forces(chapter, results),
+            motors_table(chapter, results),
             scores_table(chapter, results),
         ]
     )

@@ -184,8 +184,15 @@ class ArmsDrive:
 
     def shares(self) -> Shares:
         """Energy of all arms, shares of the worst joint of any arm."""
-        energy, torque, speed = (part.reshape(self.shape) for part in self.rows.shares())
-        return Shares(energy.sum(-1), torque.max(-1), speed.max(-1))
+        found = self.rows.shares()
+        assert found.range is not None
+        assert found.joints is not None
+        parts = np.stack([found.torque, found.speed, found.range]).reshape(3, *self.shape)
+        worst = np.argmax(np.where(np.isnan(parts), -1.0, parts), axis=-1)[..., None]
+        (torque, speed, place), joints = (
+            np.take_along_axis(part, worst, axis=-1)[..., 0] for part in (parts, found.joints.reshape(parts.shape))
+        )
+        return Shares(found.energy.reshape(self.shape).sum(-1), torque, speed, place, joints)
 
     def notes(self, i: int) -> list[str]:
         """Whose motors count as unlimited."""

@@ -281,7 +281,7 @@ class MachineDrive:
     def shares(self) -> Shares:
         """Cylinders have no motors whose shares would be known."""
         unknown = np.full(self.count, np.nan)
-        return Shares(self.guard.energy, unknown, unknown)
+        return Shares(self.guard.energy, unknown, unknown, unknown)
 
     def notes(self, i: int) -> list[str]:
         """What law, FMUs and identification have to say."""

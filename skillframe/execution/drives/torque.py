@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from skillframe.control.controller import ImpedanceController, Reading
 from skillframe.control.endings import Broken
 from skillframe.control.limits import LimitGuard
-from skillframe.control.motors import Motors, joint_limits
+from skillframe.control.motors import Motors, joint_limits, unstated
 from skillframe.execution.drive import Shares, Trials
 from skillframe.execution.drives.plants import varied_plants
 from skillframe.execution.recorder import Recorder
@@ -90,6 +90,7 @@ class TorqueDrive:
         limits = joint_limits(setup.robot, self.plant.model, limb.dofs)
         rate = setup.limits.torque_rate_nm_s
         self.motors = Motors(limits, rate, self.rows, self.dt) if limits else None
+        self._unstated = unstated(setup.robot) if limits else []
         self.guard = LimitGuard(setup.limits, self.rows, self.dt, self.motors)
 
     def prepare(self) -> list[Broken]:
@@ -146,14 +147,15 @@ class TorqueDrive:
 
     def shares(self) -> Shares:
         """(rows,) each."""
-        unknown = np.full(self.rows, np.nan)
-        torque, speed = (unknown, unknown) if self.motors is None else self.motors.shares()
-        return Shares(self.guard.energy, torque, speed)
+        if self.motors is None:
+            unknown = np.full(self.rows, np.nan)
+            return Shares(self.guard.energy, unknown, unknown, unknown)
+        (torque, speed, place), joints = self.motors.shares()
+        return Shares(self.guard.energy, torque, speed, place, joints)
 
     def notes(self, i: int) -> list[str]:
-        """Whose motors count as unlimited."""
-        silent = "" if self.motors is None else self.motors.silent()
-        return [silent] if silent else []
+        """Whose motors and ranges count as unlimited."""
+        return list(self._unstated)
 
     def recording(self, every: int) -> Recorder:
         """A plain recorder."""

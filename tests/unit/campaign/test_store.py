@@ -40,7 +40,8 @@ def test_results_have_the_contracts_columns_in_order(out):
     assert lines[0] == (
         "trial,skill,seed,start.tilt_y,start.offset_x,world.friction,"
         "success,failure,duration_s,peak_force_n,final_error_m,final_error_rad,"
-        "peak_force_filtered_n,peak_torque_share,peak_speed_share,ended_by,peak_force_10ms_n,goal_reached,ended_itself"
+        "peak_force_filtered_n,peak_torque_share,peak_speed_share,ended_by,peak_force_10ms_n,"
+        "peak_range_share,peak_torque_joint,peak_speed_joint,peak_range_joint,goal_reached,ended_itself"
     )
     keys = [tuple(line.split(",")[:2]) for line in lines[1:]]
     assert keys == [(str(t), label) for t in range(6) for label in ("a.skill.json", "replay:demo.npz")]
@@ -51,7 +52,7 @@ def test_rows_of_version_0_1_make_a_table_whose_later_cells_are_empty(out):
     """The rows of these fakes hold what rows of 0.1 held."""
     run(out)
     lines = (out / "results.csv").read_text().splitlines()
-    assert {tuple(line.split(",")[-7:]) for line in lines[1:]} == {("",) * 7}
+    assert {tuple(line.split(",")[-11:]) for line in lines[1:]} == {("",) * 11}
     assert not read_results(out / "results.csv").notes
 
 

@@ -102,6 +102,9 @@ def test_a_run_names_its_robot_and_world_and_how_deep_it_got(
     assert (said["robot"], said["world"]) == ("panda", "peg_in_hole")
     assert (said["progress"]["word"], said["progress"]["of_m"]) == ("inserted", 0.06)
     assert 0.0 <= said["progress"]["reached_m"] < 0.06
+    assert all(0.0 < said[f"peak_{what}_share"] < 1.0 for what in ("torque", "speed", "range"))
+    assert all(said[f"peak_{what}_joint"].startswith("joint") for what in ("torque", "speed", "range"))
+    assert isinstance(said["notes"], list)
     assert "not saved; add --out run.npz" in err
     run(["run", skill, *where, "--out", str(tmp_path / "run.npz"), "--quiet"])
     out, err = capsys.readouterr()

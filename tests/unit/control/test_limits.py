@@ -16,7 +16,7 @@ def guard(count=1, **limits):
 def motors(nv, count=1, rate=1000.0):
     """Motors that only a torque rate limits."""
     none = np.full(nv, np.inf)
-    return Motors([JointLimits(("joint",) * nv, (False,) * nv, none, none, -none, none)], rate, count, DT)
+    return Motors([JointLimits(("joint",) * nv, (False,) * nv, none, none, -none, none, np.zeros(nv))], rate, count, DT)
 
 
 def held(drive, torque):

@@ -6,7 +6,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from skillframe.control.motors import MOTOR_S, JointLimits, Motors, joint_limits
+from skillframe.control.motors import MOTOR_S, JointLimits, Motors, joint_limits, unstated
+from skillframe.execution.tracemeta import SHARE_JOINTS, SHARES
 from skillframe.frames import norm
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import Limits, load_robot
@@ -23,7 +24,7 @@ STIFF = np.diag([1000.0] * 3 + [50.0] * 3)
 def motors(rate=None, count=1):
     limits = JointLimits(
         ("shoulder", "slide"), (False, True), np.array([10.0, np.inf]), np.array([1.0, 0.5]),
-        np.array([-2.0, 0.0]), np.array([1.0, 0.4]),
+        np.array([-2.0, 0.0]), np.array([1.0, 0.4]), np.ones(2),
     )  # fmt: skip
     return Motors([limits], rate, count, DT)
 
@@ -72,13 +73,37 @@ def test_a_moment_within_the_limits_starts_the_count_again():
 
 
 def test_shares_are_those_of_the_worst_joint_and_unknown_where_no_limit_is_given():
-    torque, speed = after(3, torque=(-15.0, 900.0), velocity=(0.2, 0.3))[0].shares()
+    """The range of the shoulder is -2 to 1: at -1.4 it is 0.9 of 1.5 from the middle. The slide is in its middle."""
+    (torque, speed, place), joints = after(
+        3, torque=(-15.0, 900.0), velocity=(0.2, 0.3), position=(-1.4, 0.2)
+    )[0].shares()  # fmt: skip
     assert torque[0] == 1.5
     assert speed[0] == pytest.approx(0.6)
+    assert place[0] == pytest.approx(0.6)
+    assert joints[:, 0].tolist() == ["shoulder", "slide", "shoulder"]
     none = np.full(2, np.inf)
-    silent = Motors([JointLimits(("a", "b"), (False,) * 2, none, none, -none, none)], 1000.0, 1, DT)
+    silent = Motors([JointLimits(("a", "b"), (False,) * 2, none, none, -none, none, np.zeros(2))], 1000.0, 1, DT)
     silent.held(*np.ones((3, 1, 2)))
-    assert np.isnan(silent.shares()).all()
+    shares, joints = silent.shares()
+    assert np.isnan(shares).all()
+    assert (joints == "").all()
+
+
+@pytest.mark.parametrize(("position", "share"), [(-0.5, 0.0), (1.0, 1.0), (-2.0, 1.0), (0.25, 0.5)])
+def test_the_share_of_a_range_is_0_in_its_middle_and_1_at_either_end(position, share):
+    """To rounding; the slide stands in its middle."""
+    assert after(1, position=(position, 0.2))[0].shares()[0][2, 0] == pytest.approx(share, abs=1e-15)
+
+
+def test_a_range_that_is_not_given_has_no_share_and_still_ends_a_trial():
+    limits = JointLimits(
+        ("elbow",), (False,), *(np.array([x]) for x in (9.0, 1.0, -2.0 * np.pi, 2.0 * np.pi)), np.zeros(1)
+    )
+    drive = Motors([limits], None, 1, DT)
+    for _ in range(TICKS):
+        drive.held(np.zeros((1, 1)), np.zeros((1, 1)), np.array([[2.0 * np.pi + 0.01]]))
+    assert np.isnan(drive.shares()[0][2, 0])
+    assert drive.broken(0).code == "range"
 
 
 def panda(effort=None, velocity=None):
@@ -103,6 +128,7 @@ def test_a_sound_arm_inserts_and_one_whose_motors_give_a_hundredth_of_a_newton_m
     sound, weak, slow = insertion(panda()), insertion(panda(effort="0.01")), insertion(panda(velocity="0.0001"))
     assert sound.success[0], sound.failure[0]
     assert 0.0 < sound.peak_torque_share[0] < 1.0 and 0.0 < sound.peak_speed_share[0] < 1.0
+    assert 0.0 < sound.peak_range_share[0] < 1.0
     assert not weak.success[0]
     assert weak.failure[0].startswith("motor limit: joint") and weak.ended_by[0] == "motor"
     assert not slow.success[0]
@@ -132,6 +158,27 @@ def test_zero_means_not_given_and_the_result_says_so(given):
     assert note.startswith("the URDF gives no effort or no velocity for joint1, joint2, joint3 and 4 more")
 
 
+def test_a_joint_whose_range_is_not_given_is_named_and_the_others_are_judged(tmp_path):
+    """The worst of the others is found from URDF and configuration."""
+    tree = ElementTree.parse(load_robot("panda").urdf)
+    limit = tree.find("joint[@name='joint4']/limit")
+    limit.attrib.pop("lower")
+    limit.attrib.pop("upper")
+    tree.write(tmp_path / "panda.urdf")
+    robot = load_model(replace(load_robot("panda"), urdf=tmp_path / "panda.urdf"))
+    assert unstated(robot) == ["the URDF gives no range for joint4; it counts as free within +-2 pi rad or +-10 m"]
+    result = run(Hold(STIFF), replace(setup("panda", "free"), robot=robot), duration_s=0.05, trace_hz=1000)
+    trace = result.traces[0]
+    assert trace.meta["notes"] == unstated(robot)
+    limits = [robot.urdf.joints[f"joint{k}"].element.find("limit") for k in range(1, 8)]
+    low, high = (np.array([float(x.get(end, "nan")) for x in limits]) for end in ("lower", "upper"))
+    share = (np.abs(trace.q - (low + high) / 2) / ((high - low) / 2)).max(axis=0)
+    # a trace has every tick but the last; a tenth of a second of holding still moves no joint by 1e-3 of its range
+    assert result.peak_range_share[0] == pytest.approx(np.nanmax(share), abs=1e-3)
+    assert result.peak_range_joint[0] == f"joint{np.nanargmax(share) + 1}"
+    assert trace.meta["peak_range_joint"] == result.peak_range_joint[0]
+
+
 def test_a_free_flying_tool_has_no_motors_and_nothing_to_say():
     result = run(Hold(STIFF), setup(world="free"), duration_s=0.05, trace_hz=10)
     assert np.isnan(result.peak_torque_share[0])
@@ -156,6 +203,7 @@ def test_limits_stand_in_the_order_of_the_simulator():
         assert [float(written.get(k)) for k in ("effort", "velocity", "lower", "upper")] == [
             part[i] for part in (limits.effort, limits.velocity, limits.lower, limits.upper)
         ]
+    assert limits.ranged.all()
 
 
 def test_motors_of_two_arms_are_watched_on_both():
@@ -169,7 +217,10 @@ def test_motors_of_two_arms_are_watched_on_both():
             continue
         kept = limit.get("effort")
         limit.set("effort", "0.01")
-        causes[name] = run(Hold(STIFF), replace(now, robot=model, scene=scene), duration_s=0.2).failure[0]
+        result = run(Hold(STIFF), replace(now, robot=model, scene=scene), duration_s=0.2)
+        causes[name] = result.failure[0]
+        assert result.peak_torque_joint[0] == name
+        assert result.peak_torque_share[0] > 1.0
         limit.set("effort", kept)
     assert len(causes) == 2
     for name, cause in causes.items():
@@ -182,4 +233,5 @@ def test_rows_with_motors_are_independent():
     both = run(Hold(STIFF), now, {"robot.mass_scale": [1.0, 2.0]}, count=2, duration_s=0.3, trace_hz=1000)
     alone = run(Hold(STIFF), now, {"robot.mass_scale": [1.0]}, count=1, duration_s=0.3, trace_hz=1000)
     assert norm(both.traces[0].position - alone.traces[0].position).max() == 0.0
-    assert both.peak_torque_share[0] == alone.peak_torque_share[0]
+    for name in (*SHARES, *SHARE_JOINTS):
+        assert getattr(both, name)[0] == getattr(alone, name)[0]
