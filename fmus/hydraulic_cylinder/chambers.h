@@ -53,7 +53,7 @@ static inline void valve(const Model *m, const Motion *w, const double p[3], Cha
     int feeds = x > 0.0 ? A : B, drains = x > 0.0 ? B : A;
     c->flow_a = c->flow_b = c->flow_supply = 0.0;
     if (open <= 0.0) return;
-    Edge in = through_edge(m, open, rate, p[S] - p[feeds], 0.0, 0.0);
+    Edge in = through_edge(m, open, rate, p[S] - v[SUPPLY_DROP] - p[feeds], 0.0, 0.0);
     double room = drains == A ? w->position : v[STROKE] - w->position;
     cushion_of(m, room, drains == A ? w->velocity : -w->velocity, &closing, &closing_rate);
     Edge out = through_edge(m, open, rate, p[drains] - v[RETURN_PRESSURE], closing, closing_rate);
@@ -71,6 +71,15 @@ static inline double ports(const double *v, double p, double *slope)
     if (over > 0.0) { *slope -= v[RELIEF_CONDUCTANCE]; return -v[RELIEF_CONDUCTANCE] * over; }
     if (under > 0.0) { *slope -= v[CHECK_CONDUCTANCE]; return v[CHECK_CONDUCTANCE] * under; }
     return 0.0;
+}
+
+/* Out of a hose with a hole of this area, README eq. 11; back in where the chamber is below ambient. */
+static inline double burst(const double *v, double area, double p, double *slope)
+{
+    if (!(area > 0.0)) return 0.0;
+    Curve law = edge_law(p, v[LAMINAR_PRESSURE]);
+    *slope -= area * HOLE * law.slope;
+    return -area * HOLE * law.y;
 }
 
 static inline void supply_line(const Model *m, const double p[3], Chambers *c, const double by[2][3],
@@ -101,6 +110,7 @@ static inline void chambers(const Model *m, const Motion *w, const double p[3], 
     for (int i = A; i <= B; i++) {
         double sign = i == A ? 1.0 : -1.0, net = (i == A ? c->flow_a : c->flow_b) - sign * leak;
         net += ports(v, p[i], &by[i][i]) - area[i] * w->velocity;
+        net += burst(v, i == A ? v[BURST_A] : v[BURST_B], p[i], &by[i][i]);
         by[i][i] -= v[LEAKAGE], by[i][1 - i] += v[LEAKAGE];
         Curve bulk = bulk_law(p[i], v[BULK_MODULUS], v[BULK_MODULUS_SLOPE], v[AIR_FRACTION]);
         double gain = bulk.y / volume[i];

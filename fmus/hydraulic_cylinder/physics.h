@@ -6,6 +6,7 @@
 
 #define AMBIENT 101325.0      /* Pa */
 #define POLYTROPIC 1.4        /* entrained air is compressed without heat exchange */
+#define HOLE 0.0325           /* 0.67 sqrt(2 / (850 kg/m3)), flow through a sharp hole per area and sqrt(Pa) */
 #define LEAST_ABSOLUTE 100.0  /* Pa, keeps the air law finite when a chamber is torn empty */
 
 typedef struct { double y, slope; } Curve;

@@ -20,16 +20,24 @@ from skillframe.fmu.actuator import Float
 AMBIENT = 101325.0
 POLYTROPIC = 1.4
 LEAST_ABSOLUTE = 100.0
+HOLE = 0.0325  # 0.67 sqrt(2 / (850 kg/m^3)), flow through a sharp hole per area and sqrt(Pa)
 STATES = ("spool", "spool_velocity", "pressure_a", "pressure_b", "pressure_supply", "deflection")
 
 
 class PistonMotion(NamedTuple):
-    """What drives the oil at an instant: piston position [m] and velocity [m/s], command the spool follows [-1, 1]."""
+    """What drives the oil at an instant.
+
+    Piston position [m] and velocity [m/s], command the spool follows [-1, 1], flow of others [m^3/s], areas of holes in
+    the hoses [m^2], pressure that is lost before the valve [Pa].
+    """
 
     position: Float
     velocity: Float
     demand: Float
     other_flow: Float
+    burst_a: Float | float = 0.0
+    burst_b: Float | float = 0.0
+    supply_drop: Float | float = 0.0
 
 
 class Flows(NamedTuple):
@@ -110,6 +118,12 @@ def port_flow(p: SimpleNamespace, pressure: Float) -> Float:
     return result
 
 
+def burst_flow(p: SimpleNamespace, area: Float | float, pressure: Float) -> Float:
+    """Eq. 11: into a chamber through a hole of this area in its hose, negative while the chamber is above ambient."""
+    result: Float = -(area * HOLE) * edge_flow(pressure, p.laminar_pressure)
+    return result
+
+
 def sliding_deflection(p: SimpleNamespace, velocity: Float) -> Float:
     """Eq. 8: deflection of the seals in steady sliding [m], longer near standstill where break-away exceeds Coulomb."""
     if not p.has_stribeck:
@@ -147,10 +161,10 @@ def piston_force(p: SimpleNamespace, y: Float, position: Float, velocity: Float)
 def pressure_rates(p: SimpleNamespace, y: Float, motion: PistonMotion) -> Float:
     """Eq. 4: rates of the pressures (3, n) [Pa/s]."""
     pa, pb, ps = y[2], y[3], y[4]
-    flows = valve_flows(p, y[0], pa, pb, ps, motion.position)
+    flows = valve_flows(p, y[0], pa, pb, ps - motion.supply_drop, motion.position)
     leak = p.leakage * (pa - pb)
-    net_a = flows.a + port_flow(p, pa) - p.area_a * motion.velocity - leak
-    net_b = flows.b + port_flow(p, pb) + p.area_b * motion.velocity + leak
+    net_a = flows.a + port_flow(p, pa) - p.area_a * motion.velocity - leak + burst_flow(p, motion.burst_a, pa)
+    net_b = flows.b + port_flow(p, pb) + p.area_b * motion.velocity + leak + burst_flow(p, motion.burst_b, pb)
     volume_a = p.dead_volume_a + p.area_a * motion.position
     volume_b = p.dead_volume_b + p.area_b * (p.stroke - motion.position)
     rate_a, rate_b = bulk_modulus(pa, p) / volume_a * net_a, bulk_modulus(pb, p) / volume_b * net_b

@@ -19,7 +19,8 @@ import numpy as np
 from skillframe.either import absolute, ceil, clip, expm1, maximum, minimum, sqrt, stack, where
 from skillframe.machine.cylinder import equations as eq
 
-GIVEN = ("command", "position", "velocity", "acceleration", "other_flow", "step")
+GIVEN = ("command", "position", "velocity", "acceleration", "other_flow", "burst_a", "burst_b", "supply_drop", "step")
+STEP = GIVEN.index("step")
 MEMORY = ("target", "demand", "force_mean", "work")
 STAGE = (
     *eq.STATES, *(f"{name}_rate" for name in eq.STATES), "force", "power", "force_rate", "power_rate",
@@ -44,16 +45,19 @@ class _Motion(NamedTuple):
     target: Any
     demand: Any
     slew: Any
+    faults: tuple[Any, Any, Any]
 
     def at(self, t: Any) -> eq.PistonMotion:
         limit = where(self.slew > 0, self.slew * t, np.inf)
         demand = self.demand + clip(self.target - self.demand, -limit, limit)
         x, v, a = self.position, self.velocity, self.acceleration
-        return eq.PistonMotion(x + t * (v + 0.5 * a * t), v + a * t, demand, self.other_flow)
+        return eq.PistonMotion(x + t * (v + 0.5 * a * t), v + a * t, demand, self.other_flow, *self.faults)
 
 
 def _motion(p: SimpleNamespace, memory: Vector, given: Vector, target: Any) -> _Motion:
-    return _Motion(given[1], given[2], given[3], given[4], target, memory[1], p.spool_slew)
+    return _Motion(
+        given[1], given[2], given[3], given[4], target, memory[1], p.spool_slew, (given[5], given[6], given[7])
+    )
 
 
 def begin(p: SimpleNamespace, y: Vector, memory: Vector, given: Vector) -> Vector:
@@ -63,13 +67,13 @@ def begin(p: SimpleNamespace, y: Vector, memory: Vector, given: Vector) -> Vecto
     motion = _motion(p, memory, given, target)
     here = motion.at(0.0)
     rates = eq.rates(p, y, here)
-    count = _count(p, y, here, rates, given[5])
+    count = _count(p, y, here, rates, given[STEP])
     return stack([*_rows(y), *_rows(rates), *_push(p, y, rates, here, given[3]), 0.0, 0.0, target, count, 0.0])
 
 
 def substep(p: SimpleNamespace, stage: Vector, memory: Vector, given: Vector) -> Vector:
     """STAGE after the next internal step. It stays where a cylinder has come to its end."""
-    turn, a, h = stage[20], given[3], given[5] / stage[19]
+    turn, a, h = stage[20], given[3], given[STEP] / stage[19]
     motion, y, k1 = _motion(p, memory, given, stage[18]), stage[0:6], stage[6:12]
     here, middle, there = (motion.at((turn + share) * h) for share in (0.0, 0.5, 1.0))
     k2 = eq.rates(p, y + 0.5 * h * k1, middle)
@@ -90,16 +94,16 @@ def substep(p: SimpleNamespace, stage: Vector, memory: Vector, given: Vector) ->
 
 def finish(p: SimpleNamespace, stage: Vector, memory: Vector, given: Vector) -> Vector:
     """RESULT of a step: states, MEMORY, and what is SHOWN at the end of the motion."""
-    end = _motion(p, memory, given, stage[18]).at(given[5])
-    new = stack([stage[18], end.demand, stage[16] / given[5], stage[17]])
-    shown = show(p, stage[0:6], new, stack([given[0], end.position, end.velocity]))
+    end = _motion(p, memory, given, stage[18]).at(given[STEP])
+    new = stack([stage[18], end.demand, stage[16] / given[STEP], stage[17]])
+    shown = show(p, stage[0:6], new, stack([given[0], end.position, end.velocity, 0.0, 0.0, 0.0, 0.0, given[7]]))
     return stack([*_rows(stage, 6), *_rows(new, 4), *_rows(shown, len(SHOWN))])
 
 
 def show(p: SimpleNamespace, y: Vector, memory: Vector, given: Vector) -> Vector:
-    """SHOWN at states y, at the position and velocity in GIVEN."""
+    """SHOWN at states y, at the position, velocity and supply_drop in GIVEN."""
     position, velocity = given[1], given[2]
-    flows = eq.valve_flows(p, y[0], y[2], y[3], y[4], position)
+    flows = eq.valve_flows(p, y[0], y[2], y[3], y[4] - given[7], position)
     force, friction = eq.piston_force(p, y, position, velocity), eq.friction_force(p, y[5], velocity)
     return stack(
         [force, memory[2], memory[3], y[2], y[3], flows.a, flows.b, y[0], y[4], flows.supply, friction]
@@ -113,13 +117,15 @@ def _rows(vector: Vector, count: int = 6) -> list[Any]:
 def _count(p: SimpleNamespace, y: Vector, motion: eq.PistonMotion, rates: Vector, step: Any) -> Any:
     """How many internal steps keep h lambda below one half. `rates` are those now, to see ports open."""
     pa, pb, low = y[2], y[3], p.return_pressure
-    to_supply = minimum(absolute(y[4] - pa), absolute(y[4] - pb))
+    supply = y[4] - motion.supply_drop
+    to_supply = minimum(absolute(supply - pa), absolute(supply - pb))
     least = minimum(to_supply, minimum(absolute(pa - low), absolute(pb - low))) + p.laminar_pressure
     wide = maximum(absolute(eq.opening(y[0], p.deadband)), absolute(eq.opening(motion.demand, p.deadband)))
     soon_a, soon_b = 2.0 * step * absolute(rates[2]), 2.0 * step * absolute(rates[3])
     slope = p.edge * wide / sqrt(least) + p.leakage
     slope = slope + where(minimum(pa - soon_a, pb - soon_b) < low, p.check_conductance, 0.0)
     slope = slope + where(maximum(pa + soon_a, pb + soon_b) > p.relief_pressure, p.relief_conductance, 0.0)
+    slope = slope + eq.HOLE * maximum(motion.burst_a, motion.burst_b) / sqrt(p.laminar_pressure)
     volume_a = p.dead_volume_a + p.area_a * motion.position
     volume_b = p.dead_volume_b + p.area_b * (p.stroke - motion.position)
     rate = p.bulk_modulus / minimum(volume_a, volume_b) * slope
