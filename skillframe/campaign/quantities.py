@@ -2,7 +2,8 @@
 
 `start.*` moves the tool's start, `fixture.*` and `grasp.*` the true pose of fixture and tool against what the
 controller believes, `robot.*` the plant against the controller's nominal model, `sensor.*` the wrench sensor; `world.*`
-are the fields of the world's parameter dataclass.
+are the fields of the world's parameter dataclass. `fault.time` and `fault.cylinder` say when and where a hydraulic
+machine breaks, some of its `sensor.*` and `actuator.*` say what.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from skillframe.config.units import si, unit_of
 from skillframe.errors import InputError, UnknownName, suggest
 from skillframe.world.quantities import QUANTITIES, UNITS
 
-GROUPS = ("start", "fixture", "grasp", "world", "robot", "actuator", "sensor")
+GROUPS = ("start", "fixture", "grasp", "world", "robot", "actuator", "sensor", "fault")
 
 
 def world_hints(params: type) -> dict[str, Any]:

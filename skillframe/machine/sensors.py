@@ -7,7 +7,7 @@ are those of robot.toml's `[sensors]`. What comes out is 2/w old; with the rate 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -16,10 +16,13 @@ from skillframe.robot.driven import MachineNoise
 from skillframe.signals.rates import RateFilter
 
 BLOCK = 100
+RECENT = 10
 
 
 class MachineSensors:
     """The sensors of N machines with n coordinates and k cylinders. Each trial has one random generator.
+
+    A fault, where there is one, changes what is read: (N, n + 2k) to the same, before the filters.
 
     Attributes:
         z, rate: (N, n) filtered; pressure_a, pressure_b: (N, k) filtered [Pa]. lag: of all of them [s].
@@ -32,6 +35,10 @@ class MachineSensors:
         self.lag = 1.0 / (np.pi * settings.corner_hz)
         self._noise: Float = np.zeros((BLOCK, len(self._rngs), n + 2 * k))
         self._next = BLOCK
+        self.fault: Callable[[Float], Float] | None = None
+        self.raw: Float = np.zeros((RECENT, len(self._rngs), n + 2 * k))
+        """The last `RECENT` readings before the filters, (N, n + 2k) each; what is read next goes to row `turn`."""
+        self.turn = 0
 
     def start(self, z: Float, pressure_a: Float, pressure_b: Float) -> None:
         """Stand still at true values."""
@@ -45,8 +52,13 @@ class MachineSensors:
             self._noise *= self._scale
             self._next = 0
         truth = np.concatenate([z, pressure_a, pressure_b], axis=-1)
-        self._filter.step(truth + self._noise[self._next])
+        raw = truth + self._noise[self._next]
         self._next += 1
+        if self.fault is not None:
+            raw = self.fault(raw)
+        self._filter.step(raw)
+        self.raw[self.turn] = raw
+        self.turn = (self.turn + 1) % RECENT
 
     @property
     def z(self) -> Float:

@@ -16,10 +16,12 @@ from skillframe.robot.kinematics import inverse_kinematics
 from skillframe.robot.model import RobotModel
 from skillframe.signals.delay import require_delay
 from skillframe.world.convert import held
+from skillframe.world.faults import fault_problem
 from skillframe.world.plant import displacement
-from skillframe.world.quantities import QUANTITIES
+from skillframe.world.quantities import FAULTS, QUANTITIES
 from skillframe.world.scene import Scene
 
+_FAULTS = frozenset({"fault.time", "fault.cylinder", *(each.name for each in FAULTS)})
 _ACTUATOR = tuple(name for name in QUANTITIES if name.startswith("actuator."))
 NOT_NEGATIVE = frozenset({"sensor.force_noise", "sensor.torque_noise", "robot.joint_friction", "world.friction"})
 LARGEST = dict.fromkeys(("start", "fixture", "grasp", "sensor", "robot", "world"), 1e6)
@@ -49,6 +51,8 @@ def check_quantities(draws: Mapping[str, Float], robot: RobotModel | None = None
             raise InputError(key, f"cannot be {largest:g} rad", "give an angle in radians, not in degrees")
         if key == "actuator.delay":
             require_delay(least if least < 0.0 else largest, key)
+        if key in _FAULTS and (problem := fault_problem(key, np.asarray(values, dtype=float), robot)):
+            raise InputError(key, *problem)
         if least < 0.0 and key in NOT_NEGATIVE:
             raise InputError(key, f"cannot be negative, is {least:g}", "give 0 or more")
         if least <= 0.0 and key == "robot.mass_scale":
@@ -57,12 +61,14 @@ def check_quantities(draws: Mapping[str, Float], robot: RobotModel | None = None
 
 def _lacking(key: str, robot: RobotModel) -> str:
     """Why a quantity would do nothing on this robot, or "" if it does something."""
+    if key in _FAULTS and not robot.spec.hydraulic:
+        return "is no hydraulic machine, whose faults alone are simulated"
     if not robot.spec.actuation:
         return "has no actuators of its own" if key in (*_ACTUATOR, "robot.nominal_payload") else ""
     if robot.spec.servo:
         lacking = key == "robot.nominal_payload" or (key in _ACTUATOR and key != "actuator.friction_scale")
         return "is driven by servos, which have no such quantity" if lacking else ""
-    if key.startswith("sensor."):
+    if key.startswith("sensor.") and key not in _FAULTS:
         return "has no wrench sensor: its contact force is estimated from pressures"
     return "moves in a plane, and does not turn its tool to a start" if key.startswith("start.tilt_") else ""
 

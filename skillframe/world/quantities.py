@@ -37,6 +37,22 @@ _BIASES = [
     for kind, unit in (("force", "N"), ("torque", "N m"))
     for axis in "xyz"
 ]
+FAULTS = (
+    Varied("sensor.pressure_frozen", "", 0.0, "1: both pressures of the cylinder repeat their last reading"),
+    Varied("sensor.pressure_zero", "", 0.0, "1: both pressures of the cylinder read zero"),
+    Varied(
+        "sensor.encoder_step", "rad", 0.0, "jump of the encoder of the joint that the cylinder moves; m if it slides"
+    ),
+    Varied("sensor.encoder_frozen", "", 0.0, "1: that encoder repeats its last reading"),
+    Varied("actuator.stuck", "", 0.0, "1: the valve's spool stays where it then is, whatever it is told"),
+    Varied(
+        "actuator.runaway", "", 0.0, "where the valve's spool goes whatever it is told, -1 to 1 (extends); 0: nowhere"
+    ),
+    Varied("actuator.burst_a", "m2", 0.0, "hole in the hose of the piston side; 1.3e-4 is half an inch wide"),
+    Varied("actuator.burst_b", "m2", 0.0, "hole in the hose of the rod side"),
+    Varied("actuator.supply_loss", "", 0.0, "share of the supply pressure above the return line's that fails, for all"),
+)
+"""Faults of a hydraulic machine: what breaks at `fault.time`, at the cylinder `fault.cylinder`."""
 VARIED = (
     *_POSES,
     *_BIASES,
@@ -50,6 +66,11 @@ VARIED = (
     Varied("actuator.deadband", "", None, "dead band of a hydraulic machine's valves, of their full stroke"),
     Varied("actuator.friction_scale", "", 1.0, "true friction of a machine's cylinders over what its controller knows"),
     Varied("actuator.delay", "s", 0.0, "delay between command and valve of a hydraulic machine"),
+    *FAULTS,
+    Varied(
+        "fault.time", "s", 0.0, "when a machine's fault occurs, from the skill's start; negative in the swing before it"
+    ),
+    Varied("fault.cylinder", "", 1.0, "which cylinder it strikes, counted from 1 in robot.toml's order"),
     Varied("world.friction", "", None, "Coulomb coefficient of every contact; the world's own otherwise"),
 )
 QUANTITIES = frozenset(each.name for each in VARIED)

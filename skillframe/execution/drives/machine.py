@@ -21,6 +21,7 @@ from skillframe.control.limits import LimitGuard
 from skillframe.errors import InputError
 from skillframe.execution.drive import Shares, Trials
 from skillframe.execution.drives.actuated import Actuated
+from skillframe.execution.drives.machine_faults import BrokenParts
 from skillframe.execution.drives.machine_reference import LEAST_DAMPING, plane_reference
 from skillframe.execution.drives.machine_start import closed_configurations, holding_force
 from skillframe.execution.drives.recording import WithColumns
@@ -33,6 +34,7 @@ from skillframe.machine.checks.figures import CYLINDER
 from skillframe.machine.checks.holding import require_held
 from skillframe.machine.columns import EnergyBill, columns, supply_pressures
 from skillframe.machine.cylinder.bank import banks, foreign_specs, instance_parameters
+from skillframe.machine.faults import faults_in, ports
 from skillframe.machine.force.calibration import CALIBRATION_S, SETTLE_S, hold_what_was_found, swing
 from skillframe.machine.force.compiled import CompiledEstimator
 from skillframe.machine.force.findings import findings
@@ -53,6 +55,7 @@ from skillframe.world.plant import Draws, Plant
 
 __all__ = ["MachineDrive"]
 
+SWING_S = CALIBRATION_S + SETTLE_S
 VALVES_S = 0.5
 """So often the swing's rows are fitted again for overlap and supply pressure of the valves (ours)."""
 AT_STOP, WILD = 0.99, 0.5
@@ -96,7 +99,13 @@ class MachineDrive:
         self.law = CompiledLaw(self.chain, known, HydraulicGains.of(spec), self.count, self.dt)
         self.estimator = CompiledEstimator(self.chain, known, self.count, self.dt, estimate)
         self.valves = ValveIdentification(known, self.count, self.dt, ValveSettings(corner=corner))
-        self.bank = banks(spec, self.count)
+        broken = faults_in(draws)
+        self.bank = banks(spec, self.count, ports(broken))
+        self.faults = (
+            BrokenParts(self.chain, self.bank, draws, self.gauges, self.dt, -round(SWING_S / self.dt))
+            if broken
+            else None
+        )
         self.actuated = Actuated(self.plant, self.chain.actuated, self.bank, self.dt)
         self._pressures = [self.bank.outputs.index(f"pressure_{side}") for side in "ab"]
         self._z = [int(self.plant.model.joint(name).qposadr[0]) for name in self.chain.independent]
@@ -114,6 +123,7 @@ class MachineDrive:
         hold = holding_force(self.chain, z, draws)
         own = instance_parameters(self.setup.robot.spec, draws, hold)
         supply = supply_pressures(own, self.law.cylinders.supply_pressure, self.count)
+        self._height: Float = supply - self.law.cylinders.return_pressure
         require_held(self.setup.robot.spec.actuation, hold, supply, f"robot {self.setup.robot.spec.name}")
         self.actuated.master.start(0.0, 0.0, own)
         self._require_pressures()
@@ -158,7 +168,7 @@ class MachineDrive:
         self._leave(broken)
         self.estimator.calibrate(True)
         stopped = np.zeros(self.count)
-        for tick in range(round((CALIBRATION_S + SETTLE_S) / self.dt)):
+        for tick in range(round(SWING_S / self.dt)):
             position, velocity, joint, joint_rate = swing(tick * self.dt)
             stiff = LEAST_DAMPING * np.broadcast_to(np.eye(2), (self.count, 2, 2))
             zero = np.zeros((self.count, 2))
@@ -209,6 +219,8 @@ class MachineDrive:
 
     def _sample(self) -> None:
         """Read the sensors, and the model's terms where the machine then is."""
+        if self.faults is not None:
+            self.faults.tick()
         self.gauges.sample(self._true_z(), *self._true_pressures())
         self._seen = self._measured()
         self.terms = self.law.terms(self._seen)
@@ -268,7 +280,10 @@ class MachineDrive:
     def advance(self, active: Trials) -> list[Broken]:
         """One coupled step under the valve commands; trials whose FMU failed, each with its sentence."""
         self.bill.step(self.actuated.plant.velocity)
-        return self.actuated.step(self._delay.step(self.demand.valve), active)
+        arrived = self._delay.step(self.demand.valve)
+        if self.faults is not None:
+            arrived = self.faults.obey(arrived, self._height)
+        return self.actuated.step(arrived, active)
 
     def end(self, rows: Trials) -> None:
         """Their FMUs are not stepped any more."""

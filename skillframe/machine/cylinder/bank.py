@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from skillframe.errors import InputError
-from skillframe.fmu.actuator import Actuators, ActuatorSpec
+from skillframe.fmu.actuator import INPUTS, Actuators, ActuatorSpec
 from skillframe.fmu.kept import kept
 from skillframe.frames import Float
 from skillframe.machine.checks.figures import CYLINDER, completed
@@ -17,16 +18,39 @@ from skillframe.robot.driven import Actuation
 from skillframe.robot.spec import RobotSpec
 
 
-def banks(spec: RobotSpec, trials: int) -> Actuators:
+def banks(spec: RobotSpec, trials: int, ports: Sequence[str] = ()) -> Actuators:
     """A bank of a robot's actuators for so many trials. It is the same one again if it was the last asked for.
+
+    Args:
+        spec: the robot.
+        trials: how many.
+        ports: inputs that faults need, which every cylinder must have.
 
     Opening FMUs takes some tenths of a second, resetting them none to speak of, so a campaign's chunks share a bank.
 
     Raises:
         InputError, UnknownName, MissingDependency, InstanceFailed: an actuator cannot be opened.
     """
-    specs = [_as_spec(actuation) for actuation in spec.actuation]
+    specs = [_with_ports(_as_spec(actuation), ports, spec.name) for actuation in spec.actuation]
     return kept((str(spec.folder), repr(specs), trials), lambda: open_cylinders(specs, trials, spec.folder))
+
+
+def _with_ports(own: ActuatorSpec, ports: Sequence[str], robot: str) -> ActuatorSpec:
+    """An actuator with inputs for its faults.
+
+    Raises:
+        InputError: a cylinder of another maker, to whose FMU they are not mapped.
+    """
+    if not ports:
+        return own
+    lacking = [] if own.fmu == CYLINDER else [name for name in ports if name not in own.inputs]
+    if lacking:
+        text = f"its FMU has no input for {' and '.join(lacking)}, so that it cannot break so"
+        raise InputError(
+            f"robot {robot}, {own.name}", text, "map one under inputs of its [[actuation]], or leave it out"
+        )
+    mapped = {name: name for name in (*(() if own.inputs else INPUTS), *ports)}
+    return replace(own, inputs={**mapped, **own.inputs})
 
 
 def foreign_specs(spec: RobotSpec) -> list[ActuatorSpec]:
