@@ -80,6 +80,7 @@ def load_model(spec: RobotSpec) -> RobotModel:
     wanted = mimic_joints(urdf) if spec.mimic else ()
     model, fallback = _build(urdf, spec, bool(wanted))
     _free_missing_limits(model)
+    _add_motors(model, spec)
     tools = tuple(_frame(model, arm.tool_frame) for arm in spec.arm)
     followers = () if fallback else wanted
     return RobotModel(
@@ -210,6 +211,17 @@ def _free_missing_limits(model: pin.Model) -> None:
         limit = getattr(model, name).copy()
         limit[limit <= 0.0] = np.inf
         setattr(model, name, limit)
+
+
+def _add_motors(model: pin.Model, spec: RobotSpec) -> None:
+    """The motors' inertia as Pinocchio's armature: on the diagonal of the mass matrix, and without weight."""
+    single = {name: model.joints[j].idx_v for j, name in enumerate(model.names) if j and model.joints[j].nv == 1}
+    armature = model.armature.copy()
+    for joint, inertia in spec.motor_inertia.items():
+        if joint not in single:
+            raise UnknownName("joint", joint, single, f"named in {spec.name}'s [motor_inertia]")
+        armature[single[joint]] = inertia
+    model.armature = armature
 
 
 def _home(model: pin.Model, spec: RobotSpec, followers: tuple[str, ...]) -> Float:

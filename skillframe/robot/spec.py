@@ -103,6 +103,7 @@ class RobotFile:
     limits: Limits = field(default_factory=Limits)
     workspace: Workspace = field(default_factory=Workspace)
     friction_share: dict[str, float] = field(default_factory=dict)
+    motor_inertia: dict[str, float] = field(default_factory=dict)
     inertia: dict[str, LinkInertia] = field(default_factory=dict)
     payload: DeclaredPayload | None = None
     loop: tuple[LoopClosure, ...] = ()
@@ -124,6 +125,8 @@ class RobotSpec:
         mimic: joints with a URDF mimic tag follow their leader; False makes every joint independent.
         home: joint positions by joint name [rad or m]; joints not named stand at the neutral position.
         friction_share: part of the drawn `robot.joint_friction` that a joint gets, by name; 1 for joints not named.
+        motor_inertia: what motor and gear add to a joint's inertia, by name: the rotor's times the gear ratio squared
+            [kg m^2, or kg where the joint slides]; 0 for joints not named.
         payload: what is carried, where it can be changed.
         inertia: overlay by link name; loop: closed chains; actuation: what drives joints, of the kind in `drive`.
         sensors, gains: of a machine with actuators.
@@ -142,6 +145,7 @@ class RobotSpec:
     limits: Limits = field(default_factory=Limits)
     workspace: Workspace = field(default_factory=Workspace)
     friction_share: dict[str, float] = field(default_factory=dict)
+    motor_inertia: dict[str, float] = field(default_factory=dict)
     inertia: dict[str, LinkInertia] = field(default_factory=dict)
     payload: DeclaredPayload | None = None
     loop: tuple[LoopClosure, ...] = ()
@@ -275,6 +279,10 @@ def _check_values(declared: RobotFile, where: str) -> None:
     for joint, share in declared.friction_share.items():
         if not 0.0 <= share < math.inf:
             raise InputError(f"{where}: friction_share.{joint}", f"is {share:g}", "give 0 or more")
+    for joint, inertia_of_motor in declared.motor_inertia.items():
+        if not 0.0 <= inertia_of_motor <= LARGEST:
+            text = f"is {inertia_of_motor:g}"
+            raise InputError(f"{where}: motor_inertia.{joint}", text, "give 0 or more, as felt at the joint [kg m^2]")
     place = declared.workspace
     if not all(abs(x) <= LARGEST for x in place.fixture):
         raise InputError(f"{where}: workspace.fixture", "is beyond any physical size", "give metres in base")

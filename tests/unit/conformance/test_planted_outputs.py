@@ -249,7 +249,7 @@ def test_a_robot_that_cannot_bear_its_own_weight_is_named(robot):
     assert problem.startswith("stands: holding its start in the world free for 100 ms ends: ")
 
 
-@pytest.mark.parametrize("name", ["free_tool", "panda", "dual_panda", "hiab_xs031"])
+@pytest.mark.parametrize("name", ["free_tool", "panda", "dual_panda", "hiab_xs031", "ur5e", "fr3", "kuka_iiwa14"])
 def test_every_shipped_robot_passes(name):
     assert check_robot(registry().robot(name)) == []
 

@@ -20,7 +20,7 @@ from skillframe.robot.spec import load_robot
 DOWN = np.diag([1.0, -1.0, -1.0])
 
 
-@pytest.fixture(scope="module", params=["panda", "free_tool"])
+@pytest.fixture(scope="module", params=["panda", "free_tool", "ur5e", "fr3", "kuka_iiwa14"])
 def robot(request):
     return load_model(load_robot(request.param))
 

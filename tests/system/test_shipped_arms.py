@@ -1,0 +1,24 @@
+"""Every shipped arm is taught, learns and does the peg and the valley, as the commands do it."""
+
+import json
+
+import pytest
+
+from skillframe.cli.main import run
+
+pytestmark = [pytest.mark.slow, pytest.mark.needs_plugins]
+
+
+@pytest.mark.parametrize("world", ["peg_in_hole", "valley"])
+@pytest.mark.parametrize("robot", ["ur5e", "fr3", "kuka_iiwa14"])
+def test_a_shipped_arm_is_taught_and_does_what_it_was_taught(robot, world, tmp_path, capsys):
+    on = ["--world", world, "--robot", robot]
+    recorded = ["demonstration", "record", *on, "--count", "2", "--seed", "1", "--out", str(tmp_path / "d.npz")]
+    assert run(recorded) == 0
+    skill = tmp_path / "s.skill.json"
+    files = [str(tmp_path / f"d{i}.npz") for i in (1, 2)]
+    assert run(["learn", *files, "--at", "tip", "--out", str(skill)]) == 0
+    capsys.readouterr()
+    assert run(["run", str(skill), *on, "--coc", "tip", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["success"] is True
