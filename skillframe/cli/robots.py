@@ -11,6 +11,7 @@ from skillframe.cli import names
 
 if TYPE_CHECKING:
     from skillframe.robot.audit import Audit
+    from skillframe.robot.model import RobotModel
 
 
 @click.group()
@@ -97,10 +98,24 @@ def show(robot: str, as_json: bool) -> None:
     from skillframe.robot.spec import load_robot
 
     model = load_model(load_robot(robot))
+    whole, derived = _with_gains(model)
     if as_json:
-        emit_json(plain(model))
-    else:
-        click.echo(describe(model))
+        emit_json(plain(whole))
+        return
+    click.echo(describe(whole))
+    if derived:
+        click.echo(f"  robot.toml does not give {', '.join(derived)}: derived from masses, oil and filters")
+
+
+def _with_gains(model: RobotModel) -> tuple[RobotModel, list[str]]:
+    """A machine with the gains that follow from its figures, and their names; as it is where it cannot run."""
+    from skillframe.errors import SkillframeError
+    from skillframe.machine.law.gains import missing_gains, with_derived_gains
+
+    try:
+        return with_derived_gains(model), missing_gains(model.spec)
+    except SkillframeError:
+        return model, []
 
 
 def _plain(result: Audit) -> dict[str, object]:

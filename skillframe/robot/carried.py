@@ -39,7 +39,7 @@ def loaded_inertias(robot: RobotModel, masses: Float) -> tuple[str, list[pin.Ine
         with_payload(robot.spec, float(mass))
     payload = robot.spec.payload
     assert payload is not None
-    joint = robot.model.frames[robot.model.getFrameId(payload.link)].parentJoint
+    joint = robot.model.frames[robot.model.getFrameId(payload.link, pin.FrameType.BODY)].parentJoint
     empty, full = (
         load_model(with_payload(robot.spec, mass)).model.inertias[joint].toDynamicParameters()
         for mass in (0.0, payload.rating)
@@ -75,7 +75,7 @@ class CarriedLoad:
         where = f"{spec.folder / 'robot.toml'}: payload"
         if spec.payload is None:
             raise InputError(where, "the robot declares no payload", "add [payload] with link, mass and rating")
-        frame = model.frames[model.getFrameId(spec.payload.link)]
+        frame = model.frames[model.getFrameId(spec.payload.link, pin.FrameType.BODY)]
         self._joints = []
         for j in list(model.supports[frame.parentJoint])[1:]:
             if model.names[j] not in chain.independent:

@@ -62,9 +62,8 @@ def _machine(robot: RobotModel) -> list[str]:
         seen, gains = spec.sensors, spec.gains
         noise = f"encoders {seen.encoder:g} rad (m), pressures {seen.pressure:g} Pa"
         lines.append(f"  sensors: noise of {noise}, behind filters of {seen.corner_hz:g} Hz")
-        lines.append(
-            f"  gains: bodies {gains.body:g} N s/m (N m s/rad), rate of the required force {gains.force_corner_hz:g} Hz"
-        )
+        body = "derived in a run" if gains.body is None else f"{gains.body:.4g} N s/m (N m s/rad)"
+        lines.append(f"  gains: bodies {body}, rate of the required force {gains.force_corner_hz:g} Hz")
     if spec.payload is not None:
         load = spec.payload
         lines.append(f"  payload {load.mass:g} kg in {load.link!r}, rated for {load.rating:g} kg")
@@ -74,7 +73,9 @@ def _machine(robot: RobotModel) -> list[str]:
 def _how(actuation: Actuation, spec: RobotSpec) -> str:
     if spec.servo:
         return ", which takes a position" if "target" in actuation.inputs else ", which takes a torque"
-    return f", with gains of {actuation.velocity_gain:g} m and {actuation.force_gain:g} m2/(N s)"
+    gains = ((actuation.velocity_gain, "m"), (actuation.force_gain, "m2/(N s)"))
+    text = " and ".join("a derived one" if gain is None else f"{gain:.4g} {unit}" for gain, unit in gains)
+    return f", with gains of {text}"
 
 
 def as_json(robot: RobotModel) -> dict[str, Any]:

@@ -48,7 +48,8 @@ class Actuation:
         nominal: what the controller takes the actuator for, by our names, where the FMU is not told so in `parameters`.
         initial_force: the FMU's parameter for the force [N] that it holds at the start; "" if it has none.
         unused: inputs and outputs of the FMU that are left alone on purpose, so that nothing is said of them.
-        velocity_gain, force_gain: k_x [m] and k_f [m^2/(N s)] of its piston (`skillframe.machine.law.vdc_actuator`).
+        velocity_gain, force_gain: k_x [m] and k_f [m^2/(N s)] of its piston (`skillframe.machine.law.vdc_actuator`);
+            None: they follow from its figures (`skillframe.machine.law.gains`).
     """
 
     joint: str
@@ -59,8 +60,8 @@ class Actuation:
     nominal: dict[str, Any] = field(default_factory=dict)
     initial_force: str = ""
     unused: tuple[str, ...] = ()
-    velocity_gain: float = 5e-3
-    force_gain: float = 4e-9
+    velocity_gain: float | None = None
+    force_gain: float | None = None
 
     @property
     def known(self) -> dict[str, Any]:
@@ -91,11 +92,11 @@ class Gains:
 
     Attributes:
         body: K_A of every body [N s/m, N m s/rad]; the published 5 damps nothing, and a tool that lands on something
-            hard hops.
+            hard hops. None: it follows from the machine's masses and filters (`skillframe.machine.law.gains`).
         force_corner_hz: of the filter that gives the required piston forces' rate [Hz]; published: 8.
     """
 
-    body: float = 1000.0
+    body: float | None = None
     force_corner_hz: float = 16.0
 
 
@@ -104,13 +105,13 @@ def impossible(actuation: tuple[Actuation, ...], sensors: MachineNoise, gains: G
     for drive in actuation:
         for key in ("velocity_gain", "force_gain"):
             value = getattr(drive, key)
-            if not 0.0 < value < math.inf:
+            if value is not None and not 0.0 < value < math.inf:
                 yield f"actuation of {drive.joint}: {key}", f"is {value:g}", "give a positive, finite number"
     figures = (
         ("sensors.encoder", sensors.encoder, 0.0, 0.1, "rad (m), a standard deviation"),
         ("sensors.pressure", sensors.pressure, 0.0, 1e7, "Pa, a standard deviation"),
         ("sensors.corner_hz", sensors.corner_hz, LEAST_CORNER, math.inf, "Hz"),
-        ("gains.body", gains.body, 0.0, math.inf, "N s/m"),
+        ("gains.body", 0.0 if gains.body is None else gains.body, 0.0, math.inf, "N s/m"),
         ("gains.force_corner_hz", gains.force_corner_hz, LEAST_CORNER, math.inf, "Hz"),
     )
     for key, value, low, high, unit in figures:

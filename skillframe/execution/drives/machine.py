@@ -42,7 +42,8 @@ from skillframe.machine.force.load import BelievedLoad
 from skillframe.machine.force.momentum import Estimate, ForceSettings
 from skillframe.machine.force.residual_noise import residual_noise
 from skillframe.machine.force.valve import ValveIdentification, ValveSettings
-from skillframe.machine.law.hydraulic import Demand, HydraulicGains, Measured, Reference, plane_task
+from skillframe.machine.law.gains import law_gains
+from skillframe.machine.law.hydraulic import Demand, Measured, Reference, plane_task
 from skillframe.machine.law.hydraulic_compiled import CompiledLaw
 from skillframe.machine.law.vdc_actuator import cylinders
 from skillframe.machine.sensors import MachineSensors
@@ -96,7 +97,7 @@ class MachineDrive:
         corner, estimate = spec.sensors.corner_hz, ForceSettings()
         noise = residual_noise(self.chain, known, spec.sensors, estimate.corner, self.dt)
         estimate = replace(estimate, sensor_corner=corner, row_noise=tuple(noise.tolist()))
-        self.law = CompiledLaw(self.chain, known, HydraulicGains.of(spec), self.count, self.dt)
+        self.law = CompiledLaw(self.chain, known, law_gains(self.chain), self.count, self.dt)
         self.estimator = CompiledEstimator(self.chain, known, self.count, self.dt, estimate)
         self.valves = ValveIdentification(known, self.count, self.dt, ValveSettings(corner=corner))
         broken = faults_in(draws)

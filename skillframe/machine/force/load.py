@@ -15,6 +15,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from skillframe.frames import Float
 from skillframe.machine.checks.figures import CYLINDER
@@ -48,7 +49,7 @@ def carrier(chain: ClosedChain) -> int:
     """Row of theta, the moving bodies' parameters, that holds the load."""
     payload, model = chain.robot.spec.payload, chain.model
     assert payload is not None
-    return int(model.frames[model.getFrameId(payload.link)].parentJoint) - 1
+    return int(model.frames[model.getFrameId(payload.link, pin.FrameType.BODY)].parentJoint) - 1
 
 
 def inertias(chain: ClosedChain, payload: Float) -> Float:

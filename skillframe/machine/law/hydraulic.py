@@ -25,7 +25,6 @@ from skillframe.machine.law.vdc_actuator import (
 )
 from skillframe.machine.law.vdc_reference import ToolTask
 from skillframe.robot.chain import ClosedChain
-from skillframe.robot.spec import RobotSpec
 
 REACH = 1e-6  # m per unit of a joint: an axis of base along which the tool moves less is not commanded
 
@@ -90,7 +89,7 @@ class Terms(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HydraulicGains:
-    """Gains of the law.
+    """Gains of the law. Defaults are those of the crane that ships; `gains` has those of any machine.
 
     Attributes:
         velocity, force: k_x and k_f of each cylinder (k,). Published for this crane: 5e-3, 5e-3, 1e-3 and 2e-8, 2e-8,
@@ -117,12 +116,6 @@ class HydraulicGains:
     joint: float = 3.0
     force_corner: float = 16.0
     contact: ContactFriction = field(default_factory=ContactFriction)
-
-    @classmethod
-    def of(cls, spec: RobotSpec) -> HydraulicGains:
-        """Those of a machine as its robot.toml says them."""
-        velocity, force = (tuple(getattr(a, f"{name}_gain") for a in spec.actuation) for name in ("velocity", "force"))
-        return cls(velocity=velocity, force=force, body=spec.gains.body, force_corner=spec.gains.force_corner_hz)
 
 
 class Demand(NamedTuple):

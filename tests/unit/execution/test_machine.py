@@ -13,6 +13,7 @@ from skillframe.execution.drives.machine_start import holding_force
 from skillframe.execution.executor import Setup, begin, simulate
 from skillframe.execution.prepare import load_robot_model
 from skillframe.machine.checks.audit import audit
+from skillframe.machine.law.gains import law_gains
 from skillframe.machine.law.hydraulic import HydraulicGains
 from skillframe.robot.chain import ClosedChain
 from skillframe.robot.driven import Gains
@@ -125,7 +126,7 @@ def test_the_swing_in_air_finds_the_payload():
 
 
 def test_the_laws_own_defaults_are_those_of_the_crane_that_ships():
-    assert HydraulicGains.of(load_robot("hiab_xs031")) == HydraulicGains()
+    assert law_gains(ClosedChain(load_model(load_robot("hiab_xs031")))) == HydraulicGains()
 
 
 @pytest.mark.parametrize(("table", "key"), [("sensors", "corner_hz"), ("gains", "force_corner_hz")])
