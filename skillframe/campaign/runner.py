@@ -29,6 +29,8 @@ from skillframe.campaign.stopping import StopRule
 from skillframe.campaign.store import RESULTS, RowLog, ordered, write_results
 from skillframe.campaign.summary import summarize, write_summary
 from skillframe.files import write_whole
+from skillframe.robot.spec import load_robot
+from skillframe.robot.surroundings import collisions_note
 
 CHUNK = 64
 """Largest number of trials per job: batching has paid off by then, and a kill loses little."""
@@ -264,6 +266,9 @@ class _Session:
             self.spec, rows, self.log.sessions, complete=self._complete(), stop_after=self.rule.after, hashes=hashes
         )
         summary["environments"] = self._environments(rows)
+        robot = load_robot(str(folder / self.spec.robot))
+        if text := collisions_note(robot.name, robot.collisions):
+            summary["unwatched"] = text
         write_summary(folder, summary)
         return summary
 

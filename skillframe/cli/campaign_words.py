@@ -29,6 +29,8 @@ def conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any], as_json:
         emit_json({**summary, **where})
     else:
         _tell(folder, spec, summary)
+    if text := summary.get("unwatched"):
+        note(f"note: {text}")
     failed = any(skill["failures"] for skill in summary["skills"].values())
     if failed and (text := guess_note(load_robot(str(spec.folder / spec.robot)))):
         note(f"note: {text}")

@@ -64,12 +64,20 @@ def check(robot: str, as_json: bool) -> int:
     Example:
       skillframe robots check my_robot.urdf --json
     """
+    from dataclasses import replace
+
     from skillframe.errors import SkillframeError
     from skillframe.machine.checks.audit import audit
+    from skillframe.robot.model import load_model
     from skillframe.robot.spec import load_robot
 
     try:
-        result = audit(load_robot(robot))
+        model = load_model(load_robot(robot))
+        result = audit(model)
+        if _looks("whether bodies touch at home"):
+            from skillframe.world.collision_report import collision_problems
+
+            result = replace(result, problems=(*result.problems, *collision_problems(model)))
     except SkillframeError as error:
         if as_json:
             click.echo(json.dumps(_not_loaded(robot, str(error)), indent=2))
@@ -99,10 +107,13 @@ def show(robot: str, as_json: bool) -> None:
 
     model = load_model(load_robot(robot))
     whole, derived = _with_gains(model)
+    looks = _looks("which bodies may touch")
+    if looks:
+        from skillframe.world.collision_report import collision_lines, collision_values
     if as_json:
-        emit_json(plain(whole))
+        emit_json({**plain(whole), "collisions": collision_values(model) if looks else None})
         return
-    click.echo(describe(whole))
+    click.echo("\n".join([describe(whole), *(collision_lines(model) if looks else [])]))
     if derived:
         click.echo(f"  robot.toml does not give {', '.join(derived)}: derived from masses, oil and filters")
 
@@ -116,6 +127,19 @@ def _with_gains(model: RobotModel) -> tuple[RobotModel, list[str]]:
         return with_derived_gains(model), missing_gains(model.spec)
     except SkillframeError:
         return model, []
+
+
+def _looks(what: str) -> bool:
+    """Whether shapes can be compared here; a note where they cannot."""
+    from skillframe.cli.output import note
+    from skillframe.errors import MissingDependency, need
+
+    try:
+        need("mujoco")
+    except MissingDependency as error:
+        note(f"note: {what} is not said: {error}")
+        return False
+    return True
 
 
 def _plain(result: Audit) -> dict[str, object]:

@@ -129,7 +129,7 @@ def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) ->
     if as_json:
         named = {what: str(path) if path else None for what, path in files.items()}
         where = {"robot": meta["robot"], "world": meta["world"], "progress": meta["progress"]}
-        where |= {"scores": meta.get("scores") or {}, "notes": notes}
+        where |= {"scores": meta.get("scores") or {}, "touched": meta.get("touched"), "notes": notes}
         click.echo(json.dumps({**outcome, **judged, **where, **named}, sort_keys=True))
         return
     click.echo(f"success: {_scene(meta)}" if meta["success"] else f"failure: {meta['failure']}\n  {_scene(meta)}")

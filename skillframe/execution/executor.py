@@ -26,7 +26,7 @@ from skillframe.execution.tracemeta import SHARE_JOINTS, SHARES
 from skillframe.frames import Float
 from skillframe.handover import SLOW_TICKS, CommandCheck, Fault, asked, shown, unknown_end
 from skillframe.skill import Command, Observation, Skill, Status, no_reasons
-from skillframe.world.intrusion import LinkIntrusion
+from skillframe.world.collisions import Collisions
 from skillframe.world.quantities import QUANTITIES
 from skillframe.world.rates import ratio
 
@@ -100,8 +100,9 @@ class Loop:
         count = len(rngs)
         self.skill, self.setup, self.drive, self.count, self.skill_rngs = skill, setup, drive, count, rngs
         self.plant, self.dt = drive.plant, drive.dt
-        self.intrusion = LinkIntrusion(self.plant)
+        self.collisions = Collisions(self.plant)
         self.contact = TrueContact(setup.robot.spec.limits, count, self.dt)
+        self.touched: dict[int, tuple[str, str]] = {}
         self.faults: list[Fault] = []
         self.active = np.arange(count)
         self.reason, self.status = no_reasons(count), np.zeros(count, dtype=np.int64)
@@ -135,6 +136,7 @@ class Loop:
             self._end(self.active, tick * self.dt, "interrupted", True, Ended.INTERRUPTED)
         if len(self.active):
             self._end_broken(self.contact.look(self.active), ticks * self.dt)
+            self._end_touching(self.active, ticks * self.dt)
             text = f"time limit: {duration_s:g} s of simulated time are over"
             self._end(self.active, ticks * self.dt, text, False, Ended.TIME)
 
@@ -170,9 +172,9 @@ class Loop:
         broken = self.drive.violations(tick, self.active)
         if broken or slow or ending:
             self._end_broken([*broken, *self.contact.look(self.active)], time)
-        if slow and len(self.active):
-            touched = self.intrusion.causes(self.plant, self.active)
-            self._end_broken([Broken(row, Ended.COLLISION, cause) for row, cause in touched], time)
+        if slow or ending:
+            over = command.status[self.active] != Status.RUNNING
+            self._end_touching(self.active if slow else self.active[over], time)
         if ending:
             for i in self.active[command.status[self.active] != Status.RUNNING]:
                 self._end_told(int(i), time, int(command.status[i]), command.reason[i])
@@ -187,6 +189,12 @@ class Loop:
         for row, code, cause in broken:
             if row in self.active:
                 self._end(np.array([row]), time, f"{cause} (at {time:.3f} s)", True, code)
+
+    def _end_touching(self, rows: NDArray[np.int64], time: float) -> None:
+        """End those of some trials whose bodies touch what they may not, with the names of both."""
+        for touch in self.collisions.touches(self.plant, rows):
+            self.touched[touch.row] = touch.first, touch.second
+            self._end_broken([Broken(touch.row, Ended.COLLISION, touch.cause)], time)
 
     def _end_told(self, i: int, time: float, status: int, reason: object) -> None:
         """End trial i as its skill says."""
@@ -262,7 +270,8 @@ class Loop:
         """Sentences about what a result holds and leaves out."""
         mark = over(float(self.contact.peak[i]), self.setup.robot.spec.limits.force_n) if success else ""
         late = NOT_BY_ITSELF if success and self.ended_by[i] == Ended.TIME else ""
-        return [*(text for text in (late, mark) if text), *self.drive.notes(i)]
+        said = (late, mark, self.collisions.note)
+        return [*(text for text in said if text), *self.drive.notes(i)]
 
     def _meta(self, i: int, success: bool, failure: str) -> dict[str, Any]:
         scene, actuators = self.setup.scene, list(self.drive.actuators)
@@ -281,7 +290,8 @@ class Loop:
             "final_error_rad": float(self.errors[i, 1]), "analytic": scene.analytic,
             "progress": None if scene.way is None else scene.way.told(_known(self.way[i])),
             "events": [[time, text] for time, text in self.skill.journal(i)],
-            "limits": asdict(self.setup.limits), **({"actuators": actuators} if actuators else {}),
+            "limits": asdict(self.setup.limits), **({"touched": [*self.touched[i]]} if i in self.touched else {}),
+            **({"actuators": actuators} if actuators else {}),
         }  # fmt: skip
 
 

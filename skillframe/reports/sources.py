@@ -153,6 +153,8 @@ def read_folder(folder: Path) -> Chapter:
         _remember(chapter, folder / "results.csv", "results.csv")
     chapter.summary = _json_if_there(chapter, folder / "summary.json")
     chapter.notes += [text for text in [edited_results(folder, chapter.summary)] if text]
+    if isinstance(unwatched := chapter.summary.get("unwatched"), str):
+        chapter.notes.append(f"{unwatched[:1].upper()}{unwatched[1:]}.")
     chapter.scene = _json_if_there(chapter, folder / "scene.json")
     for path in sorted({*folder.glob("*.skill.json"), *folder.glob("skills/*.json")}):
         chapter.skills[path.name] = _json_if_there(chapter, path)

@@ -25,6 +25,7 @@ from skillframe.errors import InputError, UnknownName
 from skillframe.frames import Float
 from skillframe.robot.numbers import INERTIA
 from skillframe.robot.spec import LinkInertia, RobotSpec
+from skillframe.robot.surroundings import FIXTURE, TOOL
 from skillframe.robot.urdf import Joint, Urdf, read_urdf
 
 _LARGEST_MODEL = 300  # degrees of freedom; Pinocchio's data grows with the cube: 1.8 GB at 300
@@ -104,6 +105,15 @@ def _check_machine(spec: RobotSpec, urdf: Urdf) -> None:
     for name in (frame for loop in spec.loop for frame in (loop.frame_a, loop.frame_b)):
         if name not in urdf.links and name not in urdf.joints:
             raise UnknownName("frame", name, urdf.links, f"named in {spec.name}'s [[loop]]")
+    for obstacle in spec.obstacle:
+        if obstacle.name in urdf.links:
+            raise InputError(
+                f"{spec.folder / 'robot.toml'}: obstacle", f"{obstacle.name!r} is a link's name", "rename it"
+            )
+    ends = (*urdf.links, *(obstacle.name for obstacle in spec.obstacle), FIXTURE, TOOL)
+    for name in (name for pair in spec.collisions.ignore for name in pair):
+        if name not in ends:
+            raise UnknownName("link", name, ends, f"named in {spec.name}'s [collisions] ignore")
     for actuation in spec.actuation:
         if actuation.joint not in urdf.joints:
             raise UnknownName("joint", actuation.joint, urdf.joints, f"named in {spec.name}'s [[actuation]]")

@@ -24,6 +24,7 @@ from skillframe.robot.driven import (
     impossible,
 )
 from skillframe.robot.numbers import LARGEST
+from skillframe.robot.surroundings import DeclaredCollisions, Obstacle, unfit_obstacles
 
 OWN_DRIVES = ("hydraulic", "servo")
 Vector = tuple[float, float, float]
@@ -111,6 +112,8 @@ class RobotFile:
     actuation: tuple[Actuation, ...] = ()
     sensors: MachineNoise = field(default_factory=MachineNoise)
     gains: Gains = field(default_factory=Gains)
+    collisions: DeclaredCollisions = field(default_factory=DeclaredCollisions)
+    obstacle: tuple[Obstacle, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,6 +133,7 @@ class RobotSpec:
         payload: what is carried, where it can be changed.
         inertia: overlay by link name; loop: closed chains; actuation: what drives joints, of the kind in `drive`.
         sensors, gains: of a machine with actuators.
+        collisions: which bodies may touch; obstacle: what stands around it.
     """
 
     name: str
@@ -153,6 +157,8 @@ class RobotSpec:
     actuation: tuple[Actuation, ...] = ()
     sensors: MachineNoise = field(default_factory=MachineNoise)
     gains: Gains = field(default_factory=Gains)
+    collisions: DeclaredCollisions = field(default_factory=DeclaredCollisions)
+    obstacle: tuple[Obstacle, ...] = ()
 
     @property
     def hydraulic(self) -> bool:
@@ -289,6 +295,8 @@ def _check_values(declared: RobotFile, where: str) -> None:
     if abs(math.hypot(*place.attitude) - 1.0) > 0.01:
         size = f"has the length {math.hypot(*place.attitude):g}, not 1"
         raise InputError(f"{where}: workspace.attitude", size, "give a unit quaternion, x, y, z, w")
+    for key, problem, fix in unfit_obstacles(declared.obstacle):
+        raise InputError(f"{where}: {key}", problem, fix)
     _check_names(declared, where)
     if (load := declared.payload) is not None and not 0.0 <= load.mass <= load.rating < math.inf:
         text = f"mass {load.mass:g} kg is not within 0 and the rating of {load.rating:g} kg"

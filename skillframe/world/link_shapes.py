@@ -34,31 +34,30 @@ class LinkShape(NamedTuple):
     Attributes:
         link: name of the URDF's link; body: name of the joint that moves it, "universe" for what stands still.
         surface: (P, 3) points of the surface where the geom is only the hull of a mesh that is not convex; else None.
+        tool: it is at or beyond a tool frame, or carried.
+        guessed: nothing of the body is drawn; the shape is a capsule from its joint to the next.
     """
 
     link: str
     body: str
     geom: Geom
     surface: Float | None = None
+    tool: bool = False
+    guessed: bool = False
 
 
 def link_shapes(robot: RobotModel) -> list[LinkShape]:
-    """Shapes of every link but the tool's, in the order of the URDF."""
+    """Shapes of every link, in the order of the URDF, then those that are guessed."""
     tool = tool_links(robot)
     found: list[LinkShape] = []
-    bodies_with_any: set[str] = set()
     for name, link in robot.urdf.links.items():
-        if not robot.model.existBodyName(name):
-            continue
-        frame = robot.model.frames[robot.model.getBodyId(name)]
-        shapes = _shapes_of(robot, name, link, frame)
-        bodies_with_any |= {shape.body for shape in shapes}
-        found += [shape for shape in shapes if name not in tool]
+        if robot.model.existBodyName(name):
+            frame = robot.model.frames[robot.model.getBodyId(name)]
+            found += [shape._replace(tool=name in tool) for shape in _shapes_of(robot, name, link, frame)]
     heads = {joint.name: joint.child for joint in robot.urdf.joints.values()}
-    for joint, bone in bones(robot.model, bodies_with_any):
+    for joint, bone in bones(robot.model, {shape.body for shape in found}):
         head = heads.get(joint, robot.urdf.root)
-        if head not in tool:
-            found.append(LinkShape(head, joint, bone))
+        found.append(LinkShape(head, joint, bone, tool=head in tool, guessed=True))
     return found
 
 

@@ -257,6 +257,10 @@ class Plant:
         """Positions (N, B, 3) and axes (N, B, 3, 3) of all bodies, the world first. The positions are a live view."""
         return self._xpos, self._xmat.reshape(*self._xpos.shape, 3)
 
+    def body_coordinates(self) -> tuple[Float, Float]:
+        """Positions (N, B, 3) and quaternions w, x, y, z (N, B, 4) of all bodies, the world first, as live views."""
+        return self._xpos, self._xquat
+
     def body_poses(self) -> tuple[Float, Float]:
         """Positions (N, B, 3) and quaternions x, y, z, w (N, B, 4) of the drawn bodies: all but the world."""
         quaternion = self._xquat[:, 1:]

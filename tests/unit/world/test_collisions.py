@@ -27,9 +27,10 @@ def walled(name="panda", world="free", *geoms, **options):
 
 def causes(plant, rows=None):
     """(row, words) of what is found now."""
-    from skillframe.world.intrusion import LinkIntrusion
+    from skillframe.world.collisions import Collisions
 
-    return LinkIntrusion(plant).causes(plant, np.arange(plant.count) if rows is None else np.asarray(rows))
+    touches = Collisions(plant).touches(plant, np.arange(plant.count) if rows is None else np.asarray(rows))
+    return [(touch.row, touch.cause) for touch in touches]
 
 
 @pytest.fixture
@@ -260,7 +261,7 @@ def at_start(model, task, more, configuration):
 
 
 def ball_at(robot, joint):
-    """The scene of two arms, with a ball of 50 mm of the held fixture at a joint of one arm, clear of both tools."""
+    """The scene of two arms, with a ball of 20 mm of the held fixture at a joint of one arm, clear of both tools."""
     from skillframe.execution.prepare import load_world
 
     model, task = robot("dual_panda"), load_world("dual_peg", {})
@@ -269,7 +270,7 @@ def ball_at(robot, joint):
     position, rotation = plant.body_frames()
     fixture, body = (plant.model.body(name).id for name in ("fixture", joint))
     there = rotation[0, fixture].T @ (position[0, body] - position[0, fixture])
-    ball = Geom(kind="sphere", size=(0.05,), position=tuple(there.tolist()))
+    ball = Geom(kind="sphere", size=(0.02,), position=tuple(there.tolist()))
     return dataclasses.replace(task, fixture=(*task.fixture, ball))
 
 

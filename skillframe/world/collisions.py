@@ -1,0 +1,146 @@
+"""Does a body of the robot stand in something?
+
+Only tool and fixture push on each other, so a run could pass through a wall, a table or itself and succeed. Looking
+every 10 ms, and when a trial ends, is what makes a failure of it.
+
+What is compared with what stands in `parts`, how deep two parts are is found by `probe`. The plant has no geoms of
+links, so that looking changes no bit of a run.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from skillframe.errors import SkillframeError
+from skillframe.frames import Float, quaternion_from_matrix
+from skillframe.robot.chain import ClosedChain
+from skillframe.robot.model import RobotModel
+from skillframe.robot.surroundings import collisions_note
+from skillframe.world.parts import (
+    BASE_LINK,
+    HAND,
+    HELD,
+    HOME,
+    LINK,
+    OBSTACLE,
+    STANDING,
+    WORLD,
+    Pair,
+    Solid,
+    any_left,
+    left_out,
+    near,
+    robot_parts,
+    scene_parts,
+)
+from skillframe.world.plant import Plant
+from skillframe.world.probe import Overlap, Probe
+
+_MOVERS = (LINK, HAND, HELD, BASE_LINK, STANDING, OBSTACLE)
+
+
+class AtHome(NamedTuple):
+    """What a robot's parts are to each other at home.
+
+    Attributes:
+        parts: its links and obstacles.
+        skipped: why, by pair of indices, for every pair of them that is not looked at.
+        overlaps: pairs that are looked at and stand in each other.
+    """
+
+    parts: list[Solid]
+    skipped: dict[Pair, str]
+    overlaps: list[Overlap]
+
+
+class Touch(NamedTuple):
+    """Two bodies that touched: which trial, their names, and how deep they were in each other [m] when it was seen."""
+
+    row: int
+    first: str
+    second: str
+    depth: float
+
+    @property
+    def cause(self) -> str:
+        """In words: "link 'link5' is 79 mm inside the fixture"."""
+        return f"{self.first} is {1000.0 * self.depth:.0f} mm inside {self.second}"
+
+
+def at_home(robot: RobotModel) -> AtHome:
+    """Which pairs of a robot's links are looked at, and which stand in each other at home."""
+    parts = robot_parts(robot)
+    skipped = left_out(robot, parts)
+    probe = Probe(parts, skipped)
+    position, quaternion = _home_frames(robot)
+    joints = [parts[i].joint for i in probe.free]
+    free = np.concatenate([position[joints], quaternion[joints]], axis=-1).ravel()
+    found = probe.overlaps(free, np.zeros((0, 3)), np.zeros((0, 4)))
+    drawn = [overlap for overlap in found if near(robot, parts, overlap.pair)]
+    skipped |= {overlap.pair: HOME for overlap in drawn}
+    return AtHome(parts, skipped, [overlap for overlap in found if overlap not in drawn])
+
+
+def _home_frames(robot: RobotModel) -> tuple[Float, Float]:
+    """Position (J, 3) and quaternion w, x, y, z (J, 4) of every joint's body at home, loops closed if they close."""
+    home, data = robot.home, robot.model.createData()
+    if robot.spec.loop:
+        try:
+            chain = ClosedChain(robot)
+            home = chain.configuration(chain.minimal(robot.home))
+        except SkillframeError:
+            home = robot.home
+    pin.forwardKinematics(robot.model, data, home)
+    position = np.array([placement.translation for placement in data.oMi])
+    quaternion = quaternion_from_matrix(np.array([placement.rotation for placement in data.oMi]))
+    return position, quaternion[:, [3, 0, 1, 2]]
+
+
+class Collisions:
+    """Looks for bodies of a plant that stand in each other.
+
+    Args:
+        plant: its robot, its scene, and in each call its state.
+
+    Attributes:
+        enabled: whether anything is looked at; note: what a result has to say of that, "" if all is looked at.
+    """
+
+    def __init__(self, plant: Plant) -> None:
+        spec = plant.robot.spec
+        self.enabled, self.note = spec.collisions.enabled, collisions_note(spec.name, spec.collisions)
+        if not self.enabled:
+            return
+        known = at_home(plant.robot)
+        self._parts = [*known.parts, *scene_parts(plant.robot, plant.scene)]
+        skipped = {**left_out(plant.robot, self._parts), **known.skipped}
+        self.enabled = any_left(self._parts, skipped)
+        self._probe = Probe(self._parts, skipped)
+        self._free = self._bodies(plant, self._probe.free)
+        self._posed = self._bodies(plant, self._probe.posed)
+
+    def _bodies(self, plant: Plant, parts: list[int]) -> NDArray[np.int64]:
+        names = (self._parts[i].body for i in parts)
+        return np.array([0 if name == WORLD else plant.model.body(name).id for name in names], dtype=np.int64)
+
+    def touches(self, plant: Plant, rows: NDArray[np.int64]) -> list[Touch]:
+        """Of some trials those with a body in another, each with the deepest pair."""
+        if not (self.enabled and len(rows)):
+            return []
+        position, quaternion = plant.body_coordinates()
+        free = np.concatenate([position[rows[:, None], self._free], quaternion[rows[:, None], self._free]], axis=-1)
+        free = free.reshape(len(rows), 7 * len(self._free))
+        at, turn = position[rows[:, None], self._posed], quaternion[rows[:, None], self._posed]
+        finite = np.isfinite(free).all(axis=-1)  # a diverging trial is the limits' business
+        look = self._probe.overlaps
+        found = [(int(rows[k]), look(free[k], at[k], turn[k])) for k in np.flatnonzero(finite)]
+        return [self._touch(row, overlaps[0]) for row, overlaps in found if overlaps]
+
+    def _touch(self, row: int, overlap: Overlap) -> Touch:
+        """What moves first, and what it is in second."""
+        one, two = sorted((self._parts[i] for i in overlap.pair), key=lambda part: _MOVERS.index(part.role))
+        return Touch(row, one.name, two.name, overlap.depth)

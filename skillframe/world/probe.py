@@ -1,0 +1,148 @@
+"""Which parts stand in each other? A MuJoCo model of their shapes alone, in which nothing moves or pushes.
+
+MuJoCo's own collision detection rules pairs out (boxes around bodies, spheres around shapes); of the pairs that are
+left `mj_geomDistance` gives the depth, the shortest way that parts two convex shapes. One posture is looked at at a
+time, from the poses of the bodies alone, so that its answer depends on nothing else. The plant is not touched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from skillframe.frames import Float
+from skillframe.world.convert import add_geom
+from skillframe.world.parts import BITS, OBSTACLE, STANDING, Pair, Solid
+
+TOLERANCE = 1e-3
+"""Depth that is let pass [m]; ours: the resolution of drawn primitives."""
+_POINT = "point"
+_ARENA = 4 * 1024 * 1024  # bytes; room for some thousand contacts
+
+
+class Overlap(NamedTuple):
+    """Two parts in each other, by index, and how deep [m]."""
+
+    pair: Pair
+    depth: float
+
+
+class Probe:
+    """Looks for parts that stand in each other.
+
+    Args:
+        parts: all of them.
+        skip: pairs that are not looked at, first the smaller index.
+
+    Attributes:
+        free: indices of the parts that move, in the order of the rows that `overlaps` takes.
+        posed: indices of those that stand where each trial puts them.
+    """
+
+    def __init__(self, parts: Sequence[Solid], skip: Collection[Pair]) -> None:
+        self.free = [i for i, part in enumerate(parts) if part.role not in (OBSTACLE, STANDING)]
+        self.posed = [i for i, part in enumerate(parts) if part.role == STANDING]
+        spec = mujoco.MjSpec()
+        spec.memory = _ARENA
+        for index in (*self.free, *self.posed, *(i for i, p in enumerate(parts) if p.role == OBSTACLE)):
+            self._add(spec, parts[index], index)
+        for one, two in skip:
+            spec.add_exclude(bodyname1=_body(one), bodyname2=_body(two))
+        point = spec.worldbody.add_geom(name=_POINT, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[1e-9, 0, 0])
+        point.contype = point.conaffinity = 0
+        self._model = spec.compile()
+        self._data = mujoco.MjData(self._model)
+        self._point = int(self._model.geom(_POINT).id)
+        self._index(parts)
+
+    def _add(self, spec: mujoco.MjSpec, part: Solid, index: int) -> None:
+        body = spec.worldbody.add_body(name=_body(index), mocap=part.role == STANDING)
+        if part.role not in (OBSTACLE, STANDING):
+            body.add_joint(name=_body(index), type=mujoco.mjtJoint.mjJNT_FREE)
+            body.mass, body.inertia, body.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
+        bits, meets = BITS[part.role]
+        for k, (geom, _) in enumerate(part.shapes):
+            solid = replace(geom, collide=True)  # links are drawn as shapes that push on nothing
+            add_geom(spec, body, solid, f"{_body(index)}_{k}", contype=bits, conaffinity=meets, friction=0.0)
+
+    def _index(self, parts: Sequence[Solid]) -> None:
+        """Of every geom the part that it is of, and points of its surface if only its hull is convex."""
+        self._part = np.full(self._model.ngeom, -1)
+        self._surface: dict[int, Float] = {}
+        for i, part in enumerate(parts):
+            for k, (_, surface) in enumerate(part.shapes):
+                geom = int(self._model.geom(f"{_body(i)}_{k}").id)
+                self._part[geom] = i
+                if surface is not None:
+                    self._surface[geom] = self._in_geom(geom, surface)
+
+    def _in_geom(self, geom: int, points: Float) -> Float:
+        """Points of a body's frame in the frame that MuJoCo gave a mesh."""
+        rotation = np.zeros(9)
+        mujoco.mju_quat2Mat(rotation, self._model.geom_quat[geom])
+        return np.asarray((points - self._model.geom_pos[geom]) @ rotation.reshape(3, 3))
+
+    def overlaps(self, free: Float, position: Float, quaternion: Float) -> list[Overlap]:
+        """Pairs that are deeper in each other than `TOLERANCE`, the deepest first.
+
+        Args:
+            free: (7 F,) position and quaternion (w, x, y, z) in base of every part that moves.
+            position: (P, 3) of those that each trial puts somewhere.
+            quaternion: (P, 4) of the same.
+        """
+        data = self._data
+        data.qpos[:] = free
+        if self.posed:
+            data.mocap_pos[:], data.mocap_quat[:] = position, quaternion
+        mujoco.mj_kinematics(self._model, data)
+        mujoco.mj_collision(self._model, data)
+        return self._depths() if data.ncon else []
+
+    def _depths(self) -> list[Overlap]:
+        deepest: dict[Pair, float] = {}
+        for one, two in np.unique(self._data.contact.geom, axis=0).tolist():
+            i, k = sorted((int(self._part[one]), int(self._part[two])))
+            depth = self._depth(one, two)
+            if depth > max(TOLERANCE, deepest.get((i, k), 0.0)):
+                deepest[i, k] = depth
+        return sorted((Overlap(*item) for item in deepest.items()), key=lambda found: -found.depth)
+
+    def _depth(self, one: int, two: int) -> float:
+        """Depth of two shapes in each other [m]. Of a mesh that is not convex, that of its deepest point."""
+        depth = -self._distance(one, two)
+        for geom, other in ((one, two), (two, one)):
+            if geom in self._surface and depth > TOLERANCE:
+                depth = min(depth, self._deepest_point(geom, other))
+        return depth
+
+    def _deepest_point(self, geom: int, other: int) -> float:
+        at, turn = self._frame(geom)
+        points = at + self._surface[geom] @ turn.T
+        deepest = 0.0
+        for point in points[self._inside_box(other, points)]:
+            self._data.geom_xpos[self._point] = point
+            deepest = max(deepest, -self._distance(self._point, other))
+        return deepest
+
+    def _frame(self, geom: int) -> tuple[Float, Float]:
+        return self._data.geom_xpos[geom], self._data.geom_xmat[geom].reshape(3, 3)
+
+    def _inside_box(self, geom: int, points: Float) -> Float:
+        """(P,) which points lie in the box around a geom. All that is below a plane counts as inside."""
+        at, turn = self._frame(geom)
+        local = (points - at) @ turn
+        if self._model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE:
+            return np.asarray(local[:, 2] < 0.0)
+        box = self._model.geom_aabb[geom]
+        return np.asarray((np.abs(local - box[:3]) <= box[3:]).all(axis=1))
+
+    def _distance(self, one: int, two: int) -> float:
+        return float(mujoco.mj_geomDistance(self._model, self._data, one, two, 0.0, None))
+
+
+def _body(index: int) -> str:
+    return f"p{index}"
