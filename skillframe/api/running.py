@@ -24,6 +24,7 @@ from skillframe.execution.trace import Trace
 from skillframe.files import write_whole
 from skillframe.robot.guesses import guess_note
 from skillframe.robot.model import RobotModel
+from skillframe.robot.resistance import resistance_note
 from skillframe.skill import Skill
 from skillframe.world.scene import Scene
 
@@ -232,8 +233,9 @@ def once(
     typed = "" if learned is None else _command(learned, world, robot, coc, set, seed, duration_s, rate_hz, scores)
     if typed:
         trace.meta["command"] = typed
-    if not result.success[0] and (guess := guess_note(model.spec)):
-        trace.meta["notes"] = [*trace.meta.get("notes", []), guess]
+    if not result.success[0]:
+        doubts = [text for text in (guess_note(model.spec), resistance_note(model)) if text]
+        trace.meta["notes"] = [*trace.meta.get("notes", []), *doubts]
     arms = result.arm_traces[0] if isinstance(result, ArmsResult) and result.arm_traces else {}
     return SingleRun(trace=trace, arms=arms, interrupted=result.interrupted, unscored=_score(trace, scores))
 

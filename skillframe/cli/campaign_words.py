@@ -22,6 +22,8 @@ def conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any], as_json:
     from skillframe.campaign.folder import robot_notes
     from skillframe.campaign.summary import below_bar
     from skillframe.robot.guesses import guess_note
+    from skillframe.robot.model import load_model
+    from skillframe.robot.resistance import resistance_note
     from skillframe.robot.spec import load_robot
 
     if as_json:
@@ -32,9 +34,9 @@ def conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any], as_json:
     if text := summary.get("unwatched"):
         note(f"note: {text}")
     failed = any(skill["failures"] for skill in summary["skills"].values())
-    if failed and (text := guess_note(load_robot(str(spec.folder / spec.robot)))):
-        note(f"note: {text}")
-    for text in robot_notes(folder):
+    robot = load_model(load_robot(str(spec.folder / spec.robot))) if failed else None
+    doubts = [] if robot is None else [guess_note(robot.spec), resistance_note(robot)]
+    for text in filter(None, [*doubts, *robot_notes(folder)]):
         note(f"note: {text}")
     short = below_bar(spec, summary)
     if short:

@@ -8,6 +8,7 @@ from skillframe.robot.bodies import missing_meshes
 from skillframe.robot.model import RobotModel, mimic_joints
 from skillframe.robot.numbers import numbers
 from skillframe.robot.problems import Problem
+from skillframe.robot.resistance import hurting
 from skillframe.robot.urdf import Joint
 
 _ACTUATED = ("revolute", "continuous", "prismatic")
@@ -24,6 +25,7 @@ def joint_warnings(robot: RobotModel) -> Iterator[Problem]:
             text = f"joint {joint.name!r} is continuous: it has two coordinates in q (cosine, sine) and one in v"
             yield _warning("continuous", joint.name, text, "nothing to do; give angles in [home] as usual")
     yield from _mimic(robot)
+    yield from _resisting(robot)
     for uri, link in missing_meshes(robot.urdf).items():
         text = f"mesh {uri!r} is not found; the robot works without it, its drawing and size do not know this shape"
         yield _warning(
@@ -66,6 +68,16 @@ def _position(joint: Joint) -> Iterator[Problem]:
     elif low > high:
         text = f"joint {joint.name!r} has its limits reversed ({low:g} > {high:g}); {_FREE}"
         yield _warning("reversed_limits", joint.name, text, "exchange lower and upper")
+
+
+def _resisting(robot: RobotModel) -> Iterator[Problem]:
+    """Joints whose friction and damping take a good part of what skills push with."""
+    head = "put this into robot.toml, with what the maker says (0 where the arm compensates by itself):"
+    for one in hurting(robot) if not robot.spec.hydraulic else ():
+        text = f"joint {one.joint!r} has {one.figures}, which takes {one.push:.2g} N of the 20 N that skills push with"
+        text += "; it is compensated while the joint moves, not at rest" if robot.spec.dynamics.compensate else ""
+        fix = f"{head}\n[dynamics.joint]\n{one.joint} = {{ friction = 0.0, damping = 0.0 }}"
+        yield _warning("joint_resists", one.joint, text, fix)
 
 
 def _mimic(robot: RobotModel) -> Iterator[Problem]:

@@ -13,7 +13,7 @@ import os
 import sys
 import tempfile
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 
 from skillframe.errors import InputError, UnknownName
 from skillframe.frames import Float
+from skillframe.robot.joint_settings import JointDynamics
 from skillframe.robot.numbers import INERTIA
 from skillframe.robot.spec import LinkInertia, RobotSpec
 from skillframe.robot.surroundings import FIXTURE, TOOL
@@ -102,6 +103,9 @@ def _check_machine(spec: RobotSpec, urdf: Urdf) -> None:
     for joint in spec.friction_share:
         if joint not in urdf.joints:
             raise UnknownName("joint", joint, urdf.joints, f"named in {spec.name}'s [friction_share]")
+    for joint in spec.dynamics.joint:
+        if joint not in urdf.joints:
+            raise UnknownName("joint", joint, urdf.joints, f"named in {spec.name}'s [dynamics]")
     for name in (frame for loop in spec.loop for frame in (loop.frame_a, loop.frame_b)):
         if name not in urdf.links and name not in urdf.joints:
             raise UnknownName("frame", name, urdf.links, f"named in {spec.name}'s [[loop]]")
@@ -155,7 +159,7 @@ def _frame(model: pin.Model, name: str) -> int:
 def _build(urdf: Urdf, spec: RobotSpec, mimic: bool) -> tuple[pin.Model, str]:
     """The model, and why mimic joints had to be made independent (empty if they follow)."""
     _check_size(urdf)
-    text = _bare_tree(urdf, spec.inertia)
+    text = _bare_tree(urdf, spec)
     arguments = [text] if spec.base == "fixed" else [text, pin.JointModelFreeFlyer(), ROOT_JOINT]
     if mimic:
         try:
@@ -178,8 +182,9 @@ def _check_size(urdf: Urdf) -> None:
         raise InputError(urdf.path, text, "fix joints that do not matter")
 
 
-def _bare_tree(urdf: Urdf, overlay: Mapping[str, LinkInertia]) -> str:
-    """URDF text with inertias and joints only. The overlay replaces a link's own inertia."""
+def _bare_tree(urdf: Urdf, spec: RobotSpec) -> str:
+    """URDF text with inertias and joints only. [inertia] and [dynamics] replace a link's and a joint's own."""
+    overlay = spec.inertia
     robot = ET.Element("robot", name=urdf.name)
     for name, link in urdf.links.items():
         bare = ET.SubElement(robot, "link", name=name)
@@ -189,7 +194,7 @@ def _bare_tree(urdf: Urdf, overlay: Mapping[str, LinkInertia]) -> str:
         elif inertial is not None:
             bare.append(inertial)
     for joint in urdf.joints.values():
-        robot.append(_bare_joint(joint))
+        robot.append(_bare_joint(joint, spec.dynamics.joint.get(joint.name)))
     return ET.tostring(robot, encoding="unicode")
 
 
@@ -200,12 +205,13 @@ def _write_inertia(link: ET.Element, inertia: LinkInertia) -> None:
     ET.SubElement(inertial, "inertia", dict(zip(INERTIA, map(repr, inertia.inertia), strict=True)))
 
 
-def _bare_joint(joint: Joint) -> ET.Element:
+def _bare_joint(joint: Joint, own: JointDynamics | None) -> ET.Element:
     bare = ET.Element("joint", name=joint.name, type=joint.type)
-    for tag in ("parent", "child", "origin", "axis", "mimic", "dynamics"):
+    for tag in ("parent", "child", "origin", "axis", "mimic"):
         element = joint.element.find(tag)
         if element is not None:
             bare.append(element)
+    _add_dynamics(bare, joint.element.find("dynamics"), own)
     limit = joint.element.find("limit")
     given = {"effort": "0", "velocity": "0", **(limit.attrib if limit is not None else {})}
     if joint.type in _FREE_RANGE and float(given.get("lower", 0.0)) >= float(given.get("upper", 0.0)):
@@ -213,6 +219,17 @@ def _bare_joint(joint: Joint) -> ET.Element:
     if limit is not None or joint.type in _FREE_RANGE:
         ET.SubElement(bare, "limit", {k: v for k, v in given.items() if k in ("effort", "velocity", "lower", "upper")})
     return bare
+
+
+def _add_dynamics(bare: ET.Element, given: ET.Element | None, own: JointDynamics | None) -> None:
+    """Friction and damping as the URDF gives them, or as robot.toml does."""
+    values = dict(given.attrib) if given is not None else {}
+    for what in ("friction", "damping"):
+        value = None if own is None else getattr(own, what)
+        if value is not None:
+            values[what] = repr(value)
+    if values:
+        ET.SubElement(bare, "dynamics", values)
 
 
 def _free_missing_limits(model: pin.Model) -> None:

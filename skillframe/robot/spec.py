@@ -23,6 +23,7 @@ from skillframe.robot.driven import (
     MachineNoise,
     impossible,
 )
+from skillframe.robot.joint_settings import Dynamics, impossible_joints
 from skillframe.robot.numbers import LARGEST
 from skillframe.robot.surroundings import DeclaredCollisions, Obstacle, unfit_obstacles
 
@@ -105,6 +106,7 @@ class RobotFile:
     workspace: Workspace = field(default_factory=Workspace)
     friction_share: dict[str, float] = field(default_factory=dict)
     motor_inertia: dict[str, float] = field(default_factory=dict)
+    dynamics: Dynamics = field(default_factory=Dynamics)
     inertia: dict[str, LinkInertia] = field(default_factory=dict)
     payload: DeclaredPayload | None = None
     loop: tuple[LoopClosure, ...] = ()
@@ -130,6 +132,7 @@ class RobotSpec:
         friction_share: part of the drawn `robot.joint_friction` that a joint gets, by name; 1 for joints not named.
         motor_inertia: what motor and gear add to a joint's inertia, by name: the rotor's times the gear ratio squared
             [kg m^2, or kg where the joint slides]; 0 for joints not named.
+        dynamics: friction and damping of joints in place of the URDF's, and whether the controller compensates them.
         payload: what is carried, where it can be changed.
         inertia: overlay by link name; loop: closed chains; actuation: what drives joints, of the kind in `drive`.
         sensors, gains: of a machine with actuators.
@@ -150,6 +153,7 @@ class RobotSpec:
     workspace: Workspace = field(default_factory=Workspace)
     friction_share: dict[str, float] = field(default_factory=dict)
     motor_inertia: dict[str, float] = field(default_factory=dict)
+    dynamics: Dynamics = field(default_factory=Dynamics)
     inertia: dict[str, LinkInertia] = field(default_factory=dict)
     payload: DeclaredPayload | None = None
     loop: tuple[LoopClosure, ...] = ()
@@ -289,6 +293,8 @@ def _check_values(declared: RobotFile, where: str) -> None:
         if not 0.0 <= inertia_of_motor <= LARGEST:
             text = f"is {inertia_of_motor:g}"
             raise InputError(f"{where}: motor_inertia.{joint}", text, "give 0 or more, as felt at the joint [kg m^2]")
+    for key, problem, fix in impossible_joints(declared.dynamics):
+        raise InputError(f"{where}: {key}", problem, fix)
     place = declared.workspace
     if not all(abs(x) <= LARGEST for x in place.fixture):
         raise InputError(f"{where}: workspace.fixture", "is beyond any physical size", "give metres in base")
@@ -309,6 +315,9 @@ def _check_values(declared: RobotFile, where: str) -> None:
 def _check_machine(declared: RobotFile, where: str) -> None:
     """Sensors and gains of a hydraulic machine, and of nothing else."""
     kind = None if declared.drive is None else declared.drive.kind
+    if declared.dynamics.compensate and declared.actuation and kind in (None, "hydraulic"):
+        text = "a hydraulic machine's law identifies friction by itself"
+        raise InputError(f"{where}: dynamics.compensate", text, "leave it out")
     if kind in OWN_DRIVES and not declared.actuation:
         raise InputError(f"{where}: drive", "there is no [[actuation]] that it could be the kind of", "leave it out")
     if kind == "servo" and (declared.loop or len(declared.arm) > 1):

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from skillframe.control.controller import ImpedanceController, Reading
 from skillframe.control.endings import Broken
+from skillframe.control.joint_friction import FrictionCompensation
 from skillframe.control.limits import LimitGuard
 from skillframe.control.motors import Motors, joint_limits, unstated
 from skillframe.execution.drive import Shares, Trials
@@ -90,6 +91,8 @@ class TorqueDrive:
         limits = joint_limits(setup.robot, self.plant.model, limb.dofs)
         rate = setup.limits.torque_rate_nm_s
         self.motors = Motors(limits, rate, self.rows, self.dt) if limits else None
+        known = setup.robot.spec.dynamics.compensate
+        self._friction = FrictionCompensation(self.plant.model, limb.dofs, self.rows) if known else None
         self._unstated = unstated(setup.robot) if limits else []
         self.guard = LimitGuard(setup.limits, self.rows, self.dt, self.motors)
 
@@ -126,6 +129,8 @@ class TorqueDrive:
     def act(self, command: Command, ramp: float) -> Float:
         """Joint torques that the motors give, and the law's wrench (rows, 6), returned."""
         self._torque, self._law = self.controller.torque(command, self._reading, ramp)
+        if self._friction is not None:
+            self._torque = self._torque + self._friction.torque(self._reading.velocity)
         if self.motors is not None:
             self._torque = self.motors.held(self._torque, self._reading.velocity, self.limb.joint_positions())
         return self._law
