@@ -73,6 +73,19 @@ def critical_damping(
     return damping
 
 
+def raised_damping(damping: Float, floor: tuple[float, float]) -> Float:
+    """Given damping (..., 6, 6), its symmetric translational and rotational parts raised to a floor; couplings stay.
+
+    Args:
+        damping: (6, 6) or (N, 6, 6).
+        floor: least eigenvalue of the translational [Ns/m] and rotational [Nms/rad] part.
+    """
+    result = damping.copy()
+    for part, least in ((slice(0, 3), floor[0]), (slice(3, 6), floor[1])):
+        result[..., part, part] = _raise_to(damping[..., part, part], least)
+    return result
+
+
 def _eigen(matrix: Float) -> tuple[Float, Float]:
     """Eigenvalues (..., n) and vectors (..., n, n). NaN for a matrix that is not finite, as of a trial that diverged.
 

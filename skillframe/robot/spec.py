@@ -23,6 +23,7 @@ from skillframe.robot.driven import (
     MachineNoise,
     impossible,
 )
+from skillframe.robot.interface import Control, check_control
 from skillframe.robot.joint_settings import Dynamics, impossible_joints
 from skillframe.robot.numbers import LARGEST
 from skillframe.robot.surroundings import DeclaredCollisions, Obstacle, unfit_obstacles
@@ -38,13 +39,6 @@ class Arm:
 
     name: str
     tool_frame: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Control:
-    """How the robot is controlled: `rate_hz` of the impedance loop [Hz]."""
-
-    rate_hz: float = 1000.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -279,6 +273,8 @@ def _check_values(declared: RobotFile, where: str) -> None:
     for key, value in positive.items():
         if value is not None and not (0.0 < value < math.inf):
             raise InputError(f"{where}: {key}", f"is {value:g}", "give a positive, finite number")
+    check_control(declared.control, where)
+    _check_interface(declared, where)
     _check_machine(declared, where)
     for joint, value in declared.home.items():
         if not math.isfinite(value):
@@ -331,6 +327,22 @@ def _check_machine(declared: RobotFile, where: str) -> None:
         none = f"its {what}" if declared.actuation else "there is no [[actuation]]"
         text = f"[sensors] and [gains] are those of a machine with actuators, and {none}"
         raise InputError(where, text, "leave them out; a wrist sensor's noise is varied as `sensor.*` in a campaign")
+
+
+def _check_interface(declared: RobotFile, where: str) -> None:
+    """Velocities and positions are taken by one arm on a fixed base, whose joints nothing else drives."""
+    kind = declared.control.interface
+    if kind == "torque":
+        return
+    others = {
+        "is a machine whose joints are driven as [[actuation]] says": declared.actuation,
+        "has a drive of its own": declared.drive, "has closed loops": declared.loop,
+        "has several arms": len(declared.arm) > 1, "stands on a free base": declared.base == "free",
+    }  # fmt: skip
+    for what, true in others.items():
+        if true:
+            text = f"is {kind!r}, which one arm on a fixed base takes, and this robot {what}"
+            raise InputError(f"{where}: control.interface", text, 'leave it out, or write "torque"')
 
 
 def _check_names(declared: RobotFile, where: str) -> None:
