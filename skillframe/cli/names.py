@@ -37,6 +37,12 @@ def _robot_names() -> Iterable[str]:
     return robot_names()
 
 
+def _arm_classes() -> Iterable[str]:
+    from skillframe.robot.guesses import CLASSES
+
+    return CLASSES
+
+
 def _registered(*kinds: str) -> Callable[[], Iterable[str]]:
     def names() -> Iterable[str]:
         from skillframe.extend.registry import registry
@@ -47,6 +53,7 @@ def _registered(*kinds: str) -> Callable[[], Iterable[str]]:
 
 
 robots = _completed(_robot_names)
+arm_classes = _completed(_arm_classes)
 worlds = _completed(_registered("world"))
 skills = _completed(_registered("skill", "coordinator"))
 segmenters = _completed(_registered("segmenter"))

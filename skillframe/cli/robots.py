@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from skillframe.robot.audit import Audit
     from skillframe.robot.model import RobotModel
 
+_MASS = "The robot's mass, base included, as on its data sheet: masses that have to be guessed are scaled to it."
+_CLASS = "Instead of --mass, kind and payload in kg: cobot-3, -5, -10, -16, -20, industrial-7, -12, -25."
+
 
 @click.group()
 def command() -> None:
@@ -54,26 +57,32 @@ def list_robots(as_json: bool) -> int:
 
 @command.command()
 @click.argument("robot", metavar="URDF|NAME", shell_complete=names.robots)
+@click.option("--mass", "total_kg", type=float, metavar="KG", help=_MASS)
+@click.option("--class", "kind", metavar="NAME", shell_complete=names.arm_classes, help=_CLASS)
 @click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
-def check(robot: str, as_json: bool) -> int:
+def check(robot: str, total_kg: float | None, kind: str | None, as_json: bool) -> int:
     """Is a robot usable for dynamics? A URDF, a robot.toml, or a name.
 
     Exit code 0: usable; 1: it loads and is not; 2: it does not load.
 
     \b
     Example:
-      skillframe robots check my_robot.urdf --json
+      skillframe robots check my_robot.urdf --mass 33.5
     """
     from dataclasses import replace
 
-    from skillframe.errors import SkillframeError
+    from skillframe.errors import InputError, SkillframeError
     from skillframe.machine.checks.audit import audit
+    from skillframe.robot.guesses import class_mass
     from skillframe.robot.model import load_model
     from skillframe.robot.spec import load_robot
 
+    if kind is not None and total_kg is not None:
+        raise InputError("--class", "and --mass say the same thing", "give one of them")
+    total_kg = total_kg if kind is None else class_mass(kind)
     try:
         model = load_model(load_robot(robot))
-        result = audit(model)
+        result = audit(model, total_kg)
         if _looks("whether bodies touch at home"):
             from skillframe.world.collision_report import collision_problems
 

@@ -13,11 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from skillframe.errors import InputError
-from skillframe.robot.bodies import Body, rigid_bodies
+from skillframe.robot.bodies import Body
 from skillframe.robot.joint_checks import joint_warnings
 from skillframe.robot.link_checks import (
     Given,
     given_inertias,
+    guessed_bodies,
     impossible_inertias,
     inertia_fix,
     missing_inertias,
@@ -46,14 +47,19 @@ class Audit:
     problems: tuple[Problem, ...]
 
 
-def audit(robot: RobotSpec | RobotModel) -> Audit:
+def audit(robot: RobotSpec | RobotModel, total_kg: float | None = None) -> Audit:
     """Check a robot.
 
+    Args:
+        robot: as declared, or loaded.
+        total_kg: mass of the whole robot, its base included, that guessed masses are scaled to.
+
     Raises:
-        InputError, UnknownName: it does not load.
+        InputError, UnknownName: it does not load, or its links weigh more than `total_kg` already.
     """
     robot = load_model(robot) if isinstance(robot, RobotSpec) else robot
-    bodies, given = rigid_bodies(robot.urdf), given_inertias(robot)
+    given = given_inertias(robot)
+    bodies = guessed_bodies(robot, given, total_kg)
     problems = [
         *mass_matrix_problems(robot, given, bodies),
         *impossible_inertias(robot, given, bodies),

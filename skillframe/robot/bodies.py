@@ -30,6 +30,7 @@ class Body:
         links: names of its links, the first one carries the joint.
         reach: to child joints and geometry [m], 0 where unknown; bound: the reach is only a lower bound.
         far: (3,) the child joint farthest away, in body axes [m].
+        guess: mass that it is guessed to have [kg], 0 before anybody guesses.
     """
 
     joint: str | None
@@ -38,6 +39,7 @@ class Body:
     reach: float = 0.0
     bound: bool = False
     far: Float = field(default_factory=lambda: np.zeros(3))
+    guess: float = 0.0
 
 
 def rigid_bodies(urdf: Urdf) -> list[Body]:

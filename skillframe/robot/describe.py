@@ -13,6 +13,7 @@ from skillframe.frames import quaternion_from_matrix, rotation_vector
 from skillframe.robot.bodies import rigid_bodies
 from skillframe.robot.chain import ClosedChain
 from skillframe.robot.driven import Actuation
+from skillframe.robot.guesses import guess_note
 from skillframe.robot.kinematics import tool_pose
 from skillframe.robot.link_checks import given_inertias
 from skillframe.robot.model import RobotModel
@@ -30,6 +31,7 @@ def describe(robot: RobotModel) -> str:
         f"  control {spec.control.rate_hz:g} Hz, fixture at {_triple(spec.workspace.fixture)} m in base",
         f"  limits: {_limits(robot)}",
     ]
+    lines += [f"  {note}"] if (note := guess_note(spec)) else []
     lines += ["", "  joints that turn in rad, rad/s and Nm, joints that slide in m, m/s and N"]
     lines += [f"  {'joint':<20}{'home':>16}{'lower':>12}{'upper':>12}{'velocity':>12}{'effort':>10}"]
     lines += [_joint(robot, index) for index in range(1, model.njoints)]

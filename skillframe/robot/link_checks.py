@@ -14,8 +14,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from skillframe.frames import Float
-from skillframe.robot.bodies import Body, placement, size_of
-from skillframe.robot.guesses import cylinder, guessed_masses, lengths
+from skillframe.robot.bodies import Body, placement, rigid_bodies, size_of
+from skillframe.robot.guesses import cylinder, guess_masses, lengths
 from skillframe.robot.model import RobotModel
 from skillframe.robot.numbers import INERTIA, numbers
 from skillframe.robot.problems import Problem, overlay_fix
@@ -55,10 +55,23 @@ def given_inertias(robot: RobotModel) -> dict[str, Given]:
     return given
 
 
+def guessed_bodies(robot: RobotModel, given: Mapping[str, Given], total_kg: float | None) -> list[Body]:
+    """The robot's bodies, each with the mass that it is guessed to have where none is given.
+
+    Raises:
+        InputError: `total_kg` is not more than the masses that are given.
+    """
+    bodies = rigid_bodies(robot.urdf)
+    sums = {i: sum(given[n].mass for n in body.links if n in given) for i, body in enumerate(bodies)}
+    known = {i: mass for i, mass in sums.items() if mass > 0.0}
+    guess_masses(bodies, known, robot.spec.base == "free", total_kg)
+    return bodies
+
+
 def inertia_fix(links: list[str], given: Mapping[str, Given], bodies: list[Body]) -> str:
     """The fix: overlay lines for links, with the mass and centre that they have if these are possible."""
     lines = {}
-    for body, length, mass in zip(bodies, lengths(bodies), guessed_masses(bodies), strict=True):
+    for body, length in zip(bodies, lengths(bodies), strict=True):
         size = size_of(body, bodies)
         solid = min(length, _SLENDER * size) if size > 0.0 else length  # or the fix would be oversized itself
         for name in (n for n in links if n in body.links):
@@ -66,7 +79,7 @@ def inertia_fix(links: list[str], given: Mapping[str, Given], bodies: list[Body]
             center = own.com if own is not None and np.linalg.norm(own.com) <= max(size, length) else 0.5 * body.far
             known = own is not None and own.mass > 0.0
             at = (float(center[0]), float(center[1]), float(center[2]))
-            lines[name] = cylinder(own.mass if own is not None and known else mass, solid, at, not known)
+            lines[name] = cylinder(own.mass if own is not None and known else body.guess, solid, at, not known)
     return overlay_fix(lines)
 
 

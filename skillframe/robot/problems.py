@@ -31,7 +31,8 @@ def overlay_fix(inertias: Mapping[str, LinkInertia]) -> str:
     """The fix of a message: robot.toml lines that give links an inertia."""
     lines = [_overlay_line(link, inertia) for link, inertia in inertias.items()]
     guessed = [inertia.mass for inertia in inertias.values() if inertia.guessed]
-    scale = f" ({sum(guessed):.3g} kg together: scale them to the maker's total)" if len(guessed) > 1 else ""
+    how = "type --mass and the data sheet's total, or --class"
+    scale = f" ({sum(guessed):.3g} kg together; {how})" if len(guessed) > 1 else ""
     head = f"put this into a robot.toml, with figures from CAD where they are guesses{scale}:"
     return "\n".join([head, "[inertia]", *lines])
 

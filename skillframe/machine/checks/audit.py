@@ -23,14 +23,18 @@ from skillframe.robot.problems import Problem
 from skillframe.robot.spec import Limits, RobotSpec
 
 
-def audit(robot: RobotSpec | RobotModel) -> Audit:
+def audit(robot: RobotSpec | RobotModel, total_kg: float | None = None) -> Audit:
     """Check a robot, and what drives it: the audit of `skillframe.robot.audit` and the warnings of this module.
 
+    Args:
+        robot: as declared, or loaded.
+        total_kg: mass of the whole robot, its base included, that guessed masses are scaled to.
+
     Raises:
-        InputError, UnknownName: it does not load.
+        InputError, UnknownName: it does not load, or its links weigh more than `total_kg` already.
     """
     model = load_model(robot) if isinstance(robot, RobotSpec) else robot
-    found = audit_robot(model)
+    found = audit_robot(model, total_kg)
     return replace(found, problems=(*found.problems, *machine_warnings(model)))
 
 
