@@ -41,6 +41,7 @@ from skillframe.machine.force.findings import findings
 from skillframe.machine.force.load import BelievedLoad
 from skillframe.machine.force.momentum import Estimate, ForceSettings
 from skillframe.machine.force.residual_noise import residual_noise
+from skillframe.machine.force.ringing import Ringing
 from skillframe.machine.force.valve import ValveIdentification, ValveSettings
 from skillframe.machine.law.gains import law_gains
 from skillframe.machine.law.hydraulic import Demand, Measured, Reference, plane_task
@@ -59,9 +60,6 @@ __all__ = ["MachineDrive"]
 SWING_S = CALIBRATION_S + SETTLE_S
 VALVES_S = 0.5
 """So often the swing's rows are fitted again for overlap and supply pressure of the valves (ours)."""
-AT_STOP, WILD = 0.99, 0.5
-"""Opening of a valve at its stop, and the share of the swing for which one may be (ours; at 150 bar and with friction
-by a third too large it is 0.18, of a sound crane 0, and of one whose gains are ten times too large 0.97)."""
 
 
 class MachineDrive:
@@ -168,7 +166,7 @@ class MachineDrive:
         broken = self.actuated.failed(self.active)
         self._leave(broken)
         self.estimator.calibrate(True)
-        stopped = np.zeros(self.count)
+        ringing = Ringing(self.count, self.dt, SWING_S)
         for tick in range(round(SWING_S / self.dt)):
             position, velocity, joint, joint_rate = swing(tick * self.dt)
             stiff = LEAST_DAMPING * np.broadcast_to(np.eye(2), (self.count, 2, 2))
@@ -187,10 +185,10 @@ class MachineDrive:
             if failed := self.advance(self.active):
                 broken += failed
                 self._leave(failed)
-            stopped += np.abs(self.demand.valve).max(axis=1) > AT_STOP
+            ringing.step(self.terms.tip_rate, velocity)
             if not len(self.active):
                 break
-        broken += self._wild(stopped / (tick + 1))
+        broken += self._ringing(ringing)
         self.estimator.calibrate(False)
         hold_what_was_found(self.law, self.estimator.identification)
         self.findings = findings(self.law, self.load, self.estimator.identification, self.valves)
@@ -204,12 +202,10 @@ class MachineDrive:
             self.active = np.setdiff1d(self.active, rows)
             self.end(rows)
 
-    def _wild(self, share: Float) -> list[Broken]:
-        """The trials whose valves were at their stops for such shares (N,) of the swing: nothing was identified."""
-        text = "it swings by itself in the air, its valves at their stops for {:.0%} of the time"
-        cure = "lower gains.body, velocity_gain or force_gain in robot.toml"
-        wild = self.active[share[self.active] > WILD]
-        return [Broken(int(i), Ended.MACHINE, f"{text.format(share[i])}; {cure}") for i in wild]
+    def _ringing(self, swung: Ringing) -> list[Broken]:
+        """The trials that rang in the swing: nothing was identified, and nothing should be touched."""
+        said = swung.sentences(self.law)
+        return [Broken(int(i), Ended.MACHINE, said[i]) for i in self.active if said[i]]
 
     def _look_at_valves(self, tick: int) -> None:
         """Identify them, and let the law go by what is known so far: what it learns of inertias depends on it."""

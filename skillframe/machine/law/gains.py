@@ -156,7 +156,7 @@ def _valve_noise(c: Cylinders, state: ChainState, velocity: Float, body: float, 
     rates = spec.sensors.encoder * _passed(1, (corner,), dt)
     changes = spec.sensors.encoder * _passed(2, (corner, a_corner), dt)
     forces = spec.sensors.pressure * _passed(0, (corner,), dt) * np.hypot(c.area_a, c.area_b)
-    needed: Float = np.linalg.solve(state.arms.T, body * _damping(state))  # (k, n): piston force over rates
+    needed = np.asarray(np.linalg.solve(state.arms.T, body * _damping(state)), dtype=float)  # (k, n), over rates
     size = [
         velocity * norm(state.arms) * rates,
         norm(needed) * changes / c.bulk_modulus,
