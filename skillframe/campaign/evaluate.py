@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from skillframe.campaign.axes import Value
+from skillframe.campaign.noted import setup_notes
 from skillframe.campaign.pulse import beat
 from skillframe.campaign.rows import EXTRA, JUDGED, OUTCOME, SCORE, TRACE, ChunkJob, Row, plain_value, rows_of
 from skillframe.campaign.sampling import draws, trial_rngs
@@ -68,7 +69,7 @@ def describe(spec: CampaignSpec) -> dict[str, Any]:
     robot = load_robot_model(str(spec.folder / spec.robot))
     scene = _scene(spec, {})
     for text in spec.skills:
-        prepare(robot, scene, load_skill(text, spec.folder)[1], spec.coc)
+        _, setup = prepare(robot, scene, load_skill(text, spec.folder)[1], spec.coc)
     for name, value in _declared_values(spec):
         if name.startswith("world."):
             _scene(spec, {name: value})
@@ -83,7 +84,7 @@ def describe(spec: CampaignSpec) -> dict[str, Any]:
         "world": scene.name, "params": scene.params, "analytic": scene.analytic, "friction": scene.friction,
         "analytic_over": _analytic_over(spec),
         "fixture": [geom_json(g) for g in (*scene.fixture, *(g for part in scene.sprung for g in part.geoms))],
-        "tool": tool,
+        "tool": tool, "setup": setup_notes(setup),
         **({"notes": notes} if (notes := _robot_notes(robot)) else {}),
     }  # fmt: skip
 

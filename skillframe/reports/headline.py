@@ -69,8 +69,13 @@ def _setting(chapter: Chapter, results: Results) -> str:
     """Who did what, and over which ranges."""
     robot, world = (str(chapter.spec.get(key) or chapter.summary.get(key) or "") for key in ("robot", "world"))
     where = f"Robot {name_of(robot)}, world {world}" if robot and world else "Every trial"
-    ranges = [_range(results, name) for name in results.varied]
-    return f"{where}; varied from trial to trial: {', '.join(ranges)}." if ranges else f"{where}; nothing varied."
+    spans = ranges(results)
+    return f"{where}; varied from trial to trial: {', '.join(spans)}." if spans else f"{where}; nothing varied."
+
+
+def ranges(results: Results) -> list[str]:
+    """Each varied quantity with the range that its trials cover."""
+    return [_range(results, name) for name in results.varied]
 
 
 def _range(results: Results, name: str) -> str:

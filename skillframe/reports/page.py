@@ -18,6 +18,7 @@ from skillframe.reports.provenance import provenance_section
 from skillframe.reports.runs import cover, demonstrations_section, runs_section
 from skillframe.reports.sources import Chapter, read_chapters
 from skillframe.reports.trust import trust_section
+from skillframe.reports.verdict import banner, verdict_section
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 MOST_BYTES = 10_000_000
@@ -77,6 +78,7 @@ def _asset(name: str) -> Markup:
 
 
 SECTIONS = (
+    ("verdict", "What the verdict rests on"),
     ("learned", "What was learned"),
     ("demonstrations", "The demonstrations"),
     ("run", "The run"),
@@ -98,12 +100,17 @@ def _top(chapters: Sequence[Chapter]) -> Markup:
 
 def _sections(chapter: Chapter) -> list[tuple[str, str]]:
     """The sections that have something to say: a loose trace has neither skill nor campaign."""
-    own = [(name, title) for name, title in SECTIONS if chapter.folder or name in ("run", "made")]
+    told = chapter.results is not None and chapter.results.rows
+    own = [
+        (name, title) for name, title in SECTIONS
+        if (chapter.folder or name in ("run", "made")) and (told or name != "verdict")
+    ]  # fmt: skip
     return [*own[:-1], *((f"{PLUGIN}{section.name}", section.title) for section in chapter.sections), own[-1]]
 
 
 def _chapter(chapter: Chapter, index: int, scenes: dict[str, Markup], alone: bool) -> Markup:
     makers = {
+        "verdict": lambda: verdict_section(chapter),
         "learned": lambda: learned_section(chapter),
         "demonstrations": lambda: demonstrations_section(chapter),
         "run": lambda: runs_section(chapter, f"c{index}", scenes),
@@ -111,13 +118,16 @@ def _chapter(chapter: Chapter, index: int, scenes: dict[str, Markup], alone: boo
         "made": lambda: provenance_section(chapter),
     }
     given = {f"{PLUGIN}{section.name}": section.body for section in chapter.sections}
-    words = tag(
-        "div",
-        tag("p", "Report" if alone else f"Chapter {index}", class_="eyebrow"),
-        tag("h1", chapter.name),
-        lead(chapter),
+    title = join([tag("p", "Report" if alone else f"Chapter {index}", class_="eyebrow"), tag("h1", chapter.name)])
+    words = tag("div", lead(chapter))
+    hero = tag(
+        "header",
+        title,
+        banner(chapter),
+        tag("div", words, cover(chapter), class_="opening"),
+        tiles(chapter),
+        class_="hero",
     )
-    hero = tag("header", tag("div", words, cover(chapter), class_="opening"), tiles(chapter), class_="hero")
     notes = [note(text) for text in chapter.notes]
     sections = [
         tag("section", tag("h2", title), given[name] if name in given else makers[name](), id=f"c{index}-{name}")

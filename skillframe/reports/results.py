@@ -86,6 +86,7 @@ class Results:
         skills: labels in order of appearance.
         varied: names of the quantities that differ between trials.
         validity: what intervals and p-values rest on.
+        complete: all planned trials are in the table, as far as the plan is known.
         assumed: nothing is known of the plan; the trials are taken for independent, their number for fixed.
         notes: what was odd about the file.
     """
@@ -94,6 +95,7 @@ class Results:
     skills: tuple[str, ...]
     varied: tuple[str, ...]
     validity: Validity
+    complete: bool = True
     assumed: bool = False
     notes: tuple[str, ...] = ()
 
@@ -188,12 +190,15 @@ def read_results(path: Path, declared: Sequence[str] = (), plan: Plan | None = N
     rows = tuple(_row(path, number, dict(zip(head, cells, strict=True))) for number, cells in body)
     skills = tuple(dict.fromkeys(row.skill for row in rows))
     varied, validity = _varied(head, rows, declared), Validity(basis=Basis.FIXED)
+    complete = plan is None or len(rows) == plan.trials * plan.skills
     if plan is not None:
-        complete = len(rows) == plan.trials * plan.skills
         validity = validity_of(plan, complete=complete)
         counted = rows if complete else _counted(rows)
         rows, notes = counted, notes + _left_out(len(rows) - len(counted))
-    return Results(rows=rows, skills=skills, varied=varied, validity=validity, assumed=plan is None, notes=tuple(notes))
+    return Results(
+        rows=rows, skills=skills, varied=varied, validity=validity, complete=complete, assumed=plan is None,
+        notes=tuple(notes),
+    )  # fmt: skip
 
 
 def _counted(rows: tuple[ResultRow, ...]) -> tuple[ResultRow, ...]:

@@ -48,7 +48,8 @@ def run_block(run: Run, identifier: str, scenes: dict[str, Markup], force_limit:
     meta, stage = run.trace.meta, stage_of(run.trace)
     won = bool(meta.get("success"))
     badge = tag("span", "success" if won else "failure", class_="badge won" if won else "badge lost")
-    head = tag("header", tag("h3", _title(run), " ", badge), tag("p", _story(meta), class_="caption"))
+    head = tag("header", tag("h3", _title(run), " ", badge), tag("p", _story(meta), class_="caption"),
+               tag("p", run.why, class_="caption") if run.why else "")  # fmt: skip
     show = (
         _show(run, stage, identifier, scenes)
         if stage

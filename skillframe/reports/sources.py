@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,19 +26,21 @@ from skillframe.extend.records import ReportFiles
 from skillframe.files.documents import read_json, read_text
 from skillframe.reports.results import Results, read_results
 from skillframe.reports.sections import MadeSection, files_of, has_sections, made_sections
+from skillframe.reports.typical import telling, why_typical
 
 CAMPAIGN = ("campaign.toml", "results.csv", "summary.json")
 PARTS = (*CAMPAIGN, "skills", "traces", "demonstrations")
-TABLES, SHOWN = ("hashes", "versions", "params", "analytic", "analytic_over"), ("summary.json", "scene.json")
+TABLES, SHOWN = ("hashes", "versions", "params", "analytic", "analytic_over", "setup"), ("summary.json", "scene.json")
 REMOVE = "correct or remove it"
-MOST_RUNS, MOST_DEMONSTRATIONS = 4, 4
+MOST_DEMONSTRATIONS = 4
 
 
 class Run(NamedTuple):
-    """One trace and what it is called."""
+    """One trace, what it is called, and why it is shown ("" where nothing is to be said)."""
 
     name: str
     trace: Trace
+    why: str = ""
 
 
 @dataclass(kw_only=True)
@@ -53,7 +56,10 @@ class Chapter:
         skills: skill documents by file name.
         runs: the traces that are shown; traces: how many there are.
         demonstrations: by file name.
+        robot: robot.toml as run, empty if absent.
         force_limit: of the robot as run [N], or None.
+        taught: metadata of demonstrations, by their sha256 and, of those in skills/, by file name too.
+        edited: a sentence if results.csv is not as the campaign wrote it.
         sections: what plug-ins have to say.
         notes: sentences about what is missing or was left out.
         hashes: (file, sha256) of everything read.
@@ -70,7 +76,10 @@ class Chapter:
     runs: list[Run] = field(default_factory=list)
     traces: int = 0
     demonstrations: dict[str, Demonstration] = field(default_factory=dict)
+    robot: dict[str, Any] = field(default_factory=dict)
     force_limit: float | None = None
+    taught: dict[str, dict[str, Any]] = field(default_factory=dict)
+    edited: str = ""
     sections: list[MadeSection] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     hashes: list[tuple[str, str]] = field(default_factory=list)
@@ -152,22 +161,26 @@ def read_folder(folder: Path) -> Chapter:
         chapter.notes += chapter.results.notes
         _remember(chapter, folder / "results.csv", "results.csv")
     chapter.summary = _json_if_there(chapter, folder / "summary.json")
-    chapter.notes += [text for text in [edited_results(folder, chapter.summary)] if text]
+    chapter.edited = edited_results(folder, chapter.summary)
+    chapter.notes += [chapter.edited] if chapter.edited else []
     if isinstance(unwatched := chapter.summary.get("unwatched"), str):
         chapter.notes.append(f"{unwatched[:1].upper()}{unwatched[1:]}.")
     chapter.scene = _json_if_there(chapter, folder / "scene.json")
     for path in sorted({*folder.glob("*.skill.json"), *folder.glob("skills/*.json")}):
         chapter.skills[path.name] = _json_if_there(chapter, path)
-    chapter.force_limit = _force_limit(folder)
+    chapter.robot = next((read_toml(path) for path in sorted(folder.glob("robots/*/robot.toml"))), {})
+    chapter.force_limit = _force_limit(chapter)
     _read_folder_traces(chapter, folder)
     _read_demonstrations(chapter, folder)
     _add_sections(chapter, lambda: files_of(folder))
     return chapter
 
 
-def _force_limit(folder: Path) -> float | None:
-    for path in sorted(folder.glob("robots/*/robot.toml")):
-        limit = (read_toml(path).get("limits") or {}).get("force_n")
+def _force_limit(chapter: Chapter) -> float | None:
+    """As the campaign noted it, or as robot.toml says; None where neither does."""
+    for place in (chapter.scene.get("setup"), chapter.robot):
+        limits = place.get("limits") if isinstance(place, dict) else None
+        limit = limits.get("force_n") if isinstance(limits, dict) else None
         if isinstance(limit, int | float):
             return float(limit)
     return None
@@ -222,7 +235,7 @@ def _json_if_there(chapter: Chapter, path: Path) -> dict[str, Any]:
 
 
 def _read_folder_traces(chapter: Chapter, folder: Path) -> None:
-    """The first success and the first failure of each skill, then others, up to four runs."""
+    """The typical success and the first failure of each skill, then others, up to four runs."""
     found = []
     for path in sorted((folder / "traces").glob("*.npz")):
         trace = _readable(chapter, path, load_trace)
@@ -230,19 +243,9 @@ def _read_folder_traces(chapter: Chapter, folder: Path) -> None:
             found.append((path, trace))
     chapter.traces = len(found)
     order = list(chapter.results.skills) if chapter.results else []
-    for path, trace in sorted(_telling(found), key=lambda pair: _rank(pair[1], order)):
-        chapter.runs.append(Run(path.name, trace))
+    for path, trace in sorted(telling(found, chapter.results), key=lambda pair: _rank(pair[1], order)):
+        chapter.runs.append(Run(path.name, trace, why_typical(trace, chapter.results)))
         _remember(chapter, path, f"traces/{path.name}")
-
-
-def _telling(found: list[tuple[Path, Trace]]) -> list[tuple[Path, Trace]]:
-    first: dict[tuple[str, bool], tuple[Path, Trace]] = {}
-    for path, trace in found:
-        first.setdefault((str(trace.meta.get("skill", "")), bool(trace.meta.get("success"))), (path, trace))
-    chosen = list(first.values())[:MOST_RUNS]
-    names = {path for path, _ in chosen}
-    rest = [pair for pair in found if pair[0] not in names]
-    return chosen if len(chosen) > 1 else [*chosen, *rest][: min(2, MOST_RUNS)]
 
 
 def _rank(trace: Trace, order: list[str]) -> tuple[int, bool]:
@@ -252,6 +255,7 @@ def _rank(trace: Trace, order: list[str]) -> tuple[int, bool]:
 
 
 def _read_demonstrations(chapter: Chapter, folder: Path) -> None:
+    _read_teachers(chapter, folder)
     places = [*sorted((folder / "demonstrations").glob("*")), *sorted((folder / "skills").glob("*"))]
     paths = sorted({_digest(p): p for p in reversed(places) if p.suffix in (".npz", ".csv")}.values())
     for path in paths[:MOST_DEMONSTRATIONS]:
@@ -261,6 +265,22 @@ def _read_demonstrations(chapter: Chapter, folder: Path) -> None:
             _remember(chapter, path, f"{path.parent.name}/{path.name}")
     if len(paths) > MOST_DEMONSTRATIONS:
         chapter.notes.append(f"{len(paths) - MOST_DEMONSTRATIONS} more demonstrations are not drawn.")
+
+
+def _read_teachers(chapter: Chapter, folder: Path) -> None:
+    """Who taught, of the demonstrations that the folder keeps and its skills were learned from."""
+    told = [d.get("learned_from") for d in chapter.skills.values()]
+    wanted = {str(s.get("sha256")) for given in told if isinstance(given, list) for s in given if isinstance(s, dict)}
+    for place in ("demonstrations", "skills"):
+        for path in sorted((folder / place).glob("*")):
+            if path.suffix not in (".npz", ".csv"):
+                continue
+            digest = _digest(path)
+            if place == "skills" or digest in wanted:
+                with suppress(SkillframeError):  # one that cannot be read is named where it would be drawn
+                    chapter.taught[digest] = dict(read_demonstration(path).meta)
+            if place == "skills" and digest in chapter.taught:
+                chapter.taught[path.name] = chapter.taught[digest]
 
 
 def read_demonstration(path: Path) -> Demonstration:

@@ -1,0 +1,115 @@
+"""The first thing on the page: what was required, what came out, and the verdict; then what it rests on."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from typing import NamedTuple
+
+from skillframe.campaign.verdict import Verdict, verdict_of
+from skillframe.reports.margins import margins_table
+from skillframe.reports.markup import Markup, join, note, percent, tag
+from skillframe.reports.results import Rate, Results
+from skillframe.reports.scope import scope_cards
+from skillframe.reports.sources import Chapter
+from skillframe.reports.who import facts, table_of, taught_by
+
+ENDS = {
+    (True, True): "goal reached and ended by itself",
+    (True, False): "goal reached, not ended by itself",
+    (False, True): "ended by itself, goal not reached",
+    (False, False): "neither",
+}
+
+
+class Requirement(NamedTuple):
+    """What a campaign file asks for.
+
+    Attributes:
+        skill: label that it is asked of.
+        rate: lowest acceptable success rate; None if nothing is required.
+    """
+
+    skill: str
+    rate: float | None
+
+
+def required(chapter: Chapter, results: Results) -> Requirement:
+    """`[expect]` of the campaign file; without it, the first skill and nothing required."""
+    expect = table_of(chapter.spec, "expect")
+    rate = expect.get("rate")
+    known = isinstance(rate, int | float) and not isinstance(rate, bool) and 0.0 <= rate <= 1.0
+    return Requirement(str(expect.get("skill") or results.skills[0]), float(rate) if known else None)
+
+
+def complete(chapter: Chapter, results: Results) -> bool:
+    """All planned trials are there, or the campaign stopped early as asked."""
+    stopped = chapter.summary.get("stopped_after_trial") is not None
+    return results.complete or (stopped and chapter.summary.get("complete") is True)
+
+
+def verdict(chapter: Chapter, results: Results) -> Verdict:
+    """The verdict on the skill that something is required of."""
+    skill, rate = required(chapter, results)
+    obstacle = "results.csv was changed after the campaign had written it" if chapter.edited else ""
+    if skill not in results.skills:
+        obstacle = f"the table holds no trial of {skill}"
+    interval = results.rate(skill).interval
+    return verdict_of(rate, interval, complete=complete(chapter, results), obstacle=obstacle)
+
+
+def banner(chapter: Chapter) -> Markup:
+    """Requirement, result and verdict in three lines; nothing where there are no trials."""
+    results = chapter.results
+    if results is None or not results.rows:
+        return Markup("")
+    found, (skill, rate) = verdict(chapter, results), required(chapter, results)
+    asked = "nothing" if rate is None else f"{skill} succeeds in at least {percent(rate)} of trials"
+    counted = results.rate(skill)
+    share = (
+        f"{counted.successes} of {counted.trials} trials, {percent(counted.share)}" if counted.trials else "no trial"
+    )
+    lines = (
+        ("Required", asked), ("Result", f"{skill}: {share}; {_interval(results, counted)}"),
+        ("Verdict", join([tag("strong", found.word), f": {found.why}"])),
+    )  # fmt: skip
+    facts = tag("dl", *(join([tag("dt", label), tag("dd", text)]) for label, text in lines))
+    return tag(
+        "section", tag("p", found.word, class_="verdict-word", aria_hidden="true"), facts,
+        class_=f"verdict {found.word}", aria_label="Verdict",
+    )  # fmt: skip
+
+
+def _interval(results: Results, counted: Rate) -> str:
+    """The interval with a decimal more than elsewhere, for a requirement may lie near its end."""
+    if counted.interval is None:
+        return results.interval_name
+    low, high = (f"{100.0 * bound:.1f}".removesuffix(".0") for bound in counted.interval)
+    return f"{results.interval_name}: {low} % to {high} %"
+
+
+def verdict_section(chapter: Chapter) -> Markup:
+    """What the verdict rests on: who did it, how trials ended, limits, and what was and was not tried."""
+    results = chapter.results
+    if results is None or not results.rows:
+        return note("There is no trial yet, so there is nothing to rest a verdict on.")
+    skill, _ = required(chapter, results)
+    skill = skill if skill in results.skills else results.skills[0]
+    told = [("Skill", skill), *facts(chapter, skill), ("How its trials ended", ends(results, skill))]
+    listed = tag(
+        "dl", *(join([tag("dt", label), tag("dd", text)]) for label, text in told if text), class_="facts card"
+    )
+    return join([
+        listed, margins_table(chapter, results, skill),
+        scope_cards(chapter, results, taught_by(chapter, skill)[1]),
+    ])  # fmt: skip
+
+
+def ends(results: Results, skill: str) -> str:
+    """How often the goal was reached and the skill had ended by itself; "" where the table does not say."""
+    pairs = [
+        (r.values.get("goal_reached", math.nan), r.values.get("ended_itself", math.nan)) for r in results.of(skill)
+    ]
+    known = [(goal == 1.0, itself == 1.0) for goal, itself in pairs if math.isfinite(goal) and math.isfinite(itself)]
+    counts = Counter(known)
+    return "; ".join(f"{text}: {counts[kind]}" for kind, text in ENDS.items() if counts[kind])

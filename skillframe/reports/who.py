@@ -1,0 +1,145 @@
+"""Who did it: who taught, and which robot, interface, controller and sensors ran; what the files do not say is said."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+from skillframe.campaign.spec import name_of
+from skillframe.reports.markup import number
+from skillframe.reports.quantities import quantity
+from skillframe.reports.sources import Chapter
+
+UNKNOWN = "not known: the folder does not say"
+IDEAL = "ideal torque source: the joints give at once the torque that they are told"
+FREE = "ideal force source: the tool flies freely and takes the wrench that it is told"
+DRIVES = {"hydraulic": "hydraulic cylinders", "servo": "electric servos"}
+
+
+def table_of(values: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+    """A table inside a table, empty where it is absent or something else."""
+    found = values.get(key)
+    return found if isinstance(found, Mapping) else {}
+
+
+def setup_of(chapter: Chapter) -> Mapping[str, Any]:
+    """With what the trials ran: `setup` of scene.json, and of campaigns that lack it what robot.toml says."""
+    noted = table_of(chapter.scene, "setup")
+    if noted or not chapter.robot:
+        return noted
+    driven = table_of(chapter.robot, "drive").get("kind") or "hydraulic"
+    told = {key: chapter.robot[key] for key in ("control", "limits", "base") if key in chapter.robot}
+    return {**told, "drive": driven if chapter.robot.get("actuation") else ""}
+
+
+def hydraulic(chapter: Chapter) -> bool:
+    """Whether hydraulic cylinders drive it."""
+    return setup_of(chapter).get("drive") == "hydraulic"
+
+
+def ideal(chapter: Chapter) -> bool:
+    """Whether nothing stands between the law's torques and the joints, as far as is known."""
+    setup = setup_of(chapter)
+    return bool(setup) and not setup.get("drive") and _interface_name(setup) in ("", "torque")
+
+
+def _interface_name(setup: Mapping[str, Any]) -> str:
+    return str(table_of(setup, "control").get("interface") or "")
+
+
+def facts(chapter: Chapter, skill: str) -> list[tuple[str, str]]:
+    """Label and text of each fact, for one skill."""
+    return [
+        ("Taught by", taught_by(chapter, skill)[0]), ("Robot", robot_words(chapter)),
+        ("Interface", interface_words(setup_of(chapter))), ("Controller", controller_words(chapter, skill)),
+        ("Sensors", sensor_words(chapter)),
+    ]  # fmt: skip
+
+
+def taught_by(chapter: Chapter, skill: str) -> tuple[str, bool]:
+    """Who taught a skill, in words, and whether a simulated person had a part in it."""
+    metas = _teachers(chapter, skill)
+    if metas is None:
+        return "not known: the folder does not hold the skill", False
+    if not metas:
+        return "nobody: the skill file names no demonstration", False
+    counts = Counter(_teacher(meta) for meta in metas)
+    said = [f"{_count(n)} {who}" for who, n in counts.items()]
+    return " and ".join(said), any(meta is not None and bool(meta.get("simulated")) for meta in metas)
+
+
+def _teachers(chapter: Chapter, skill: str) -> list[Mapping[str, Any] | None] | None:
+    """Metadata of a skill's demonstrations, None for one that the folder does not hold; None without the skill."""
+    document = chapter.skills.get(skill)
+    if document is not None:
+        given = document.get("learned_from")
+        sources = given if isinstance(given, list) else []
+        return [chapter.taught.get(str(s.get("sha256"))) if isinstance(s, Mapping) else None for s in sources]
+    kind, colon, files = skill.partition(":")
+    if not colon or not kind:
+        return None
+    names = [name.rsplit("/", 1)[-1] for name in files.split(",") if "=" not in name]
+    return [chapter.taught.get(name) for name in names]
+
+
+def _count(n: int) -> str:
+    return "one demonstration" if n == 1 else f"{n} demonstrations"
+
+
+def _teacher(meta: Mapping[str, Any] | None) -> str:
+    if meta is None:
+        return "whose teacher is not known (the folder does not hold the recording)"
+    how = f" ({kind})" if (kind := meta.get("teacher")) else ""
+    return f"by a simulated person{how}" if meta.get("simulated") else f"from a recording{how}"
+
+
+def robot_words(chapter: Chapter) -> str:
+    """Name and summary of the robot."""
+    name = name_of(str(chapter.spec.get("robot") or chapter.summary.get("robot") or ""))
+    summary = str(chapter.robot.get("summary") or "")
+    return ": ".join(part for part in (name, summary) if part) or UNKNOWN
+
+
+def interface_words(setup: Mapping[str, Any]) -> str:
+    """What takes the controller's commands, from a set-up."""
+    if not setup:
+        return UNKNOWN
+    drive, name = str(setup.get("drive") or ""), _interface_name(setup)
+    if drive:
+        return f"{DRIVES.get(drive, f'the drive {drive} of a plug-in')}, simulated"
+    if name in ("", "torque"):
+        return FREE if setup.get("base") == "free" else IDEAL
+    rest = {k: v for k, v in table_of(setup, "control").items() if k not in ("interface", "rate_hz")}
+    return ", ".join([f"{name} interface", *(f"{key.replace('_', ' ')} {value}" for key, value in rest.items())])
+
+
+def controller_words(chapter: Chapter, skill: str) -> str:
+    """The law, its rate, and the kind of skill that it follows."""
+    rate = table_of(setup_of(chapter), "control").get("rate_hz")
+    law = "force and motion of cylinders" if hydraulic(chapter) else "impedance of the tool"
+    at = f" at {number(float(rate), 4)} Hz" if isinstance(rate, int | float) else ""
+    document = chapter.skills.get(skill)
+    kind = str((document or {}).get("type") or skill.partition(":")[0])
+    made = table_of(document or {}, "created_by")
+    by = f" of {made['plugin']} {made.get('plugin_version', '')}".rstrip() if made.get("plugin") else ""
+    return f"{law}{at}; a skill of type {kind}{by}"
+
+
+def sensor_words(chapter: Chapter) -> str:
+    """The sensors with their noise, as the campaign wrote them down."""
+    told = table_of(setup_of(chapter), "sensors")
+    if not told:
+        return "noise not written down in this folder"
+    where = (
+        "encoders and chamber pressures" if hydraulic(chapter) else "encoders and a force-torque sensor at the wrist"
+    )
+    return f"{where}; standard deviations: {', '.join(_deviation(key, value) for key, value in told.items())}"
+
+
+def _deviation(key: str, value: object) -> str:
+    words = key.replace("_", " ")
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return f"{words} {value}"
+    named = quantity(key)
+    return f"{words} {number(named.factor * float(value))} {named.unit}".strip()

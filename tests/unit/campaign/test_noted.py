@@ -1,0 +1,39 @@
+"""What a campaign writes down of the set-up its trials run with."""
+
+import json
+
+import pytest
+
+from skillframe.campaign.noted import setup_notes
+from skillframe.execution.prepare import load_robot_model, load_world
+from skillframe.execution.setup import Setup
+from skillframe.world.sensors import SensorSettings
+
+pytestmark = pytest.mark.needs_plugins
+
+
+def notes(robot):
+    setup = Setup(
+        robot=load_robot_model(robot), scene=load_world("free", {}), sensors=SensorSettings(force_noise=0.7)
+    )  # fmt: skip
+    return json.loads(json.dumps(setup_notes(setup)))
+
+
+def test_an_arm_s_limits_sensors_and_quantities_are_written_down():
+    found = notes("panda")
+    assert (found["drive"], found["base"], found["limits"]["force_n"]) == ("", "fixed", 80.0)
+    assert found["sensors"]["force_noise"] == 0.7
+    assert found["nominal"]["robot.mass_scale"] == 1.0
+    assert not any(name.startswith("actuator.") for name in found["nominal"])
+
+
+def test_a_machine_has_cylinders_their_quantities_and_no_wrist_sensor():
+    found = notes("hiab_xs031")
+    assert found["drive"] == "hydraulic"
+    assert "pressure" in found["sensors"]
+    assert found["nominal"]["actuator.delay"] == 0.0
+    assert not any(name.startswith("sensor.") for name in found["nominal"])
+
+
+def test_servos_are_no_ideal_torques():
+    assert notes("panda_servo")["drive"] == "servo"
