@@ -242,7 +242,7 @@ class Loop:
         success = self.goal & ~self.limited & (self.status != Status.FAILURE)
         failure = no_reasons(self.count)
         for i in np.flatnonzero(~success):
-            failure[i] = self._failure(i)
+            failure[i] = self._failure(int(i))
         traces = None
         if self.recorder is not None:
             traces = [

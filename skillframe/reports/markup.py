@@ -84,9 +84,9 @@ def table(head: Iterable[object], rows: Iterable[Iterable[object]], *, class_: s
     return tag("div", content, class_="scroll")
 
 
-def note(*text: object) -> Markup:
+def note(*text: object, role: str | None = None) -> Markup:
     """A sentence about something that is missing or worth knowing."""
-    return tag("p", *text, class_="note")
+    return tag("p", *text, class_="note", role=role)
 
 
 def number(value: float, digits: int = 3) -> str:

@@ -22,6 +22,11 @@ from skillframe.reports.verdict import banner, verdict_section
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 MOST_BYTES = 10_000_000
+RELOAD_S = 5
+LIVE = (
+    f"The campaign has not ended. skillframe report --watch makes this page anew, and it loads itself again every "
+    f"{RELOAD_S} seconds."
+)
 
 
 def write_report(inputs: Sequence[Path], out: Path) -> int:
@@ -40,18 +45,26 @@ def write_report(inputs: Sequence[Path], out: Path) -> int:
     return write_chapters(read_chapters(inputs), out)
 
 
-def write_chapters(chapters: Sequence[Chapter], out: Path) -> int:
+def write_chapters(chapters: Sequence[Chapter], out: Path, *, live: bool = False) -> int:
     """As `write_report`, of what was read before.
+
+    Args:
+        chapters: what the page shows.
+        out: the HTML file.
+        live: the page loads itself again and again, for it will be made anew.
+
+    Returns:
+        its size in bytes.
 
     Raises:
         InputError: there are no chapters, or the file cannot be written.
     """
-    page = render(chapters).encode("utf-8")
+    page = render(chapters, live=live).encode("utf-8")
     write_whole(out, page)
     return len(page)
 
 
-def render(chapters: Sequence[Chapter]) -> str:
+def render(chapters: Sequence[Chapter], *, live: bool = False) -> str:
     """The whole document. The same chapters give the same text.
 
     Raises:
@@ -65,10 +78,15 @@ def render(chapters: Sequence[Chapter]) -> str:
     head = tag(
         "head", tag("meta", charset="utf-8"), tag("meta", http_equiv="Content-Security-Policy", content=POLICY),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"), tag("title", title),
-        tag("style", _asset("page.css")),
+        tag("style", _asset("page.css")), tag("meta", http_equiv="refresh", content=str(RELOAD_S)) if live else "",
     )  # fmt: skip
     body = tag(
-        "body", _top(chapters), tag("main", *bodies), _foot(), *scenes.values(), tag("script", _asset("viewer.js"))
+        "body",
+        _top(chapters),
+        tag("main", note(LIVE, role="status") if live else "", *bodies),
+        _foot(),
+        *scenes.values(),
+        tag("script", _asset("viewer.js")),
     )
     return "<!DOCTYPE html>\n" + tag("html", head, body, lang="en")
 

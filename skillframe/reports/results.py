@@ -177,8 +177,16 @@ def read_results(path: Path, declared: Sequence[str] = (), plan: Plan | None = N
     """
     try:
         text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(path, f"cannot be read as a table ({error})", "give a campaign's results.csv") from None
+    return results_of(text, path, declared, plan)
+
+
+def results_of(text: str, path: Path, declared: Sequence[str] = (), plan: Plan | None = None) -> Results:
+    """As `read_results`, from the text of a table; `path` is where it comes from."""
+    try:
         table = list(csv.reader(io.StringIO(text), strict=True))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except csv.Error as error:
         raise InputError(path, f"cannot be read as a table ({error})", "give a campaign's results.csv") from None
     head = table[0] if table else []
     missing = [name for name in REQUIRED if name not in head]

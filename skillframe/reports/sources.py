@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from skillframe.campaign.axes import parse_axis
+from skillframe.campaign.live import live_table
 from skillframe.campaign.spec import flatten, name_of
 from skillframe.campaign.validity import Plan, plan_of
 from skillframe.campaign.verify import edited_results
@@ -24,7 +25,7 @@ from skillframe.errors import InputError, SkillframeError
 from skillframe.execution.trace import Trace
 from skillframe.extend.records import ReportFiles
 from skillframe.files.documents import read_json, read_text
-from skillframe.reports.results import Results, read_results
+from skillframe.reports.results import Results, read_results, results_of
 from skillframe.reports.sections import MadeSection, files_of, has_sections, made_sections
 from skillframe.reports.typical import telling, why_typical
 
@@ -84,6 +85,12 @@ class Chapter:
     notes: list[str] = field(default_factory=list)
     hashes: list[tuple[str, str]] = field(default_factory=list)
 
+    @property
+    def planned(self) -> int:
+        """Runs that the campaign file plans; 0 if it does not say."""
+        trials, skills = self.spec.get("trials"), self.spec.get("skills")
+        return trials * len(skills) if isinstance(trials, int) and isinstance(skills, list) else 0
+
 
 def scenes(chapter: Chapter) -> list[tuple[str, str]]:
     """(robot, world) of what a chapter shows, each pair once, without what its files do not say."""
@@ -106,6 +113,15 @@ def read_chapters(inputs: Sequence[Path]) -> list[Chapter]:
         else:
             loose.append(path)
     return [*chapters, read_traces(loose)] if loose else chapters
+
+
+def campaign_folders(inputs: Sequence[Path]) -> list[Path]:
+    """The folders that get a chapter each.
+
+    Raises:
+        InputError: a folder without results.
+    """
+    return [folder for path in inputs if path.is_dir() for folder in _folders(path)]
 
 
 def _folders(path: Path) -> list[Path]:
@@ -156,12 +172,9 @@ def read_folder(folder: Path) -> Chapter:
         chapter.spec_text = read_text(folder / "campaign.toml")
         chapter.name = str(chapter.spec.get("name") or chapter.name)
         _remember(chapter, folder / "campaign.toml", "campaign.toml")
-    if (folder / "results.csv").is_file():
-        chapter.results = read_results(folder / "results.csv", *_declared(chapter.spec))
-        chapter.notes += chapter.results.notes
-        _remember(chapter, folder / "results.csv", "results.csv")
+    stored = _read_table(chapter, folder)
     chapter.summary = _json_if_there(chapter, folder / "summary.json")
-    chapter.edited = edited_results(folder, chapter.summary)
+    chapter.edited = "" if stored else edited_results(folder, chapter.summary)
     chapter.notes += [chapter.edited] if chapter.edited else []
     if isinstance(unwatched := chapter.summary.get("unwatched"), str):
         chapter.notes.append(f"{unwatched[:1].upper()}{unwatched[1:]}.")
@@ -174,6 +187,20 @@ def read_folder(folder: Path) -> Chapter:
     _read_demonstrations(chapter, folder)
     _add_sections(chapter, lambda: files_of(folder))
     return chapter
+
+
+def _read_table(chapter: Chapter, folder: Path) -> bool:
+    """The campaign's table. Whether it was made from the stored rows, because the campaign runs or was killed."""
+    skills = chapter.spec.get("skills")
+    text = live_table(folder, skills if isinstance(skills, list) else [])
+    path = folder / ("results.csv" if text is None else "rows.jsonl")
+    if not path.is_file():
+        return False
+    given = _declared(chapter.spec)
+    chapter.results = read_results(path, *given) if text is None else results_of(text, path, *given)
+    chapter.notes += chapter.results.notes
+    _remember(chapter, path, path.name)
+    return text is not None
 
 
 def _force_limit(chapter: Chapter) -> float | None:

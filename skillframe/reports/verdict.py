@@ -38,8 +38,10 @@ def required(chapter: Chapter, results: Results) -> Requirement:
     """`[expect]` of the campaign file; without it, the first skill and nothing required."""
     expect = table_of(chapter.spec, "expect")
     rate = expect.get("rate")
-    known = isinstance(rate, int | float) and not isinstance(rate, bool) and 0.0 <= rate <= 1.0
-    return Requirement(str(expect.get("skill") or results.skills[0]), float(rate) if known else None)
+    skill = str(expect.get("skill") or results.skills[0])
+    if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0.0 <= rate <= 1.0:
+        return Requirement(skill, None)
+    return Requirement(skill, float(rate))
 
 
 def complete(chapter: Chapter, results: Results) -> bool:
@@ -73,6 +75,8 @@ def banner(chapter: Chapter) -> Markup:
         ("Required", asked), ("Result", f"{skill}: {share}; {_interval(results, counted)}"),
         ("Verdict", join([tag("strong", found.word), f": {found.why}"])),
     )  # fmt: skip
+    if not complete(chapter, results) and chapter.planned:
+        lines = (*lines, ("Progress", f"{len(results.rows)} of {chapter.planned} runs are counted"))
     facts = tag("dl", *(join([tag("dt", label), tag("dd", text)]) for label, text in lines))
     return tag(
         "section", tag("p", found.word, class_="verdict-word", aria_hidden="true"), facts,

@@ -29,7 +29,7 @@ def setup_of(chapter: Chapter) -> Mapping[str, Any]:
     if noted or not chapter.robot:
         return noted
     driven = table_of(chapter.robot, "drive").get("kind") or "hydraulic"
-    told = {key: chapter.robot[key] for key in ("control", "limits", "base") if key in chapter.robot}
+    told: dict[str, Any] = {key: chapter.robot[key] for key in ("control", "limits", "base") if key in chapter.robot}
     return {**told, "drive": driven if chapter.robot.get("actuation") else ""}
 
 
