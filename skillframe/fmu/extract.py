@@ -126,7 +126,7 @@ def member_names(path: Path) -> list[str]:
             return archive.namelist()
     except FileNotFoundError:
         raise InputError(path, "no such file", "check the path") from None
-    except (zipfile.BadZipFile, OSError) as error:
+    except (zipfile.BadZipFile, NotImplementedError, UnicodeDecodeError, OSError) as error:
         raise InputError(
             path, f"is not an FMU: {error}", "give the .fmu file (a zip with a modelDescription.xml)"
         ) from None

@@ -171,6 +171,23 @@ def test_a_zip_with_a_link_or_a_bomb_is_refused(built, tmp_path, monkeypatch):
         unpack(bomb)
 
 
+@pytest.mark.parametrize(
+    ("find", "offset", "byte", "words"),
+    [(b"PK\x01\x02", 6, 133, "zip file version 13.3"), ("\xe9".encode(), 1, 0xFF, "can't decode byte")],
+)
+def test_a_zip_whose_table_of_contents_is_damaged_is_refused(tmp_path, find, offset, byte, words):
+    """A version that nobody has, and a name that is no UTF-8: `zipfile` raises other errors for each."""
+    path = tmp_path / "a.fmu"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", "")
+        archive.writestr("resources/\xe9", "")
+    content = bytearray(path.read_bytes())
+    content[content.rindex(find) + offset] = byte
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=f"is not an FMU: .*{words}"):
+        unpack(path)
+
+
 @pytest.mark.parametrize("content", [b"", b"no zip at all", b"PK\x03\x04 cut off"])
 def test_what_is_no_fmu_gets_one_sentence(tmp_path, content):
     path = tmp_path / "x.fmu"
