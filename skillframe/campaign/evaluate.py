@@ -83,6 +83,7 @@ def describe(spec: CampaignSpec) -> dict[str, Any]:
     return {
         "world": scene.name, "params": scene.params, "analytic": scene.analytic, "friction": scene.friction,
         "analytic_over": _analytic_over(spec),
+        "interface": robot.spec.control.figures(),
         "fixture": [geom_json(g) for g in (*scene.fixture, *(g for part in scene.sprung for g in part.geoms))],
         "tool": tool, "setup": setup_notes(setup),
         **({"notes": notes} if (notes := _robot_notes(robot)) else {}),

@@ -12,6 +12,7 @@ from skillframe.cli import names
 if TYPE_CHECKING:
     from skillframe.robot.audit import Audit
     from skillframe.robot.model import RobotModel
+    from skillframe.robot.spec import RobotSpec
 
 _MASS = "The robot's mass, base included, as on its data sheet: masses that have to be guessed are scaled to it."
 _CLASS = "Instead of --mass, kind and payload in kg: cobot-3, -5, -10, -16, -20, industrial-7, -12, -25."
@@ -81,7 +82,8 @@ def check(robot: str, total_kg: float | None, kind: str | None, as_json: bool) -
         raise InputError("--class", "and --mass say the same thing", "give one of them")
     total_kg = total_kg if kind is None else class_mass(kind)
     try:
-        model = load_model(load_robot(robot))
+        spec = load_robot(robot)
+        model = load_model(spec)
         result = audit(model, total_kg)
         if _looks("whether bodies touch at home"):
             from skillframe.world.collision_report import collision_problems
@@ -92,9 +94,9 @@ def check(robot: str, total_kg: float | None, kind: str | None, as_json: bool) -
             click.echo(json.dumps(_not_loaded(robot, str(error)), indent=2))
         raise
     if as_json:
-        click.echo(json.dumps(_plain(result), indent=2))
+        click.echo(json.dumps({**_plain(result), "interface": spec.control.figures()}, indent=2))
     else:
-        _print_audit(robot, result)
+        _print_audit(robot, result, spec)
     return 0 if result.usable else 1
 
 
@@ -163,9 +165,11 @@ def _not_loaded(robot: str, message: str) -> dict[str, object]:
     return {"usable": False, "nq": None, "nv": None, "mass_kg": None, "problems": [problem]}
 
 
-def _print_audit(robot: str, result: Audit) -> None:
+def _print_audit(robot: str, result: Audit, spec: RobotSpec) -> None:
     verdict = "usable for dynamics" if result.usable else "NOT usable for dynamics"
     click.echo(f"{robot}: {verdict} (nq {result.nq}, nv {result.nv}, {result.mass_kg:.4g} kg)")
+    if spec.control.interface != "torque":
+        click.echo(f"  {spec.control.admittance.told()}")
     said: set[str] = set()
     for problem in result.problems:
         click.echo(f"\n{problem.severity} {problem.code} at {problem.where}\n  {problem.message}")

@@ -107,7 +107,8 @@ def _hundredths(value: float) -> str:
 
 def _scene(meta: dict[str, Any]) -> str:
     """Who did it where, and how far it got, where the world can say that."""
-    where, way = f"{meta['robot']} in {meta['world']}", meta["progress"]
+    takes, way = meta["interface"]["takes"], meta["progress"]
+    where = f"{meta['robot']}{'' if takes == 'torque' else f', told a {takes},'} in {meta['world']}"
     if way is None:
         return where
     reached = "an unknown part" if way["reached_m"] is None else f"{way['reached_m'] * 1000:.0f}"
@@ -128,7 +129,7 @@ def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) ->
         note("not saved; add --out run.npz")
     if as_json:
         named = {what: str(path) if path else None for what, path in files.items()}
-        where = {"robot": meta["robot"], "world": meta["world"], "progress": meta["progress"]}
+        where = {name: meta[name] for name in ("robot", "interface", "world", "progress")}
         where |= {"scores": meta.get("scores") or {}, "touched": meta.get("touched"), "notes": notes}
         click.echo(json.dumps({**outcome, **judged, **where, **named}, sort_keys=True))
         return

@@ -105,7 +105,7 @@ class AdmittanceLaw:
         else:
             self._damping = raised_damping(damping, floor)
         h = self._dt
-        self._gain = h * np.linalg.inv(MASS + h * self._damping + h * h * stiffness)
+        self._gain: Float = np.linalg.inv(MASS / h + self._damping + h * stiffness).astype(np.float64, copy=False)
 
     def _require_soft(self, stiffness: Float) -> None:
         part = stiffness[..., :3, :3]

@@ -25,8 +25,8 @@ TURN_LENGTH = 0.2
 """[m] that makes a turn comparable with a way."""
 LEAST_DAMPING, SINGULAR_DAMPING, SINGULAR_BELOW = 1e-3, 0.05, 0.05
 """l far from singularities, l_0 and s_0."""
-REFRESH = 20
-"""Steps between two looks for singularities."""
+REFRESH_S = 0.04
+"""[s] between two inverses: the posture hardly changes in 40 ms, and the law goes on with what is really made."""
 POSTURE = 0.5
 """k [1/s]."""
 LEASH_SLACK = 5e-3
@@ -59,8 +59,7 @@ class JointSteps:
         self._home, self._limits, self._dt = start.copy(), limits, dt
         self._leash = limits.velocity * delay + LEASH_SLACK
         self._scale = np.repeat([1.0, TURN_LENGTH], 3)[:, None]
-        self._squared = np.full(len(start), LEAST_DAMPING**2)
-        self._step = 0
+        self._every, self._step = max(1, round(REFRESH_S / dt)), 0
 
     def velocities(self, twist: Float, jacobian: Float, command: Float, measured: Float) -> tuple[Float, Float]:
         """Joint velocities (N, n) for twists (N, 6), and the twists (N, 6) that they make.
@@ -71,35 +70,35 @@ class JointSteps:
             command: (N, n) commanded joints.
             measured: (N, n) joints.
         """
-        scaled = jacobian * self._scale
-        if self._step % REFRESH == 0:
+        if self._step % self._every == 0:
+            scaled = jacobian * self._scale
             self._squared = _damping(scaled)
+            self._inverse = self._inverted(scaled)
         self._step += 1
         spare = POSTURE * (self._home - command) if jacobian.shape[-1] > 6 else np.zeros_like(command)
-        wanted = twist[..., None] * self._scale
-        speed = self._held_to_speed(self._solve(scaled, wanted, spare))
+        left = twist - (jacobian @ spare[..., None])[..., 0]
+        speed = self._held_to_speed(spare + (self._inverse @ left[..., None])[..., 0])
         stuck = self._at_end(command, speed)
         if np.count_nonzero(stuck):
-            speed = self._around(scaled, wanted, spare, command, speed, stuck)
+            speed = self._around(jacobian, twist, spare, command, speed, stuck)
         ahead = command - measured
         late = ((np.abs(ahead) > self._leash) & (ahead * speed > 0.0)).any(-1)
         if np.count_nonzero(late):
             speed[late] = 0.0
         return speed, (jacobian @ speed[..., None])[..., 0]
 
-    def _solve(self, jacobian: Float, wanted: Float, spare: Float) -> Float:
-        """Damped least squares, (N, n); columns of zeros stay at rest."""
-        turned = jacobian.mT
-        gram = jacobian @ turned
+    def _inverted(self, scaled: Float) -> Float:
+        """(N, n, 6) damped inverses of Jacobians whose turning rows are scaled; columns of zeros give rows of zeros."""
+        gram = scaled @ scaled.mT
         gram[:, range(6), range(6)] += self._squared[:, None]
-        left = wanted - jacobian @ spare[..., None]
-        result: Float = spare + (turned @ np.linalg.solve(gram, left))[..., 0]
+        result: Float = scaled.mT @ np.linalg.inv(gram) * self._scale[:, 0]
         return result
 
     def _held_to_speed(self, speed: Float) -> Float:
         """Rows scaled so that no joint is above its limit."""
         share = (np.abs(speed) / self._limits.velocity).max(-1)
-        return speed / np.maximum(share, 1.0)[:, None]
+        result: Float = speed / np.maximum(share, 1.0)[:, None]
+        return result
 
     def _at_end(self, command: Float, speed: Float) -> NDArray[np.bool_]:
         """(N, n) joints that a step would carry over the end of their range."""
@@ -108,15 +107,17 @@ class JointSteps:
         return over | ((ahead < self._limits.lower) & (speed < 0.0))
 
     def _around(
-        self, jacobian: Float, wanted: Float, spare: Float, command: Float, speed: Float, stuck: NDArray[np.bool_]
+        self, jacobian: Float, twist: Float, spare: Float, command: Float, speed: Float, stuck: NDArray[np.bool_]
     ) -> Float:
         """Velocities of the rows that are stuck, without the joints that are; a joint that gets stuck then as well."""
-        rows = stuck.any(-1)
+        rows: NDArray[np.bool_] = np.asarray(stuck.any(-1))
         held = stuck.copy()
         for _ in range(held.shape[-1]):
             free = np.where(held[:, None], 0.0, jacobian)
-            again = self._held_to_speed(self._solve(free, wanted, np.where(held, 0.0, spare)))
-            speed = np.where(rows[:, None], again, speed)
+            own = np.where(held, 0.0, spare)
+            left = twist - (free @ own[..., None])[..., 0]
+            again = self._held_to_speed(own + (self._inverted(free * self._scale) @ left[..., None])[..., 0])
+            speed = np.where(rows[..., None], again, speed)
             more = self._at_end(command, speed) & ~held
             if not np.count_nonzero(more):
                 break
@@ -128,7 +129,7 @@ class JointSteps:
 def _damping(jacobian: Float) -> Float:
     """(N,) l^2 for Jacobians (N, 6, n) whose turning rows are scaled. What is not finite counts as regular."""
     gram = jacobian @ jacobian.mT
-    sound = np.asarray(np.isfinite(gram).all(axis=(-1, -2)))
-    least = np.linalg.eigvalsh(np.where(sound[:, None, None], gram, np.eye(6)))[:, 0]
+    sound = np.asarray(np.isfinite(gram).all(axis=(-1, -2), keepdims=True))
+    least = np.linalg.eigvalsh(np.where(sound, gram, np.eye(6)))[..., 0]
     near = 1.0 - np.clip(least, 0.0, None) / SINGULAR_BELOW**2
     return np.maximum(SINGULAR_DAMPING**2 * near, LEAST_DAMPING**2)

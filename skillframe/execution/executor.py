@@ -57,7 +57,7 @@ def simulate(
         setup: robot, scene and settings.
         draws: quantities of `QUANTITIES` per trial, each (N,); absent ones are nominal.
         rngs: one generator per trial; sensors and skill draw from children of it.
-        duration_s: simulated seconds after which a trial is stopped.
+        duration_s: simulated seconds after which a trial is stopped; more where the robot's interface is slow.
         trace_hz: rate of the traces; None keeps none.
         progress: called every 10 ms of simulated time with the seconds simulated.
 
@@ -112,7 +112,7 @@ class Loop:
         self.shares = np.full((3, count), np.nan)
         self.joints = np.full((3, count), "", dtype=object)  # of torque, speed and range, as the shares
         self.goal, self.errors, self.energy = np.zeros(count, dtype=bool), np.zeros((count, 2)), np.zeros(count)
-        rate = setup.robot.spec.control.rate_hz
+        rate = setup.robot.spec.control.tick_hz
         self.recorder = None if trace_hz is None else drive.recording(ratio(rate, trace_hz, "control", "the trace"))
         self.interrupted = False
 
@@ -122,6 +122,8 @@ class Loop:
 
     def run(self, duration_s: float, progress: Callable[[float], None] | None) -> None:
         """Tick until every trial has ended or the time is up."""
+        pace = self.setup.robot.spec.control.pace
+        duration_s *= pace
         ticks = round(duration_s / self.dt)
         tick = 0
         try:
@@ -130,7 +132,7 @@ class Loop:
                 if not len(self.active):
                     return
                 if progress is not None and tick % SLOW_TICKS == 0:
-                    progress(tick * self.dt)
+                    progress(tick * self.dt / pace)
         except KeyboardInterrupt:
             self.interrupted = True
             self._end(self.active, tick * self.dt, "interrupted", True, Ended.INTERRUPTED)
@@ -277,6 +279,7 @@ class Loop:
         scene, actuators = self.setup.scene, list(self.drive.actuators)
         return {
             "robot": self.setup.robot.spec.name, "world": scene.name, "params": scene.params,
+            "interface": self.setup.robot.spec.control.figures(),
             "center_of_compliance": np.asarray(self.setup.center_of_compliance, dtype=float).tolist(),
             "frames": {k: list(v) for k, v in scene.tool.frames.items()},
             "hand": scene.tool.hand, "success": success, "failure": failure, "reason": str(self.reason[i]),

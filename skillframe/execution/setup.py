@@ -40,6 +40,7 @@ class Setup:
 
     @property
     def limits(self) -> Limits:
-        """The robot's limits; a free-flying tool has no joints whose torque rate could be limited."""
-        limits = self.robot.spec.limits
-        return replace(limits, torque_rate_nm_s=None) if self.robot.spec.base == "free" else limits
+        """The robot's limits; no torque rate without joints, or where the arm's own loop makes the torques."""
+        spec = self.robot.spec
+        told = spec.base != "free" and spec.control.interface == "torque"
+        return spec.limits if told else replace(spec.limits, torque_rate_nm_s=None)

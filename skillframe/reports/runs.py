@@ -71,6 +71,8 @@ def _title(run: Run) -> str:
 
 def _story(meta: Mapping[str, Any]) -> str:
     where = " in ".join(str(meta[k]) for k in ("robot", "world") if meta.get(k))
+    takes = (meta.get("interface") or {}).get("takes", "torque")
+    where += "" if takes == "torque" else f", told a {takes}"
     facts = [where, str((not meta.get("success") and meta.get("failure")) or meta.get("reason") or "")]
     for key, what, unit, factor in (
         ("duration_s", "took", "s", 1.0),

@@ -29,6 +29,7 @@ def describe(robot: RobotModel) -> str:
         f"{spec.name}: {spec.summary}" if spec.summary else spec.name,
         f"  base {spec.base}, {moving} moving bodies, nq {model.nq}, nv {model.nv}, {mass:.4g} kg",
         f"  control {spec.control.rate_hz:g} Hz, fixture at {_triple(spec.workspace.fixture)} m in base",
+        *([] if spec.control.interface == "torque" else [f"  {spec.control.admittance.told()}"]),
         f"  limits: {_limits(robot)}",
     ]
     lines += [f"  {note}"] if (note := guess_note(spec)) else []
@@ -87,6 +88,7 @@ def as_json(robot: RobotModel) -> dict[str, Any]:
     return {
         "name": spec.name, "summary": spec.summary, "base": spec.base, "nq": model.nq, "nv": model.nv,
         "mass_kg": _mass(robot), "moving_bodies": _moving(robot), "rate_hz": spec.control.rate_hz,
+        "interface": spec.control.figures(),
         "fixture_m": [float(x) for x in spec.workspace.fixture], "limits": asdict(spec.limits),
         "joints": [_joint_values(robot, index) for index in range(1, model.njoints)],
         "arms": [_arm_values(robot, i) for i in range(len(spec.arm))],

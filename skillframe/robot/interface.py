@@ -73,6 +73,14 @@ class Control:
         """How many times longer than taught a skill takes; 1 for torques."""
         return 1.0 if self.interface == "torque" else self.admittance.slow_down
 
+    def figures(self) -> dict[str, float | str]:
+        """What the arm takes and what follows, for files and scripts, in SI units."""
+        return {"takes": "torque", "rate_hz": self.rate_hz} if self.interface == "torque" else self.admittance.figures()
+
+    def guided(self) -> Control:
+        """The arm in a person's hands, who moves it against no loop of its own: as with torques."""
+        return self if self.interface == "torque" else Control()
+
     @property
     def admittance(self) -> Admittance:
         """What follows for an arm that takes velocities or positions."""
@@ -145,9 +153,9 @@ class Admittance:
         )
 
     def figures(self) -> dict[str, float | str]:
-        """The same for scripts, in SI units."""
+        """The same, by name."""
         return {
-            "interface": self.kind, "rate_hz": self.rate, "total_delay_s": self.total_delay, "damping": self.damping,
+            "takes": self.kind, "rate_hz": self.rate, "total_delay_s": self.total_delay, "damping": self.damping,
             "turning_damping": self.turning_damping(), "speed_m_s": self.speed, "slow_down": self.slow_down,
         }  # fmt: skip
 

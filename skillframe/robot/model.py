@@ -15,7 +15,7 @@ import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -54,6 +54,11 @@ class RobotModel:
     tool_frames: tuple[int, ...]
     followers: tuple[str, ...] = ()
     mimic_fallback: str = ""
+
+    def guided(self) -> RobotModel:
+        """The robot in a person's hands: an arm that takes positions yields as one that takes torques."""
+        control = self.spec.control.guided()
+        return self if control is self.spec.control else replace(self, spec=replace(self.spec, control=control))
 
     def arm_index(self, arm: str) -> int:
         """Index of an arm by name.

@@ -107,7 +107,7 @@ def _attempt(
     columns = {key: np.array([start[key] for start in starts]) for key in starts[0]}
     handle = HANDLE if HANDLE in scene.tool.frames else scene.tool.hand
     setup = Setup(
-        robot=robot, scene=scene, center_of_compliance=np.array(scene.tool.frames[handle]),
+        robot=robot.guided(), scene=scene, center_of_compliance=np.array(scene.tool.frames[handle]),
         sensors=sensors or SensorSettings(), filter_wrench=False, make_drive=drive_maker(robot),
     )  # fmt: skip
     rngs = [np.random.default_rng([seed, slot, attempt]) for slot in slots]

@@ -185,7 +185,7 @@ def _attempt(
     teacher = teacher_for(scene, fixture_poses(robot, columns, len(slots)), settings)
     last = (scene.task, *scene.task.then)[-1]
     setup = Setup(
-        robot=robot, scene=scene, center_of_compliance=np.array(scene.tool.frames[scene.tool.hand]),
+        robot=robot.guided(), scene=scene, center_of_compliance=np.array(scene.tool.frames[scene.tool.hand]),
         sensors=sensors or SensorSettings(), filter_wrench=False, stop_when=last.done or scene.goal,
         make_drive=drive_maker(robot),
     )  # fmt: skip

@@ -50,6 +50,11 @@ def chosen_drive(skill: Skill, setup: Setup, draws: Draws, rngs: Sequence[np.ran
         check_quantities(draws)
         _require_origin(setup)
         return skill, MachineDrive(setup, draws, rngs)
+    if (arm := setup.robot.spec.control).interface != "torque":
+        from skillframe.execution.drives.admittance import AdmittanceDrive
+        from skillframe.execution.paced import PacedSkill
+
+        return PacedSkill(skill, arm.admittance.ticks, arm.pace), AdmittanceDrive(setup, draws, rngs)
     from skillframe.execution.drives.torque import OneArm, TorqueDrive
 
     return skill, TorqueDrive(setup, OneArm(setup, draws, rngs))

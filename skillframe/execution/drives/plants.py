@@ -13,7 +13,7 @@ def varied_plants(setup: Setup, draws: Draws, count: int) -> tuple[Plant, Plant]
     Raises:
         UnreachablePose: the robot cannot reach a start.
     """
-    robot, scene, dt = setup.robot, setup.scene, 1.0 / setup.robot.spec.control.rate_hz
+    robot, scene, dt = setup.robot, setup.scene, 1.0 / setup.robot.spec.control.tick_hz
     fixture = fixture_poses(robot, draws, count)
     plant = Plant(robot, scene, count, fixture, draws, timestep=dt)
     differs = any(key.startswith("grasp.") or key in ("robot.mass_scale", "robot.payload") for key in draws)

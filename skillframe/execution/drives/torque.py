@@ -85,7 +85,7 @@ class TorqueDrive:
 
     def __init__(self, setup: Setup, limb: Limb) -> None:
         self.limb, self.plant, self.rows = limb, limb.plant, limb.rows
-        self.dt = 1.0 / setup.robot.spec.control.rate_hz
+        self.dt = 1.0 / setup.robot.spec.control.tick_hz
         self.filter = WrenchFilter(dt=self.dt).steady() if setup.filter_wrench else None
         self.controller = ImpedanceController(self.rows)
         limits = joint_limits(setup.robot, self.plant.model, limb.dofs)

@@ -41,6 +41,7 @@ def audit(robot: RobotSpec | RobotModel, total_kg: float | None = None) -> Audit
 def machine_warnings(robot: RobotModel) -> Iterator[Problem]:
     """Figures that no cylinder has, or that are not given; loops that do not close, home, and limits made for arms."""
     spec = robot.spec
+    yield from _interface(spec)
     yield from _unmapped(spec)
     if spec.servo:
         yield from (_warning("cannot_run", *slip) for one in spec.actuation for slip in unfit_servo(one))
@@ -64,6 +65,15 @@ def machine_warnings(robot: RobotModel) -> Iterator[Problem]:
     for text in unfit:
         yield _warning("impossible_home", f"at home {text}", "choose another [home]")
     yield from _limits(robot.spec.limits)
+
+
+def _interface(spec: RobotSpec) -> Iterator[Problem]:
+    """An arm that takes velocities or positions so late, or for so stiff a contact, that it is slow."""
+    if spec.control.interface == "torque":
+        return
+    fix = "shorten delay_s, mount the tool softly (a lower contact_stiffness), or give a larger push_n"
+    for text in spec.control.admittance.doubts():
+        yield _warning("slow_interface", text, f"{fix}, under [control]")
 
 
 def _unmapped(spec: RobotSpec) -> Iterator[Problem]:

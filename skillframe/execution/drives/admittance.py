@@ -1,0 +1,121 @@
+"""An arm that takes velocities or positions: an admittance law makes its commands, its own loop the torques.
+
+    encoders, force sensor -> filter -> Observation -> skill -> Command -> admittance -> joint steps
+        -> (at the rate of commands) -> the arm's inner loop -> motors -> torque -> plant
+
+Sensors, limits and records are those of ideal torques (`skillframe.execution.drives.torque`). The law goes by the
+nominal robot at the joints as commanded: where they are, and on from there by what they lag behind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from skillframe.control.admittance import AdmittanceLaw, Bounds
+from skillframe.control.controller import Reading
+from skillframe.control.endings import Broken
+from skillframe.control.inner_loop import InnerLoop
+from skillframe.control.joint_steps import JointSteps, Range
+from skillframe.control.motors import joint_limits
+from skillframe.execution.drives.torque import OneArm, TorqueDrive
+from skillframe.execution.setup import Setup
+from skillframe.frames import Float, Pose, norm, rotation_matrix
+from skillframe.skill import Command
+from skillframe.world.plant import Draws, Kinematics, Plant
+
+BLEED = 1.0
+"""[1/s] at which a velocity's integral follows the measured joints: errors of the arm's loop do not pile up (ours)."""
+
+
+class AdmittanceDrive(TorqueDrive):
+    """One arm told velocities or positions.
+
+    Args:
+        setup: robot, scene and settings.
+        draws: quantities per trial.
+        rngs: one generator per trial, for the sensors.
+    """
+
+    def __init__(self, setup: Setup, draws: Draws, rngs: Sequence[np.random.Generator]) -> None:
+        limb = OneArm(setup, draws, rngs)
+        super().__init__(setup, limb)
+        self._by_hand = TorqueDrive(setup, limb)
+        self.arm, self._pace = setup.robot.spec.control.admittance, setup.robot.spec.control.pace
+        self._limits = _range(setup, self.plant)
+        self._dofs, self._dt_command = self.plant.dofs, self.arm.ticks * self.dt
+        self._lever = float(norm(np.array(setup.scene.tool.frames["tip"]) - limb.point))
+        self._begin()
+
+    def _begin(self) -> None:
+        """Law, joint steps and inner loop where the joints are now."""
+        start = self.limb.joint_positions().copy()
+        self._joints, self._sent = start, start if self.arm.kind == "position" else np.zeros_like(start)
+        floor = (self.arm.damping, self.arm.turning_damping(self._lever))
+        bounds = Bounds(floor, self.arm.push, self.arm.stiffness)
+        self.admittance = AdmittanceLaw(self.rows, self._dt_command, bounds)
+        self._steps = JointSteps(start.take(self._dofs, axis=1), self._limits, self.arm.total_delay, self._dt_command)
+        self._inner = InnerLoop(self.arm, start, self.limb.mass_matrix, self.dt)
+        self._tick, self._law = 0, np.zeros((self.rows, 6))
+
+    def prepare(self) -> list[Broken]:
+        """Tare as an arm of ideal torques does, which yields where a trial was drawn to begin in contact."""
+        broken = self._by_hand.prepare()
+        self._begin()
+        return broken
+
+    def act(self, command: Command, ramp: float) -> Float:
+        """The arm's next command where one is due, and the torques of its own loop; the law's wrench (N, 6)."""
+        if self._tick % self.arm.ticks == 0:
+            self._tell(command, ramp)
+        self._tick += 1
+        self._drive()
+        return self._law
+
+    def notes(self, i: int) -> list[str]:
+        """What the arm takes, and by which clock the skill ran."""
+        clock = f"; its clock ran {self.arm.slow_down:.1f} times slower" if self.arm.slow_down > 1.0 else ""
+        return [*super().notes(i), f"the arm {self.arm.told()}{clock}"]
+
+    def _tell(self, command: Command, ramp: float) -> None:
+        """A step of the law, and the joints on by what it makes."""
+        law, dofs = self.admittance, self._dofs
+        measured = self.limb.joint_positions().take(dofs, axis=1)  # in C order, or rounding would depend on N
+        joints, jacobian = self._joints.take(dofs, axis=1), self._reading.jacobian.take(dofs, axis=-1)
+        paced = command._replace(twist=command.twist / self._pace)
+        self._law = law.step(paced, moved(self._pose, jacobian, joints - measured), self._wrench, ramp)
+        speed, law.twist = self._steps.velocities(law.twist, jacobian, joints, measured)
+        self._joints = self._joints.copy()
+        self._joints[:, dofs] = joints + self._dt_command * speed
+        self._sent = self._joints
+        if self.arm.kind == "velocity":
+            self._joints[:, dofs] += (self._dt_command * BLEED) * (measured - joints)
+            self._sent = np.zeros_like(self._joints)
+            self._sent[:, dofs] = speed
+
+    def _read(self, kinematics: Kinematics, measured: Pose) -> Reading:
+        self._pose = kinematics.pose.at(self.limb.point)
+        return super()._read(kinematics, measured)
+
+    def _drive(self) -> None:
+        """Torques of the arm's own loop, held to its motors."""
+        reading, position = self._reading, self.limb.joint_positions()
+        self._torque = self._inner.torque(self._sent, position, reading.velocity, reading.bias)
+        if self.motors is not None:
+            self._torque = self.motors.held(self._torque, reading.velocity, position)
+
+
+def moved(pose: Pose, jacobian: Float, step: Float) -> Pose:
+    """A pose after small steps (N, n) of the joints, to first order: a lag of 1 mrad bends it by less than 1 um."""
+    way = (jacobian @ step[..., None])[..., 0]
+    return Pose(pose.position + way[:, :3], rotation_matrix(way[:, 3:]) @ pose.rotation)
+
+
+def _range(setup: Setup, plant: Plant) -> Range:
+    """Of the joints that move the tool."""
+    limits = joint_limits(setup.robot, plant.model)
+    if not limits:
+        free = np.full(len(plant.dofs), np.inf)
+        return Range(free, -free, free)
+    return Range(*(np.asarray(part)[plant.dofs] for part in (limits[0].velocity, limits[0].lower, limits[0].upper)))

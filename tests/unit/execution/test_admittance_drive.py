@@ -1,0 +1,150 @@
+"""An arm that takes positions or velocities, beside the same arm as an ideal source of torques."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from skillframe.errors import InputError
+from skillframe.execution.drives.admittance import AdmittanceDrive
+from skillframe.execution.executor import Setup, begin, simulate
+from skillframe.robot.interface import Control
+from skillframe.robot.model import load_model
+from skillframe.robot.spec import load_robot
+from skillframe.testing import HoldSkill
+from tests.laws.pushing import Hold, Push, impedance
+from tests.laws.runs import SILENT, generators, scene
+
+KINDS = {
+    "position": Control(interface="position", rate_hz=500.0),
+    "slow": Control(interface="position", rate_hz=125.0, delay_s=0.02),
+    "velocity": Control(interface="velocity", delay_s=0.003, bandwidth_hz=50.0),
+}
+STIFF = np.diag([1000.0] * 3 + [50.0] * 3)
+DOWN = (0.0, 0.0, -1.0)
+
+
+@cache
+def robot(kind, **limits):
+    model = load_model(load_robot("panda"))
+    return replace(model, spec=replace(model.spec, control=KINDS[kind] if kind in KINDS else Control()))
+
+
+def setup(kind, world="valley", sensors=SILENT, model=None, **params):
+    task = scene(world, **params)
+    return Setup(robot=model or robot(kind), scene=task, center_of_compliance=np.array(task.tool.frames["tip"]),
+                 sensors=sensors)  # fmt: skip
+
+
+def run(kind, skill, draws=None, seconds=3.0, count=1, trace_hz=100.0, **given):
+    columns = {key: np.full(count, value) for key, value in (draws or {}).items()}
+    return simulate(skill, setup(kind, **given), columns, generators(count), duration_s=seconds, trace_hz=trace_hz)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_arm_that_is_told_to_hold_stands_as_it_was_put(kind):
+    result = run(kind, HoldSkill(), seconds=0.3)
+    position = result.traces[0].position
+    assert np.abs(position - position[0]).max() < 1e-5
+    assert result.reason[0].startswith("time limit")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_in_the_air_the_tool_goes_at_the_pace_of_the_arm_and_along_the_skills_way(kind):
+    """D v_d is in the drive, so that nothing lags but the arm: after the start, the speed is 10 mm/s over the pace.
+
+    A velocity's integral follows the joints by 1/s: while they lag by 17 ms, the tool goes faster by up to 1.7 %.
+    """
+    pace = KINDS[kind].pace
+    result = run(kind, Push(DOWN, STIFF, speed=0.01, stall=False), {"start.offset_z": 0.05}, seconds=0.8)
+    trace = result.traces[0]
+    late = trace.time > 0.5 * trace.time[-1]
+    speed = np.polyfit(trace.time[late], trace.position[late], 1)[0]
+    np.testing.assert_allclose(speed, [0.0, 0.0, -0.01 / pace], atol=2e-4)  # 2 % of 10 mm/s
+    assert trace.time[-1] == pytest.approx(0.8 * pace, abs=0.02)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_against_the_valley_it_pushes_as_hard_as_it_may_and_comes_to_rest_without_bouncing(kind):
+    """The law's drive is cut to 20 N, and at rest the contact carries all of it."""
+    result = run(kind, Push(DOWN, STIFF, cap=60.0, stall=False), {"start.offset_z": 0.001}, seconds=1.6)
+    trace = result.traces[0]
+    force = np.linalg.norm(trace.wrench_true[-20:, :3], axis=1)
+    np.testing.assert_allclose(force, 20.0, atol=0.1)
+    assert result.peak_force_n[0] < 2.0 * 20.0  # 1.2 to 1.75 times by the rule, for D as designed
+
+
+def test_with_a_fifth_of_the_damping_the_contact_rings_into_the_force_limit():
+    """What the floor is for: 0.3 k_e T_tot, below the 0.57 that is least."""
+    bare = replace(KINDS["position"], contact_stiffness=1e4)
+    model = replace(robot("position"), spec=replace(robot("position").spec, control=bare))
+    result = run("position", Push(DOWN, STIFF, stall=False), {"start.offset_z": 0.001}, seconds=2.0, model=model)
+    assert result.peak_force_n[0] > 60.0
+
+
+@pytest.mark.parametrize("kind", ["position", "velocity"])
+def test_a_force_on_a_free_axis_moves_the_tool_at_force_over_damping(kind):
+    """K = 0 along x, a feed-forward of 10 N: v = 10 / D, and it stays where it is when the push ends."""
+    arm = KINDS[kind].admittance
+    skill = Hold(
+        impedance("x"), feedforward=lambda time: np.array([10.0 * (time < 1.0 / arm.slow_down), 0, 0, 0, 0, 0])
+    )
+    result = run(kind, skill, {"start.offset_z": 0.05}, seconds=2.0 / arm.slow_down)
+    way = result.traces[0].position[-1, 0] - result.traces[0].position[0, 0]
+    assert way == pytest.approx(10.0 / arm.damping, rel=0.03)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_trial_does_not_depend_on_its_neighbours(kind):
+    skill = Push(DOWN, STIFF, stall=False)
+    draws = {"start.offset_z": np.array([0.005, 0.03, 0.004]), "fixture.tilt_y": np.array([0.1, 0.0, -0.1])}
+    both = simulate(skill, setup(kind), draws, generators(3), duration_s=0.4, trace_hz=100.0)
+    first = {key: values[:1] for key, values in draws.items()}
+    alone = simulate(skill, setup(kind), first, generators(1), duration_s=0.4, trace_hz=100.0)
+    np.testing.assert_array_equal(both.traces[0].position, alone.traces[0].position)
+    np.testing.assert_array_equal(both.traces[0].wrench_true, alone.traces[0].wrench_true)
+
+
+def test_a_trial_that_begins_in_contact_yields_while_it_is_tared_and_does_not_press():
+    result = run("position", HoldSkill(), {"start.offset_z": -0.002}, seconds=0.2)
+    assert result.peak_force_n[0] < 20.0
+
+
+def test_time_limits_are_stretched_with_the_skills_clock_and_every_result_says_so():
+    pace = KINDS["position"].pace
+    result = run("position", HoldSkill(), seconds=0.1)
+    assert result.duration_s[0] == pytest.approx(0.1 * pace, abs=1e-3)
+    assert f"{0.1 * pace:g} s of simulated time" in result.reason[0]
+    meta = result.traces[0].meta
+    assert meta["interface"]["takes"] == "position"
+    assert any(
+        "takes a position 500 times a second" in n and "its clock ran 2.7 times slower" in n for n in meta["notes"]
+    )
+
+
+def test_a_skill_that_the_arm_cannot_hold_is_refused_with_the_figure():
+    with pytest.raises(InputError, match=r"asks for 6e\+04 N/m"):
+        run("position", Hold(np.diag([6e4] * 3 + [50.0] * 3)), seconds=0.1)
+
+
+def test_torques_that_the_arms_own_loop_makes_have_no_rate_limit_and_motors_are_watched():
+    loop = begin(HoldSkill(), setup("position"), {}, generators(1))
+    assert isinstance(loop.drive, AdmittanceDrive)
+    assert loop.setup.limits.torque_rate_nm_s is None
+    assert setup("torque").limits.torque_rate_nm_s == 1000.0
+    result = run("position", HoldSkill(), seconds=0.05)
+    assert 0.0 < result.peak_torque_share[0] < 1.0
+
+
+def test_a_push_against_a_joint_at_its_end_does_not_wind_up():
+    """The law goes on with the twist that is made, which is none."""
+    loop = begin(Push((0.0, 0.0, 1.0), STIFF, speed=0.02, stall=False), setup("position"), {}, generators(1))
+    loop.prepare()
+    drive = loop.drive
+    stop = drive._joints[0, drive._dofs] + 1e-4
+    drive._steps._limits = drive._steps._limits._replace(upper=stop, lower=stop - 2e-4)
+    for tick in range(1000):
+        loop._tick(tick)
+    assert np.all(drive._joints[0, drive._dofs] <= stop + 1e-9)
+    assert np.abs(drive.admittance.twist).max() < 1e-3
