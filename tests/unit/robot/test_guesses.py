@@ -88,7 +88,9 @@ def test_printed_masses_of_an_arm_come_near_to_the_real_ones(bare, name):
 
 @pytest.mark.parametrize("name", [*ARMS, *UNSEEN])
 def test_each_link_has_its_share_of_the_arm_s_mass(bare, name):
-    """Of the true total, each link's guess is within a factor of 2.5 of its maker's figure. 1.75 in an arm's mean: UR30 1.71.
+    """Of the true total, each link's guess is within a factor of 2.5 of its maker's figure.
+
+    Within 1.75 in an arm's mean; the UR30 has 1.71.
 
     Links with a wrist's motors or with none of their own differ by that much at the same length. The Panda's link 2
     (0.6 kg) is left out: an identification moves mass between links, and the same mechanics as FR3 give it 2.9 kg."""
