@@ -1,4 +1,4 @@
-"""Every shipped arm is taught, learns and does the peg and the valley, as the commands do it."""
+"""Every shipped arm is taught, learns and does peg, valley and coupler, as the commands do it."""
 
 import json
 
@@ -9,7 +9,7 @@ from skillframe.cli.main import run
 pytestmark = [pytest.mark.slow, pytest.mark.needs_plugins]
 
 
-@pytest.mark.parametrize("world", ["peg_in_hole", "valley"])
+@pytest.mark.parametrize("world", ["peg_in_hole", "valley", "hose_coupler"])
 @pytest.mark.parametrize("robot", ["ur5e", "fr3", "kuka_iiwa14"])
 def test_a_shipped_arm_is_taught_and_does_what_it_was_taught(robot, world, tmp_path, capsys):
     on = ["--world", world, "--robot", robot]
