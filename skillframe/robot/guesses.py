@@ -8,15 +8,18 @@ counts as d, 1.5 times the longest such reach. Both taper with the reach that th
 Our choice, fitted to eleven published arms. With the true total a link is then within a factor of 2.5 of its maker's
 figure, 1.5 in the mean (root mean square of the logarithm), but for the Panda, whose identification gives link 2 next
 to nothing. The scale s comes from a total that the user gives, or from a class of arms (`CLASSES`), of which the moving
-links have 83 %: the mean of eight arms, 76 to 90 %. Without either, the longest branch weighs 15 kg (R / 1 m)^1.5:
-within a factor of 1.7 for arms of up to 20 kg payload, but for the Gen3, of carbon fibre, 2.5 times too heavy (the mean
-of the arms is 17.5). What lifts more is heavier still: the UR30 2.2 times, an industrial arm two to six times.
+links have 83 %: the mean of eight arms, 76 to 90 %. Without either, the longest branch weighs 15 kg (l / 1 m)^1.5, l
+being its length from joint to joint, without what shapes stand out: within a factor of 1.7 for arms of up to 20 kg
+payload, but for the Gen3, of carbon fibre, 2.5 times too heavy (the mean of the arms is 17.5). What lifts more is
+heavier still: the UR30 2.2 times, an industrial arm two to six times.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+
+import numpy as np
 
 from skillframe.errors import InputError, UnknownName
 from skillframe.robot.bodies import Body
@@ -89,7 +92,7 @@ def _longest(bodies: list[Body]) -> float:
 
 
 def _shares(bodies: list[Body]) -> tuple[list[float], float]:
-    """Mass of every body over that of the longest branch, and this branch's reach [m]."""
+    """Mass of every body over that of the longest branch, and this branch's length from joint to joint [m]."""
     ahead = [body.reach for body in bodies]
     follow = [-1] * len(bodies)
     for index in range(len(bodies) - 1, 0, -1):  # children stand behind their parents
@@ -100,10 +103,11 @@ def _shares(bodies: list[Body]) -> tuple[list[float], float]:
     most, motor = ahead[first] or UNKNOWN, MOTOR * _longest(bodies)
     tapered = [min(1.0, max(LEAST, reach / most)) ** TAPER for reach in ahead]
     weights = [(body.reach + motor) * part for body, part in zip(bodies, tapered, strict=True)]
-    along = 0.0
+    along = between = 0.0
     while first >= 0:
-        along, first = along + weights[first], follow[first]
-    return [weight / along for weight in weights], most
+        along, between = along + weights[first], between + float(np.linalg.norm(bodies[first].far))
+        first = follow[first]
+    return [weight / along for weight in weights], between or most
 
 
 def cylinder(mass: float, length: float, center: tuple[float, float, float], guessed: bool) -> LinkInertia:
