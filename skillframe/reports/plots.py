@@ -6,10 +6,11 @@ attitudes are rotation vectors from the start, in degrees (readable up to half a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.execution.trace import Trace
@@ -29,9 +30,16 @@ FORCE_CAPTION = (
     "What the environment does to the tool, filtered: the controller's estimate. Limits are held against it and "
     "against the simulator's own force; x, y, z are the robot's base axes."
 )
-ESTIMATE_CAPTION = (
-    "What the environment does to the tool, as estimated from the pressures; x, y, z are the robot's base axes."
+DOUBT_CAPTION = (
+    "Shaded: the estimate is not valid. Fewer than two pistons have been sliding for long enough, and what holds those "
+    "that stand is not known."
 )
+ESTIMATE_CAPTION = (
+    "What the environment does to the tool, as estimated from the pressures; x, y, z are the robot's base axes. "
+    + DOUBT_CAPTION
+)
+VALID = 0.5
+"""`force_valid` is 1 where the estimate is valid; what a recording holds may have been resampled."""
 SHORT_PEAK = 1.1
 """A peak of the simulator that exceeds what the trace holds by this factor is told beside the plot."""
 POSITION_CAPTION = (
@@ -53,14 +61,16 @@ class Curve:
 def time_plot(
     title: str, unit: str, time: Float, curves: Sequence[Curve], *, caption: str = "",
     limit: float | None = None, events: Sequence[tuple[float, str]] = (), width: float = 460.0,
+    shaded: NDArray[np.bool_] | None = None,
 ) -> Markup:  # fmt: skip
-    """A plot over time. A limit is drawn when it is near enough to matter."""
+    """A plot over time, shaded where `shaded` (T,) is true. A limit is drawn when it is near enough to matter."""
     axes = Axes(
         width=width, x=_time_range(time), y=_value_range(curves, unit, limit), x_label="time [s]", y_label=f"[{unit}]"
     )
     names = [(c.name, c.stroke) for c in curves if c.name]
     content = [
         axes.frame(),
+        _shades(axes, time, shaded),
         *(axes.line(*envelope(time, c.values), c.stroke) for c in curves),
     ]
     content += [legend(axes, names), _limit_line(axes, limit, unit), _event_marks(axes, events), _cursor(axes)]
@@ -83,6 +93,22 @@ def _value_range(curves: Sequence[Curve], unit: str, limit: float | None) -> tup
         high = max(high, limit)
     low, high = padded(low, high, least=LEAST_RANGE.get(unit, 1e-6))
     return low, high + HEADROOM * (high - low)
+
+
+def _shades(axes: Axes, time: Float, shaded: NDArray[np.bool_] | None) -> Markup:
+    """A band over every stretch of samples that are to be shaded, each as long as its samples last."""
+    if shaded is None or not np.any(shaded):
+        return Markup("")
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], np.asarray(shaded, dtype=bool), [False]])))
+    upto = np.append(time, time[-1])
+    spans = [(axes.across(time[a]), axes.across(upto[b])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    tall = {"y": axes.top, "height": axes.bottom - axes.top, "class_": "doubtful"}
+    return join([tag("rect", x=round(float(a), 1), width=round(float(b - a), 1), **tall) for a, b in spans])
+
+
+def doubted(columns: Mapping[str, Float]) -> NDArray[np.bool_] | None:
+    """(T,) where an estimated force is not valid, by a machine's or a recording's columns; None where none says so."""
+    return columns["force_valid"] < VALID if "force_valid" in columns else None
 
 
 def _limit_line(axes: Axes, limit: float | None, unit: str) -> Markup:
@@ -155,7 +181,7 @@ def run_plots(trace: Trace, force_limit: float | None = None) -> list[Markup]:
     turns = _pairs(turned(trace.desired_quaternion, first), turned(trace.quaternion, first))
     plots = [
         time_plot("Contact force", "N", time, [true_size, *_components(trace.wrench[:, :3], "thin"), size],
-                  limit=None if limit is None else float(limit), events=events,
+                  limit=None if limit is None else float(limit), events=events, shaded=doubted(trace.machine),
                   caption=(ESTIMATE_CAPTION if trace.estimated else FORCE_CAPTION) + _short_peak(trace)),
         time_plot("Position", "mm", time, moved, events=events, caption=POSITION_CAPTION),
         time_plot("Attitude", "°", time, turns, events=events, caption=ATTITUDE_CAPTION),
@@ -181,10 +207,11 @@ def demonstration_plots(demonstration: Demonstration) -> Markup:
     time = demonstration.time - demonstration.time[0]
     moved = 1e3 * (demonstration.position - demonstration.position[0])
     turn = turned(demonstration.quaternion, demonstration.quaternion[:1])
-    force = demonstration.wrench[:, :3]
+    force, extra = demonstration.wrench[:, :3], demonstration.extra
     size = Curve(name="|F|", values=norm(force), stroke="line ink")
     return join([
-        time_plot("Force", "N", time, [*_components(force, "thin"), size], width=350),
+        time_plot("Force", "N", time, [*_components(force, "thin"), size], width=350, shaded=(unsure := doubted(extra)),
+                  caption=DOUBT_CAPTION if unsure is not None and np.any(unsure) else ""),
         time_plot("Position", "mm", time, _components(moved, ""), width=350),
         time_plot("Attitude", "°", time, _components(turn, ""), width=350),
     ])  # fmt: skip

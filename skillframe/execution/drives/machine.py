@@ -42,6 +42,7 @@ from skillframe.machine.force.load import BelievedLoad
 from skillframe.machine.force.momentum import Estimate, ForceSettings
 from skillframe.machine.force.residual_noise import residual_noise
 from skillframe.machine.force.ringing import Ringing
+from skillframe.machine.force.stated import StatedSigma
 from skillframe.machine.force.valve import ValveIdentification, ValveSettings
 from skillframe.machine.law.gains import law_gains
 from skillframe.machine.law.hydraulic import Demand, Measured, Reference, plane_task
@@ -110,6 +111,7 @@ class MachineDrive:
         self._z = [int(self.plant.model.joint(name).qposadr[0]) for name in self.chain.independent]
         late = np.asarray(draws.get("actuator.delay", np.zeros(self.count)))
         self._delay = CommandDelay(np.round(late / self.dt).astype(np.int64), len(known.area_a))
+        self.sigma = StatedSigma(self.count, self.dt)
         self.findings: list[list[str]] = [[] for _ in rngs]
         meant = [a.unused for a in spec.actuation if a.fmu != CYLINDER]
         rows = unmapped(foreign_specs(spec), meant, spec.folder)
@@ -175,6 +177,7 @@ class MachineDrive:
             if tick == 0:
                 self._weigh()
             self._estimate(force_counts=False)
+            self.sigma.show(tick, self._estimated)
             self._look_at_valves(tick)
             self._valve(
                 Reference(
@@ -189,6 +192,7 @@ class MachineDrive:
             if not len(self.active):
                 break
         broken += self._ringing(ringing)
+        self.sigma.hold()
         self.estimator.calibrate(False)
         hold_what_was_found(self.law, self.estimator.identification)
         self.findings = findings(self.law, self.load, self.estimator.identification, self.valves)
@@ -229,7 +233,7 @@ class MachineDrive:
 
     def _estimate(self, force_counts: bool = True) -> None:
         """The force from what was sampled; in the air it is known to be zero."""
-        estimate = self.estimator.step(self._seen, self.terms)
+        self._estimated = estimate = self.estimator.step(self._seen, self.terms)
         nothing = np.zeros_like(estimate.force)
         self.estimate = (
             estimate if force_counts else estimate._replace(sigma=nothing, feedback=nothing, answered=nothing)
@@ -314,7 +318,7 @@ class MachineDrive:
         return {
             "pressure_a": pressure_a, "pressure_b": pressure_b, "valve": self.demand.valve,
             "piston_force": self.demand.present - self.estimator.friction(self.terms),
-            "piston_force_true": self.actuated.force, "force_sigma": self.estimate.sigma,
+            "piston_force_true": self.actuated.force, "force_sigma": self.sigma.stated(self.estimate),
             "force_valid": self.estimate.valid.astype(float),
             "energy_supply": self.bill.supply, "energy_pistons": self.bill.pistons,
         }  # fmt: skip

@@ -1,12 +1,14 @@
 """Plots of a hydraulic machine's run: only where there is a machine, each actuator named, only what is known."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import report_fakes
 
+from skillframe.demonstration.record import Demonstration
 from skillframe.reports.machine import machine_plots
-from skillframe.reports.plots import events_of, run_plots
+from skillframe.reports.plots import demonstration_plots, events_of, run_plots
 
 NAMES = ["lift_piston", "tilt_piston"]
 
@@ -52,3 +54,33 @@ def test_the_highest_force_is_called_an_estimate_where_no_sensor_measures_it():
 
 def test_a_machines_run_shows_no_torque_that_nobody_measures():
     assert len(run_plots(machine_trace())) == 2
+
+
+def shades(page):
+    """(start, width) of every shaded band [px]."""
+    bands = re.findall(r'<rect x="([\d.]+)" width="([\d.]+)"[^>]*class="doubtful"', page)
+    return [(float(x), float(width)) for x, width in bands]
+
+
+def test_the_estimated_force_is_shaded_where_it_is_not_valid_and_nowhere_else():
+    trace = machine_trace()
+    assert not shades(str(run_plots(trace)[0]))
+    rows, time = len(trace.time), trace.time
+    valid = np.ones(rows)
+    valid[2:5] = valid[-3:] = 0.0
+    page = str(run_plots(replace(trace, machine={**trace.machine, "force_valid": valid}))[0])
+    (first, long), (second, short) = shades(page)
+    px = (second - first) / (time[-3] - time[2])  # px a second, from the two bands' beginnings
+    assert np.isclose(long / px, time[5] - time[2], atol=0.1 / px)  # positions are written to 0.1 px
+    assert np.isclose(short / px, time[-1] - time[-3], atol=0.1 / px)
+    assert "Shaded: the estimate is not valid" in page
+
+
+def test_a_recording_of_a_machine_is_shaded_by_its_own_column_and_one_of_an_arm_is_not():
+    run = report_fakes.trace()
+    recording = Demonstration(time=run.time, position=run.position, quaternion=run.quaternion, wrench=run.wrench)
+    valid = np.ones(len(recording.time))
+    valid[: len(valid) // 2] = 0.0
+    said = replace(recording, extra={"force_valid": valid})
+    assert len(shades(str(demonstration_plots(said)))) == 1
+    assert not shades(str(demonstration_plots(recording)))
