@@ -45,7 +45,7 @@ def main(out: Path, quick: bool) -> None:
     )
     forces = [results.table(name)["peak_force_n"] for name in skills]
     right.boxplot(forces, tick_labels=list(skills), showfliers=False)
-    right.set(ylabel="peak contact force [N]", title="how hard they push")
+    right.set(ylabel="peak contact force in the simulator [N]", title="how hard they push")
     for ax in (left, right):
         ax.spines[["top", "right"]].set_visible(False)
     figure.savefig(out / "compare.png", dpi=110)

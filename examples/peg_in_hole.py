@@ -23,7 +23,7 @@ def main(out: Path, quick: bool) -> None:
     tilt = "3deg" if quick else "5deg"
     done = run(skill, "peg_in_hole", "panda", coc="tip", set={"fixture.tilt_y": tilt, "fixture.offset_x": "3mm"})
     print(f"{'success' if done.success else done.failure} after {done.duration_s:.1f} s")
-    print(f"largest contact force {done.peak_force_n:.1f} N, {1000 * done.final_error_m:.2f} mm from the goal")
+    print(f"peak contact force {done.peak_force_n:.1f} N, {1000 * done.final_error_m:.2f} mm from the goal")
 
     still = done.picture(out / "peg_in_hole_still.png")
     figure, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.2), width_ratios=(1.1, 1.0), layout="constrained")

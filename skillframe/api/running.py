@@ -80,7 +80,7 @@ class SingleRun:
 
     @property
     def peak_force_n(self) -> float:
-        """Largest true contact force [N]."""
+        """Peak contact force [N]: the largest of one control tick in the simulator."""
         return float(self.trace.meta["peak_force_n"])
 
     @property
@@ -168,7 +168,9 @@ class SingleRun:
     def __repr__(self) -> str:
         meta, said = self.trace.meta, "success" if self.success else f"failure: {self.failure}"
         what = f"{meta.get('skill')} by {meta['robot']} in {meta['world']}"
-        return f"SingleRun({what}: {said}; {self.duration_s:.2f} s, peak force {self.peak_force_n:.1f} N)"
+        return (
+            f"SingleRun({what}: {said}; {self.duration_s:.2f} s, peak force in the simulator {self.peak_force_n:.1f} N)"
+        )
 
 
 def run(

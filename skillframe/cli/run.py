@@ -118,6 +118,7 @@ def _scene(meta: dict[str, Any]) -> str:
 def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) -> None:
     from skillframe.execution.tracemeta import SHARE_JOINTS, SHARES
     from skillframe.reports.motors import said_of_motors
+    from skillframe.reports.peaks import said
 
     keys = ["success", "failure", "reason", "duration_s", "peak_force_n", "final_error_m", "final_error_rad"]
     outcome = {key: _known(meta[key]) for key in keys}
@@ -137,10 +138,8 @@ def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) ->
     ended = f"  ended after {meta['duration_s']:.2f} s ({meta['reason']})"
     if None not in outcome.values():
         missed, turned = _hundredths(meta["final_error_m"] * 1000), _hundredths(math.degrees(meta["final_error_rad"]))
-        ended += (
-            f"; peak contact force in the simulator {meta['peak_force_n']:.1f} N, by the estimate "
-            f"{meta['peak_force_filtered_n']:.1f} N; {missed} mm and {turned} degrees from the goal"
-        )
+        forces = ", ".join(said(meta, "{:.1f}".format))
+        ended += f"; {forces}; {missed} mm and {turned} degrees from the goal"
     click.echo(ended)
     if motors := said_of_motors(meta):
         click.echo(f"  motors: {', '.join(motors)}")

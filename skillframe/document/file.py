@@ -1,9 +1,9 @@
 """The skill file: one readable JSON document that says what was learned, from what, by whom, and in which frame.
 
 Layout (fixed outside, so that scripts can rely on it): `format`, `version`, `type`, `type_version`, `created_by`,
-`learned_from` [{`file`, `sha256`}], `frame` (points and axes, see `skillframe.document.frame`) and `phases`, a list
-whose items belong to the type. Keys are sorted, a row of numbers stands on one line, and every number comes back to the
-last bit: Python writes the shortest decimal that does.
+`learned_from` [{`file`, `sha256`, `simulated`, `teacher`}], `frame` (points and axes, see `skillframe.document.frame`)
+and `phases`, a list whose items belong to the type. Keys are sorted, a row of numbers stands on one line, and every
+number comes back to the last bit: Python writes the shortest decimal that does.
 """
 
 from __future__ import annotations
@@ -68,7 +68,8 @@ def _creator(name: str) -> dict[str, str]:
     return {"skillframe": __version__, "plugin": plugin.distribution, "plugin_version": plugin.version}
 
 
-def _source(demonstration: Demonstration) -> dict[str, str]:
+def _source(demonstration: Demonstration) -> dict[str, Any]:
+    """A demonstration's file and hash, and who taught: a simulated person, or whom a recording shows."""
     path = Path(demonstration.source) if demonstration.source else None
     digest = hashlib.sha256()
     if path is not None and path.is_file():
@@ -76,7 +77,11 @@ def _source(demonstration: Demonstration) -> dict[str, str]:
     else:
         for array in (demonstration.time, demonstration.position, demonstration.quaternion, demonstration.wrench):
             digest.update(array.astype("<f8").tobytes())
-    return {"file": shown(demonstration.source) or "(in memory)", "sha256": digest.hexdigest()}
+    kind = demonstration.meta.get("teacher")
+    return {
+        "file": shown(demonstration.source) or "(in memory)", "sha256": digest.hexdigest(),
+        "simulated": bool(demonstration.meta.get("simulated")), **({"teacher": kind} if isinstance(kind, str) else {}),
+    }  # fmt: skip
 
 
 def save(document: Document, path: Path) -> None:

@@ -30,7 +30,7 @@ class Result:
         status: of the skill at its end (`Status`).
         reason: why the trial ended, in words.
         duration_s: simulated seconds.
-        peak_force_n: largest true contact force.
+        peak_force_n: peak contact force, the largest true force of one control tick.
         final_error_m, final_error_rad: distance to the goal at the end.
         energy_j: work of the controller on the tool.
         peak_force_filtered_n: largest force that the controller's estimate read.

@@ -10,10 +10,13 @@ import numpy as np
 from skillframe.campaign.spec import name_of
 from skillframe.reports.learned import described
 from skillframe.reports.markup import Markup, escape, join, number, percent, tag
+from skillframe.reports.peaks import WORDS, said
 from skillframe.reports.quantities import quantity
 from skillframe.reports.results import Rate, Results
 from skillframe.reports.sources import Chapter
 from skillframe.reports.svg import Axes, picture
+
+MEDIANS = (*WORDS, "duration_s")
 
 
 def lead(chapter: Chapter) -> Markup:
@@ -113,16 +116,12 @@ def interval_bar(rate: Rate, index: int) -> Markup:
 
 
 def _typical(results: Results, skill: str) -> str:
-    parts = []
-    for column, unit, what in (
-        ("peak_force_n", "N", "peak force"), ("peak_force_filtered_n", "N", "by the estimate"),
-        ("duration_s", "s", "duration"),
-    ):  # fmt: skip
-        values = [r.values.get(column, math.nan) for r in results.of(skill)]
-        finite = [v for v in values if math.isfinite(v)]
-        if finite:
-            parts.append(f"{what} {number(float(np.median(finite)))} {unit}")
-    return f"median {', '.join(parts)}" if parts else ""
+    rows = results.of(skill)
+    columns = {name: [v for r in rows if math.isfinite(v := r.values.get(name, math.nan))] for name in MEDIANS}
+    medians = {name: float(np.median(values)) for name, values in columns.items() if values}
+    parts = said(medians, number)
+    parts += [f"duration {number(medians['duration_s'])} s"] if "duration_s" in medians else []
+    return f"medians: {', '.join(parts)}" if parts else ""
 
 
 def _run_sentences(chapter: Chapter) -> list[object]:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from skillframe.campaign.spec import DURATION_S
 from skillframe.reports.markup import Markup, join, note, number, percent, table, tag
-from skillframe.reports.peaks import ESTIMATE, MEAN, TICK
+from skillframe.reports.peaks import DEFINED, ESTIMATE, MEAN, PEAK
 from skillframe.reports.results import ResultRow, Results
 from skillframe.reports.sources import Chapter
 from skillframe.reports.typical import typical
@@ -55,7 +55,7 @@ def margins_of(chapter: Chapter, rows: Sequence[ResultRow]) -> list[Margin]:
             Margin("peak_force_filtered_n", ESTIMATE, "N", 1.0, limit),
         ]
         above = table_of(setup_of(chapter), "limits").get("transient")
-        found += [Margin("peak_force_n", TICK, "N", 1.0, above * limit)] if isinstance(above, int | float) else []
+        found += [Margin("peak_force_n", PEAK, "N", 1.0, above * limit)] if isinstance(above, int | float) else []
     columns = dict.fromkeys(name for row in rows for name in row.values)
     for name in columns:
         if share := SHARE.fullmatch(name):
@@ -107,7 +107,7 @@ def margins_table(chapter: Chapter, results: Results, skill: str) -> Markup:
     first = margins[0]
     lead = tag(
         "p", f"Nearest of {skill}'s {len(rows)} trials: ", tag("strong", first.what), ", ",
-        *_words(_worst(rows, first), first), ". Typical is the trial nearest to the median of that column.",
+        *_words(_worst(rows, first), first), f". Typical is the trial nearest to the median of that column. {DEFINED}",
     )  # fmt: skip
     head = ("what", "limit", "typical trial", "worst trial")
     return join([

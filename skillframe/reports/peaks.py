@@ -1,17 +1,37 @@
-"""The three peaks of a contact force, in the words that every page, table and command uses for them.
+"""One definition of a peak of the contact force, in the words that every page, table and command uses.
 
-| column | what it is | held to |
+| column | words | held to |
 |---|---|---|
-| `peak_force_n` | largest force of one control tick in the simulator | twice the limit |
-| `peak_force_10ms_n` | largest mean over 10 ms of the simulator's force | the limit |
-| `peak_force_filtered_n` | largest force that the controller's filtered estimate read | the limit |
+| `peak_force_n` | peak contact force in the simulator: the largest of one control tick | twice the limit |
+| `peak_force_10ms_n` | over 10 ms: the largest mean of the simulator's force over any 10 ms | the limit |
+| `peak_force_filtered_n` | by the estimate: the largest that the controller's filtered estimate read | the limit |
+
+"Peak" by itself is always the first.
 """
 
-TICK = "peak contact force in the simulator, one tick"
-MEAN = "contact force in the simulator, mean over 10 ms"
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+PEAK = "peak contact force in the simulator"
+MEAN = "contact force in the simulator over 10 ms"
 ESTIMATE = "contact force by the controller's estimate"
-SHORT = {
-    "peak_force_n": "one tick in the simulator", "peak_force_10ms_n": "mean over 10 ms in the simulator",
-    "peak_force_filtered_n": "by the controller's estimate",
-}  # fmt: skip
-"""After "peak force", by column."""
+DEFINED = "A peak is the largest contact force of one control tick in the simulator."
+WORDS = {"peak_force_n": PEAK, "peak_force_10ms_n": "over 10 ms", "peak_force_filtered_n": "by the estimate"}
+
+
+def said(values: Mapping[str, object], figure: Callable[[float], str]) -> list[str]:
+    """The three of a trial that are known, each a phrase with its unit; they belong together in this order.
+
+    Args:
+        values: by column.
+        figure: writes a number.
+    """
+    known = {column: value for column in WORDS if (value := _known(values.get(column))) is not None}
+    return [f"{WORDS[column]} {figure(value)} N" for column, value in known.items()]
+
+
+def _known(value: object) -> float | None:
+    """A finite number, or None."""
+    return float(value) if isinstance(value, int | float) and math.isfinite(value) else None

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from skillframe.reports import peaks
 from skillframe.reports.machine import machine_plots
 from skillframe.reports.markup import Markup, data_uri, figure, join, json_script, note, number, table, tag
 from skillframe.reports.motors import said_of_motors
@@ -74,14 +75,11 @@ def _story(meta: Mapping[str, Any]) -> str:
     takes = (meta.get("interface") or {}).get("takes", "torque")
     where += "" if takes == "torque" else f", told a {takes}"
     facts = [where, str((not meta.get("success") and meta.get("failure")) or meta.get("reason") or "")]
-    for key, what, unit, factor in (
-        ("duration_s", "took", "s", 1.0),
-        ("peak_force_n", "peak force in the simulator", "N", 1.0),
-        ("peak_force_filtered_n", "by the estimate", "N", 1.0),
-        ("final_error_m", "final error", "mm", 1e3),
-    ):
-        if isinstance(meta.get(key), int | float):
-            facts.append(f"{what} {_figure(float(meta[key]) * factor)} {unit}")
+    if isinstance(meta.get("duration_s"), int | float):
+        facts.append(f"took {_figure(float(meta['duration_s']))} s")
+    facts.append(", ".join(peaks.said(meta, _figure)))
+    if isinstance(meta.get("final_error_m"), int | float):
+        facts.append(f"final error {_figure(1e3 * float(meta['final_error_m']))} mm")
     facts += [*said_of_motors(meta), *said_of(meta)]
     drawn = [_draw_text(name, value) for name, value in sorted((meta.get("draws") or {}).items())]
     how = "Set for this run" if meta.get("trial") is None else "Drawn for this trial"

@@ -13,6 +13,7 @@ from skillframe.frames import Float
 from skillframe.reports.convergence import MOST_CURVES, cell_map, influence, rate_curves
 from skillframe.reports.markup import Markup, figure, join, note, number, percent, table, tag
 from skillframe.reports.motors import motors_table
+from skillframe.reports.peaks import DEFINED, PEAK, WORDS, said
 from skillframe.reports.quantities import quantity
 from skillframe.reports.results import Results
 from skillframe.reports.scores import scores_table
@@ -21,6 +22,7 @@ from skillframe.reports.svg import Axes, padded, picture, text
 from skillframe.reports.theory import regions, theory_sentence
 
 MOST_TRIALS_NAMED = 6
+PEAKS = "peak_force_n"
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -155,7 +157,7 @@ def _forces(chapter: Chapter, results: Results) -> Markup:
         return note("The table holds no peak forces.")
     known = [(skill, float(np.median(f)), float(f.max())) for skill, f in finite.items() if len(f)]
     said = [
-        f"{skill}: median {number(middle)} N, highest {number(top)} N{_by_estimate(results, skill)}"
+        f"{skill}: median peak {number(middle)} N, highest {number(top)} N{_others(results, skill)}"
         for skill, middle, top in known
     ]
     drawn = figure(
@@ -167,11 +169,12 @@ def _forces(chapter: Chapter, results: Results) -> Markup:
     return join([tag("h3", "How hard it pushed"), _skill_key(results), drawn])
 
 
-def _by_estimate(results: Results, skill: str) -> str:
-    """The highest force that the controller's estimate read, where the table has it."""
-    read = [row.values.get("peak_force_filtered_n", math.nan) for row in results.of(skill)]
-    finite = [value for value in read if math.isfinite(value)]
-    return f" ({number(max(finite))} N by the estimate)" if finite else ""
+def _others(results: Results, skill: str) -> str:
+    """The highest forces besides the peak, where the table has them: over 10 ms, and by the estimate."""
+    columns = {name: [row.values.get(name, math.nan) for row in results.of(skill)] for name in WORDS if name != PEAKS}
+    finite = {name: [v for v in values if math.isfinite(v)] for name, values in columns.items()}
+    parts = said({name: max(values) for name, values in finite.items() if values}, number)
+    return f" ({', '.join(parts)})" if parts else ""
 
 
 def _held(results: Results, limit: float | None) -> str:
@@ -179,8 +182,8 @@ def _held(results: Results, limit: float | None) -> str:
     if limit is None:
         return ""
     if all(math.isnan(row.values.get("peak_force_10ms_n", math.nan)) for row in results.rows):
-        return " Peaks are the simulator's; limits are held against the filtered force, which has lower ones."
-    text = " Peaks are the simulator's. A trial fails if the estimate is above the limit, or in the simulator the mean"
+        return f" {DEFINED} Limits are held against the filtered force, which has lower ones."
+    text = f" {DEFINED} A trial fails if the estimate is above the limit, or in the simulator the mean"
     text += " over 10 ms is above it or a peak above twice the limit."
     marked = [row for row in results.rows if row.success and row.values.get("peak_force_n", 0.0) > limit]
     if marked:
@@ -195,11 +198,13 @@ def _histogram(forces: Sequence[Float], limit: float | None) -> Markup:
     counts = [np.histogram(f, edges)[0] for f in forces]
     axes = Axes(
         width=600, height=260, x=padded(0.0, edges[-1], 0.01), y=(0.0, 1.08 * max(int(c.max()) for c in counts)),
-        x_label="peak contact force [N]", y_label="trials",
+        x_label=f"{PEAK} [N]", y_label="trials",
     )  # fmt: skip
     outlines = [np.concatenate([[0.0], np.repeat(c, 2), [0.0]]) for c in counts]
     lines = [axes.line(np.repeat(edges, 2), y, f"histogram s{i % 4 + 1}") for i, y in enumerate(outlines)]
-    return picture(axes, "Peak contact force of all trials", axes.frame(), *lines, _force_limit(axes, limit))
+    return picture(
+        axes, "Peak contact force in the simulator, of all trials", axes.frame(), *lines, _force_limit(axes, limit)
+    )
 
 
 def _force_limit(axes: Axes, limit: float | None) -> Markup:

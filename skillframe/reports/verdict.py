@@ -71,15 +71,15 @@ def banner(chapter: Chapter) -> Markup:
     share = (
         f"{counted.successes} of {counted.trials} trials, {percent(counted.share)}" if counted.trials else "no trial"
     )
-    lines = (
+    lines: list[tuple[str, object]] = [
         ("Required", asked), ("Result", f"{skill}: {share}; {_interval(results, counted)}"),
         ("Verdict", join([tag("strong", found.word), f": {found.why}"])),
-    )  # fmt: skip
+    ]  # fmt: skip
     if not complete(chapter, results) and chapter.planned:
-        lines = (*lines, ("Progress", f"{len(results.rows)} of {chapter.planned} runs are counted"))
-    facts = tag("dl", *(join([tag("dt", label), tag("dd", text)]) for label, text in lines))
+        lines.append(("Progress", f"{len(results.rows)} of {chapter.planned} runs are counted"))
+    listed = tag("dl", *(join([tag("dt", label), tag("dd", text)]) for label, text in lines))
     return tag(
-        "section", tag("p", found.word, class_="verdict-word", aria_hidden="true"), facts,
+        "section", tag("p", found.word, class_="verdict-word", aria_hidden="true"), listed,
         class_=f"verdict {found.word}", aria_label="Verdict",
     )  # fmt: skip
 

@@ -75,12 +75,17 @@ def _teachers(chapter: Chapter, skill: str) -> list[Mapping[str, Any] | None] | 
     if document is not None:
         given = document.get("learned_from")
         sources = given if isinstance(given, list) else []
-        return [chapter.taught.get(str(s.get("sha256"))) if isinstance(s, Mapping) else None for s in sources]
+        return [_told(chapter, source) if isinstance(source, Mapping) else None for source in sources]
     kind, colon, files = skill.partition(":")
     if not colon or not kind:
         return None
     names = [name.rsplit("/", 1)[-1] for name in files.split(",") if "=" not in name]
     return [chapter.taught.get(name) for name in names]
+
+
+def _told(chapter: Chapter, source: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """What the skill file says of a demonstration's teacher, or the demonstration, if the folder keeps it."""
+    return source if "simulated" in source else chapter.taught.get(str(source.get("sha256")))
 
 
 def _count(n: int) -> str:

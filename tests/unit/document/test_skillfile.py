@@ -1,5 +1,6 @@
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -87,6 +88,15 @@ def test_it_says_who_made_it_and_from_what(tmp_path: Path) -> None:
     assert [s["file"] for s in made["learned_from"]] == ["(in memory)"] * 2
     assert made["learned_from"][0] == made["learned_from"][1]
     assert len(made["learned_from"][0]["sha256"]) == 64
+
+
+def test_it_says_whether_a_simulated_person_taught() -> None:
+    demonstration = example_demonstrations()[0]
+    plain = {key: value for key, value in demonstration.meta.items() if key not in ("simulated", "teacher")}
+    taught = replace(demonstration, meta={**plain, "simulated": {"kind": "kinesthetic"}, "teacher": "kinesthetic"})
+    first, second = skillfile.new_document(TYPE, body(), [taught, replace(demonstration, meta=plain)])["learned_from"]
+    assert (first["simulated"], first["teacher"]) == (True, "kinesthetic")
+    assert second["simulated"] is False and "teacher" not in second
 
 
 def test_a_failed_save_leaves_the_old_file(tmp_path: Path) -> None:

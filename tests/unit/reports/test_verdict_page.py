@@ -122,6 +122,13 @@ def test_a_simulated_teacher_is_told_from_a_recording_and_from_nobody_knows(fold
     assert "not known" in said
 
 
+def test_a_skill_file_that_says_who_taught_needs_no_recording_beside_it(folder):
+    document = json.loads((folder / "skills" / PEG).read_text())
+    document["learned_from"] = [{"file": "x", "sha256": "0", "simulated": True, "teacher": "blind"}] * 2
+    (folder / "skills" / PEG).write_text(json.dumps(document))
+    assert taught_by(read_chapters([folder])[0], PEG) == ("2 demonstrations by a simulated person (blind)", True)
+
+
 def test_an_interface_is_an_ideal_torque_source_unless_the_robot_says_otherwise():
     assert interface_words({"control": {"rate_hz": 1000}}).startswith("ideal torque source")
     assert interface_words({"control": {"interface": "torque"}}).startswith("ideal torque source")
