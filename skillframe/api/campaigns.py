@@ -106,7 +106,7 @@ class CampaignResults:
         return {name: np.array([row.get(name, "") for row in mine]) for name in columns(self.spec)}
 
     def run_of(self, trial: int, skill: str | None = None) -> SingleRun:
-        """A trial that left a trace: of each skill the first two and the first failures.
+        """A trial that left a trace: of each skill the first two, the typical success and the first failures.
 
         Raises:
             InputError: it left none. UnknownName: no such skill.

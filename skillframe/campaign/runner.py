@@ -2,8 +2,9 @@
 
 Rows are stored the moment a chunk ends; a kill loses the chunks in flight and nothing else. However it ends - done,
 early, interrupted, stopped by trouble of the environment (`trouble`) - results.csv and summary.json are written from
-the rows that are there. Last, the first trials and the first failures of each skill run once more to leave their
-traces; because a trial's row does not depend on what runs beside it, that costs a few trials instead of traces of all.
+the rows that are there. Last, the first trials, the typical success and the first failures of each skill run once more
+to leave their traces; because a trial's row does not depend on what runs beside it, that costs a few trials instead of
+traces of all.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.stopping import StopRule
 from skillframe.campaign.store import RESULTS, RowLog, ordered, write_results
 from skillframe.campaign.summary import summarize, write_summary
+from skillframe.campaign.typical import nearest_to_median
 from skillframe.files import write_whole
 from skillframe.robot.spec import load_robot
 from skillframe.robot.surroundings import collisions_note
@@ -73,7 +75,8 @@ class Options:
         chunk: largest number of trials per job.
         time_limit_s: wall time that a job may take without simulated time going on; a slow one may take for ever.
         memory_bytes: limit per local worker; None shares the machine's.
-        traces: how many trials per skill leave a trace: the first `SAMPLE`, then the first failures.
+        traces: how many trials per skill leave a trace: the first `SAMPLE`, the success whose duration is nearest to
+            the median of all successes, then the first failures.
     """
 
     workers: int | None = None
@@ -229,6 +232,9 @@ class _Session:
         for skill, label in enumerate(self.spec.labels):
             ran = [row for row in self._rows() if row["skill"] == label and row["duration_s"] == row["duration_s"]]
             picked = [row["trial"] for row in ran[: min(SAMPLE, self.options.traces)]]
+            typical = nearest_to_median({row["trial"]: row["duration_s"] for row in ran if row["success"]})
+            if typical is not None and typical not in picked and len(picked) < self.options.traces:
+                picked.append(typical)
             failed = [row["trial"] for row in ran if not row["success"] and row["trial"] not in picked]
             picked += failed[: self.options.traces - len(picked)]
             missing = tuple(t for t in picked if not trace_path(self.spec.folder, t, label).exists())

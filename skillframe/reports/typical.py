@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
 
+from skillframe.campaign.typical import nearest_to_median
 from skillframe.execution.trace import Trace
 from skillframe.reports.markup import number
 from skillframe.reports.results import ResultRow, Results
@@ -21,11 +22,8 @@ Found = tuple[Path, Trace]
 
 def typical(rows: Sequence[ResultRow], column: str) -> ResultRow | None:
     """The row whose value is nearest to the column's median; None without a known value."""
-    known = [row for row in rows if math.isfinite(row.values.get(column, math.nan))]
-    if not known:
-        return None
-    middle = median(row.values[column] for row in known)
-    return min(known, key=lambda row: (abs(row.values[column] - middle), row.trial))
+    trial = nearest_to_median({row.trial: row.values.get(column, math.nan) for row in rows})
+    return next((row for row in rows if row.trial == trial), None)
 
 
 def typical_duration(results: Results | None, skill: str) -> float:

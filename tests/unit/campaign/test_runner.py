@@ -101,12 +101,16 @@ def test_the_summary_counts_what_the_table_holds(out):
     assert set(summary["hashes"]) == {"campaign", "files", "results.csv"}
 
 
-def test_traces_are_kept_of_the_first_trials_and_of_the_first_failures(out):
+def test_traces_are_kept_of_the_first_trials_the_typical_success_and_the_first_failures(out):
     run(out, traces=5)
     rows = [line.split(",") for line in table(out).decode().splitlines()[1:]]
     failed = [int(row[0]) for row in rows if row[1] == "a.skill.json" and row[6] == "0" and int(row[0]) > 1]
     names = sorted(path.name for path in (out / "traces").glob("*a.skill.json.npz"))
-    assert names == [f"{trial:05d}_a.skill.json.npz" for trial in sorted([0, 1, *failed[:3]])]
+    won = {int(row[0]): float(row[8]) for row in rows if row[1] == "a.skill.json" and row[6] == "1"}
+    middle = np.median(list(won.values()))
+    typical = min(won, key=lambda trial: abs(won[trial] - middle))
+    assert typical > 1
+    assert names == [f"{trial:05d}_a.skill.json.npz" for trial in sorted([0, 1, typical, *failed[:2]])]
 
 
 def test_the_bar_is_asked_of_the_skill_it_names(campaign, tmp_path):
