@@ -14,6 +14,7 @@ import numpy as np
 from skillframe.api.inputs import File
 from skillframe.api.learning import LearnedSkill, Skills, skill_of
 from skillframe.api.tasks import Robot, Settings, World, robot_of, scene_of
+from skillframe.config.of_runs import DURATION, TRACE_RATE
 from skillframe.demonstration.record import resolve_point
 from skillframe.errors import InputError, SkillframeError
 from skillframe.execution.arms import ArmsResult
@@ -28,7 +29,7 @@ from skillframe.robot.resistance import resistance_note
 from skillframe.skill import Skill
 from skillframe.world.scene import Scene
 
-LONGEST_S, RATE_HZ = 20.0, 100.0
+LONGEST_S, RATE_HZ = DURATION.default, TRACE_RATE.default
 """Longest run [s] and rate of the trace [Hz] where nothing else is said; our choice."""
 PICTURE = (960, 720)
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from math import isnan
 from typing import Any
 
 from skillframe.config.fields import settings_of
+from skillframe.config.of_runs import OF_RUNS
 from skillframe.config.units import doubt
 from skillframe.extend.records import WorldType
 from skillframe.extend.registry import registry
@@ -13,9 +15,23 @@ from skillframe.world.quantities import VARIED
 
 
 def of_trials() -> Iterator[dict[str, Any]]:
-    """Rows of what can differ between trials: `name`, `world` (None), `unit`, `default`, `about`."""
+    """Rows of what can differ between trials: `name`, `world` (None), `unit`, `default`, `about`, `range`, `why`."""
     for each in VARIED:
-        yield {"name": each.name, "world": None, "unit": each.unit, "default": each.nominal, "about": each.about}
+        limits = each.range
+        yield {
+            "name": each.name, "world": None, "unit": each.unit, "default": each.nominal, "about": each.about,
+            "range": None if limits is None else limits[:2], "why": "" if limits is None else limits.why,
+        }  # fmt: skip
+
+
+def of_runs() -> Iterator[dict[str, Any]]:
+    """Rows of what holds for a whole run or campaign, with its `option` of `skillframe run`."""
+    for each in OF_RUNS:
+        default = None if isnan(each.default) else each.default
+        yield {
+            "name": each.name, "world": None, "unit": each.unit, "default": default,
+            "about": each.about, "range": each.range[:2], "why": each.range.why, "option": each.option,
+        }  # fmt: skip
 
 
 def of_world(record: WorldType) -> Iterator[dict[str, Any]]:

@@ -118,10 +118,10 @@ def _declared_values(spec: CampaignSpec) -> Iterator[tuple[str, Value]]:
 
 def _check_quantity(robot: RobotModel, name: str, value: Value) -> None:
     """Refuse a value that no trial of this robot could run with."""
-    if name in QUANTITIES:
-        check_quantities({name: np.array([value], dtype=float)}, robot)
     if name in ("robot.payload", "robot.nominal_payload"):
         with_payload(robot.spec, float(value))
+    if name in QUANTITIES:
+        check_quantities({name: np.array([value], dtype=float)}, robot)
 
 
 def _scene(spec: CampaignSpec, varied: Mapping[str, Value]) -> Scene:

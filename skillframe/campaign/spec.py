@@ -8,7 +8,6 @@ with grid or values axes cannot stop early (`validity`). `[set]` fixes quantitie
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -18,10 +17,12 @@ from skillframe.campaign.axes import Axis, Value, cells_of, parse_axis
 from skillframe.campaign.quantities import GROUPS, check_axis, check_name, check_value, in_si
 from skillframe.campaign.validity import Plan, plan_of
 from skillframe.config import build, read_toml
+from skillframe.config.of_runs import DURATION
+from skillframe.config.ranges import require_within
 from skillframe.document.source import SkillSource, parse_source
 from skillframe.errors import InputError
 
-DURATION_S = 20.0
+DURATION_S = DURATION.default
 MOST_TRIALS = 10_000_000  # more are a typing mistake, and would fill the memory before the first one runs
 """Simulated time after which a trial has failed; our choice, several times what an insertion takes."""
 
@@ -52,7 +53,11 @@ class Expect:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _File:
-    """The keys of a campaign file, in the types TOML has."""
+    """The keys of a campaign file, in the types TOML has.
+
+    Attributes:
+        duration_s: simulated time after which a trial has failed [s].
+    """
 
     seed: int
     trials: int
@@ -220,13 +225,13 @@ def _check_numbers(file: _File, path: Path) -> None:
     checks = [
         ("seed", file.seed, file.seed >= 0, "give zero or more"),
         ("trials", file.trials, 1 <= file.trials <= MOST_TRIALS, f"give 1 to {MOST_TRIALS}"),
-        ("duration_s", file.duration_s, 0.0 < file.duration_s < math.inf, "give seconds above zero"),
         ("stop.interval_width", width, width is None or 0.0 < width < 1.0, "give a number between 0 and 1"),
         ("expect.rate", rate, rate is None or 0.0 <= rate <= 1.0, "give a number from 0 to 1"),
     ]
     for key, value, good, fix in checks:
         if not good:
             raise InputError(f"{path}: {key}", f"is {value}", fix)
+    require_within(file.duration_s, file.duration_s, DURATION.unit, DURATION.range, f"{path}: duration_s")
 
 
 def _check_skills(file: _File, path: Path) -> None:

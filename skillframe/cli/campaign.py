@@ -10,8 +10,9 @@ import click
 
 from skillframe.cli.endings import TRACE
 from skillframe.cli.interrupts import terminable
-from skillframe.cli.numbers import COUNT, NATURAL, POSITIVE
+from skillframe.cli.numbers import COUNT, NATURAL, WithUnit
 from skillframe.cli.output import note, quiet_option
+from skillframe.config.ranges import Range
 
 if TYPE_CHECKING:
     from skillframe.campaign.runner import Options
@@ -38,7 +39,8 @@ def _running(function: Callable[..., int]) -> Callable[..., int]:
         click.option("--scheduler", metavar="ADDRESS", help="A running Dask scheduler, e.g. tcp://10.0.0.5:8786."),
         click.option("--chunk", type=COUNT, help="Largest number of trials per job [64]."),
         click.option(
-            "--time-limit", "time_limit_s", type=POSITIVE, metavar="SECONDS",
+            "--time-limit", "time_limit_s", metavar="SECONDS",
+            type=WithUnit("s", Range(0.0, 1e9, "thirty years"), above=True),
             help="Wall time without progress after which a worker is taken for hung [120]; a slow one is not.",
         ),
         click.option("--traces", type=NATURAL, help="Trials per skill that leave a trace [8]."),

@@ -9,10 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from skillframe.cli.numbers import NUMBER, POSITIVE
+from skillframe.cli.numbers import WithUnit
+from skillframe.config.ranges import Range
 
 if TYPE_CHECKING:
     from skillframe.fmu.library import BuiltFmu
+
+_TIME = Range(-1e9, 1e9, "thirty years to either side")
 
 
 @click.group(name="fmu")
@@ -138,12 +141,18 @@ def _print_check(path: Path, found: dict[str, Any]) -> None:
 
 @command.command("simulate")
 @click.argument("file")
-@click.option("--stop", required=True, type=NUMBER, help="End time [s].")
-@click.option("--step", required=True, type=NUMBER, help="Communication step [s].")
+@click.option("--stop", required=True, type=WithUnit("s", _TIME), help="End time [s].")
+@click.option("--step", required=True, type=WithUnit("s", _TIME), help="Communication step [s].")
 @click.option("--input", "table", type=click.Path(path_type=Path), help="CSV: time, then inputs by name; rows hold.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="CSV: time, then every output by name.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter or start value of an input.")
-@click.option("--timeout", default=30.0, type=POSITIVE, show_default=True, help="Wall time without a sign of life [s].")
+@click.option(
+    "--timeout",
+    default=30.0,
+    type=WithUnit("s", Range(0.0, 1e9, "thirty years"), above=True),
+    show_default=True,
+    help="Wall time without a sign of life [s].",
+)
 def simulate(
     file: str, stop: float, step: float, table: Path | None, out: Path, settings: tuple[str, ...], timeout: float
 ) -> int:

@@ -12,6 +12,9 @@ from typing import Any
 import click
 
 from skillframe.config import LARGEST
+from skillframe.config.ranges import Range, require_within
+from skillframe.config.units import UNITS, parse, si
+from skillframe.errors import InputError
 from skillframe.files.documents import LARGEST_WHOLE
 
 
@@ -23,6 +26,46 @@ class _Finite(click.FloatRange):
         if not math.isfinite(number) or abs(number) > LARGEST:
             self.fail(f"{str(value)[:40]} is not a finite number of usual size.", param, ctx)
         return number
+
+
+class WithUnit(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.2 on
+    """A number with a range, bare or with a word for its unit: 20, 20ms. What comes out is in `word`.
+
+    Args:
+        word: in which a bare number is, such as "s" or "deg"; "" for a plain number.
+        limits: in SI.
+        above: the lower end itself is refused.
+    """
+
+    name = "quantity"
+
+    def __init__(self, word: str, limits: Range, above: bool = False) -> None:
+        self.unit, self.factor = UNITS[word] if word else ("", 1.0)
+        self.limits, self.above = limits, above
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """As typed, in the option's own unit."""
+        try:
+            number = self._bare(value)
+            typed = value if isinstance(value, str) and parse(value) else number
+            require_within(typed, number * self.factor, self.unit, self.limits, "")
+        except InputError as error:
+            self.fail(f"{error.problem}; {error.fix}.", param, ctx)
+        if self.above and number * self.factor <= self.limits.least:
+            self.fail(f"{number:g} is not above {self.limits.least:g}.", param, ctx)
+        return number
+
+    def _bare(self, value: Any) -> float:
+        """In the option's own unit."""
+        given = si(value, self.unit, "")
+        if given is not value:
+            return float(given) / self.factor
+        try:
+            return float(value)
+        except ValueError:
+            words = ", ".join(word for word, (unit, _) in UNITS.items() if unit == self.unit)
+            also = f", bare or with one of {words}" if words else ""
+            raise InputError("", f"{str(value)[:40]!r} is no number", f"give one{also}") from None
 
 
 class _Whole(click.IntRange):

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from skillframe.cli.names import robot_option, world_option
-from skillframe.cli.numbers import COUNT, NOT_NEGATIVE, NUMBER, POSITIVE, SEED
+from skillframe.cli.numbers import COUNT, NOT_NEGATIVE, POSITIVE, SEED, WithUnit
 from skillframe.cli.output import note, progress, quiet_option, warned
+from skillframe.config import LARGEST
+from skillframe.config.ranges import Range
 
 if TYPE_CHECKING:
     from skillframe.api.recording import Person
@@ -18,6 +21,11 @@ if TYPE_CHECKING:
     from skillframe.teaching.teleoperation import OperatorSettings
     from skillframe.world.scene import Scene
 
+_AIM = Range(0.0, pi / 2.0, "as a person who is further off aims at nothing")
+_TURN = Range(-pi, pi, "half a turn to either side")
+_DELAY = Range(0.0, LARGEST)  # its own range is `signals.delay.LONGEST_DELAY`
+_STIFF = Range(0.0, 1e8, "stiffer than steel structures of this size")
+_RATE = Range(0.01, 1e5, "as no controller here is faster")
 QUIET_S = 5.0  # a recording that is over by then needs no progress
 
 
@@ -31,9 +39,15 @@ QUIET_S = 5.0  # a recording that is over by then needs no progress
 @click.option("--count", default=1, show_default=True, type=COUNT, help="Number of demonstrations.")
 @click.option("--seed", default=0, show_default=True, type=SEED, help="Everything random follows from it.")
 @click.option(
-    "--noise", type=NOT_NEGATIVE, help="Standard deviation of the person's aim [degrees]; default 8, machines 6."
+    "--noise",
+    type=WithUnit("deg", _AIM),
+    help="Standard deviation of the person's aim [degrees]; default 8, machines 6.",
 )
-@click.option("--delay", type=NOT_NEGATIVE, help="One-way delay [s]; default 0, teleoperation 0.1, of machines 0.05.")
+@click.option(
+    "--delay",
+    type=WithUnit("s", _DELAY),
+    help="One-way delay [s]; default 0, teleoperation 0.1, of machines 0.05.",
+)
 @click.option(
     "--scale", type=POSITIVE, help="Motion scale of teleoperation; default 1, teleoperation 2, of machines 4."
 )
@@ -41,18 +55,28 @@ QUIET_S = 5.0  # a recording that is over by then needs no progress
     "--force-scale", type=POSITIVE, help="Machines: force of the machine over force at the hand; default 1000."
 )
 @click.option(
-    "--hand-stiffness", type=POSITIVE, help="Machines: how stiffly the hand holds the master [N/m]; default 1200."
+    "--hand-stiffness",
+    type=WithUnit("N/m", _STIFF, above=True),
+    help="Machines: how stiffly the hand holds the master [N/m]; default 1200.",
 )
-@click.option("--stiffness", type=NOT_NEGATIVE, help="Machines: stiffness while they are taught [N/m]; default 1e5.")
+@click.option(
+    "--stiffness", type=WithUnit("N/m", _STIFF), help="Machines: stiffness while they are taught [N/m]; default 1e5."
+)
 @click.option("--damping", type=NOT_NEGATIVE, help="Machines: damping while they are taught [N s/m]; default 1e5.")
 @click.option(
     "--feed-velocity", is_flag=True, help="Machines: feed the master's velocity as well (mind the loop gain)."
 )
-@click.option("--packet-rate", type=POSITIVE, help="Machines: packets a second, held between them; default 100.")
-@click.option("--angle", type=NUMBER, help="Machines: push at this angle in their plane, -90 straight down [degrees].")
+@click.option(
+    "--packet-rate", type=WithUnit("Hz", _RATE), help="Machines: packets a second, held between them; default 100."
+)
+@click.option(
+    "--angle",
+    type=WithUnit("deg", _TURN),
+    help="Machines: push at this angle in their plane, -90 straight down [degrees].",
+)
 @click.option("--belief", metavar="X,Y,TURN", help="Blind: deviation of goal minus start [mm, mm, degrees].")
 @click.option("--centre", metavar="X,Y,TURN", help="Blind: mean of goal minus start [mm, mm, degrees]; default 0,0,0.")
-@click.option("--rate", type=POSITIVE, help="Sample rate [Hz]; default 500, machines 100.")
+@click.option("--rate", type=WithUnit("Hz", _RATE), help="Sample rate [Hz]; default 500, machines 100.")
 @click.option(
     "--set",
     "settings",

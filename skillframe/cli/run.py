@@ -12,10 +12,10 @@ import click
 from skillframe.cli import names
 from skillframe.cli.endings import PAGE, TRACE
 from skillframe.cli.names import robot_option, world_option
-from skillframe.cli.numbers import POSITIVE, SEED
+from skillframe.cli.numbers import SEED, WithUnit
 from skillframe.cli.output import note, quiet_option
+from skillframe.config.of_runs import DURATION, TRACE_RATE
 
-LONGEST_S, RATE_HZ = 20.0, 100.0
 FORCES = ("peak_force_filtered_n", "peak_force_10ms_n", "ended_by", "goal_reached", "ended_itself")
 QUIET_S = 5.0  # a run that is over by then needs no progress
 
@@ -37,9 +37,19 @@ QUIET_S = 5.0  # a run that is over by then needs no progress
 @click.option("--video", type=click.Path(path_type=Path), help="Film of the run (.mp4).")
 @click.option("--seed", default=0, show_default=True, type=SEED, help="Seed of the sensor noise.")
 @click.option(
-    "--duration", default=LONGEST_S, show_default=True, type=POSITIVE, help="Longest run in simulated seconds."
+    "--duration",
+    default=DURATION.default,
+    show_default=True,
+    type=WithUnit("s", DURATION.range),
+    help="Longest run in simulated seconds.",
 )
-@click.option("--rate", default=RATE_HZ, show_default=True, type=POSITIVE, help="Rate of the trace [Hz].")
+@click.option(
+    "--rate",
+    default=TRACE_RATE.default,
+    show_default=True,
+    type=WithUnit("Hz", TRACE_RATE.range),
+    help="Rate of the trace [Hz].",
+)
 @click.option(
     "--score",
     "scores",

@@ -8,21 +8,42 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
+from skillframe.config.ranges import Range, range_of, require_within
 from skillframe.config.units import unit_of
 
 ENTRY = re.compile(r"    (\w[\w, ]*): (.*)")
 
 
 def settings_of(kind: type) -> Iterator[dict[str, Any]]:
-    """Fields of a dataclass: `name`, `default` (None if there is none), `about`, and `unit` (SI, "" if none)."""
+    """Fields of a dataclass: `name`, `default` (None if there is none), `about`, `unit` (SI, "" if none), `range`.
+
+    The range is (least, most) in SI, or None where the text about the field states none.
+    """
     said = texts(kind)
     for field in dataclasses.fields(kind):
         factory = field.default_factory
         default = factory() if factory is not dataclasses.MISSING else field.default
         required, about = default is dataclasses.MISSING, said.get(field.name, "")
+        limits = range_of(about)
         yield {
             "name": field.name, "default": None if required else default, "about": about, "unit": unit_of(about),
+            "range": None if limits is None else limits[:2],
         }  # fmt: skip
+
+
+def require_ranges(given: Any, where: str) -> None:
+    """Refuse a dataclass with a number beyond the range that the text about its field states.
+
+    Args:
+        given: the dataclass; None has nothing to refuse.
+        where: for messages.
+
+    Raises:
+        InputError: names the first such field.
+    """
+    for row in settings_of(type(given)) if given is not None else ():
+        value, limits = getattr(given, row["name"]), row["range"]
+        require_within(value, value, row["unit"], limits and Range(*limits), f"{where}.{row['name']}")
 
 
 def texts(kind: type) -> dict[str, str]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from skillframe.config.fields import texts
+from skillframe.config.ranges import range_of, require_within
 from skillframe.config.units import parse, si, unit_of
 from skillframe.errors import InputError, UnknownName
 from skillframe.files.documents import NotToml, parse_toml, read_text, shown, storable
@@ -47,21 +48,49 @@ def build(cls: type[T], values: Mapping[str, Any], where: str) -> T:
     for key in values:
         if key not in fields:
             raise InputError(where, str(UnknownName("key", str(key), fields)))
+    said = texts(cls)
     ready = {
-        key: coerce(_in_si(cls, key, value, hints[key], f"{where}.{key}"), hints[key], f"{where}.{key}")
-        for key, value in values.items()
-    }
+        key: _value(value, hints[key], said.get(key, ""), f"{where}.{key}") for key, value in values.items()
+    }  # fmt: skip
     missing = [n for n, f in fields.items() if n not in ready and _required(f)]
     if missing:
         raise InputError(where, f"missing {', '.join(missing)}", "add it")
     return cls(**ready)
 
 
-def _in_si(cls: type, key: str, value: Any, hint: Any, where: str) -> Any:
-    """A text such as "8mm" as a number, where the field is one. Its docstring says in which unit."""
-    if not isinstance(value, str) or parse(value) is None or str in (hint, *typing.get_args(hint)):
+def _value(value: Any, hint: Any, about: str, where: str) -> Any:
+    """A value of the annotated type, in SI, within the range that the text about its field states."""
+    ready = coerce(in_si(value, hint, unit_of(about), where), hint, where)
+    require_within(value, ready, unit_of(about), range_of(about), where)
+    return ready
+
+
+def in_si(value: Any, hint: Any, unit: str, where: str) -> Any:
+    """Texts with a unit ("8mm") as SI numbers where the type asks for numbers, also in lists and tables.
+
+    Raises:
+        InputError: a unit of another dimension.
+    """
+    if isinstance(value, Mapping) and typing.get_origin(hint) is dict:
+        return {key: in_si(inner, typing.get_args(hint)[1], unit, f"{where}.{key}") for key, inner in value.items()}
+    if isinstance(value, list | tuple) and not isinstance(hint, type):
+        return [in_si(inner, _inner(hint, i), unit, f"{where}[{i}]") for i, inner in enumerate(value)]
+    if not isinstance(value, str) or parse(value) is None or not _numeric(hint):
         return value
-    return si(value, unit_of(texts(cls).get(key, "")), where)
+    return si(value, unit, where)
+
+
+def _inner(hint: Any, index: int) -> Any:
+    """The type of an element of a list or tuple; of a union, that of its list or tuple."""
+    options = [h for h in (hint, *typing.get_args(hint)) if typing.get_origin(h) in (list, tuple)]
+    args = typing.get_args(options[0]) if options else ()
+    return args[min(index, len(args) - 1)] if args and args[-1] is not Ellipsis else args[0] if args else Any
+
+
+def _numeric(hint: Any) -> bool:
+    """Whether a number is asked for, and no text."""
+    kinds = (hint, *typing.get_args(hint))
+    return str not in kinds and (float in kinds or int in kinds)
 
 
 def _required(field: dataclasses.Field[Any]) -> bool:

@@ -28,7 +28,8 @@ _FACTORS: dict[str, dict[str, float]] = {
 UNITS = {word: (unit, factor) for unit, words in _FACTORS.items() for word, factor in words.items()}
 """SI unit and factor of every word."""
 TYPED = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z/]+)\s*")
-_SAID = re.compile(r"\[([^\]]+)\]")
+SAID = re.compile(r"\[([^\]]+)\]")
+"""What stands in brackets in a text about a quantity: its unit, and its range (`skillframe.config.ranges`)."""
 
 
 class Quantity(NamedTuple):
@@ -49,8 +50,9 @@ def parse(text: str) -> Quantity | None:
 
 def unit_of(text: str) -> str:
     """The SI unit that a text about a quantity states, "of the peg [m]", or "" if it states none that is known."""
-    for said in _SAID.findall(text):
-        unit = {"Nm": "N m"}.get(said, str(said))
+    for said in SAID.findall(text):
+        word = str(said).partition(",")[0]
+        unit = {"Nm": "N m"}.get(word, word)
         if unit in _FACTORS:
             return unit
     return ""

@@ -14,6 +14,9 @@ from typing import Any
 import numpy as np
 
 from skillframe.config import parse_numbers
+from skillframe.config.of_runs import CENTER
+from skillframe.config.ranges import require_within
+from skillframe.config.units import parse, si
 from skillframe.errors import InputError, UnknownName
 from skillframe.frames import Float, Pose, matrix_from_quaternion
 
@@ -112,13 +115,18 @@ def resolve_point(text: str | None, frames: Mapping[str, Any], where: str = "") 
 
     Raises:
         UnknownName: the text is neither three numbers nor a known name.
+        InputError: a unit of another dimension, or a point further away than tools are long.
     """
     if text is None or (text in POINT_ALIASES and text not in frames):
         return np.zeros(3)
     if text in frames:
         return np.array(frames[text], dtype=float)
-    values = np.array(parse_numbers(text))
-    if values.shape != (3,):
-        note = 'or give "x,y,z" in metres in the tool frame'
+    typed = [part.strip() for part in text.split(",")]
+    values = [si(part, "m", f"{where or 'point'} {text}") for part in typed]
+    numbers = np.array(parse_numbers(",".join(map(str, values))))
+    if numbers.shape != (3,):
+        note = 'or give "x,y,z" in metres in the tool frame, or with units: 0,0,20mm'
         raise UnknownName("point", text, [*frames, "tool"], note=note, where=where)
-    return values
+    for part, number, axis in zip(typed, numbers.tolist(), "xyz", strict=True):
+        require_within(part if parse(part) else number, number, "m", CENTER.range, f"{where or 'point'} {text}: {axis}")
+    return numbers

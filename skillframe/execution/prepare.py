@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from skillframe.config.ranges import require_within
 from skillframe.config.units import si
 from skillframe.cosim.servos import require_servos
 from skillframe.demonstration.record import resolve_point
@@ -31,7 +32,7 @@ from skillframe.robot.model import RobotModel, load_model
 from skillframe.robot.spec import OWN_DRIVES, RobotSpec, load_robot
 from skillframe.skill import Skill
 from skillframe.world.placement import start_poses
-from skillframe.world.quantities import QUANTITIES, UNITS
+from skillframe.world.quantities import QUANTITIES, RANGES, UNITS
 from skillframe.world.scene import Scene
 
 
@@ -44,7 +45,7 @@ def split_settings(world: str | None, settings: Mapping[str, Any]) -> tuple[dict
 
     Raises:
         UnknownName: a key that exists in neither, with the nearest one.
-        InputError: a quantity that is not a number, or has a unit of another dimension.
+        InputError: a quantity that is not a number, has a unit of another dimension, or is beyond its range.
     """
     params_type = None if world is None else registry().world(world).params
     fields = set() if params_type is None else {f"world.{f.name}" for f in dataclasses.fields(params_type)}
@@ -54,13 +55,14 @@ def split_settings(world: str | None, settings: Mapping[str, Any]) -> tuple[dict
         if key in fields:
             params[key.removeprefix("world.")] = value
         elif key in QUANTITIES:
-            value = si(value, UNITS[key], f"--set {key}")
+            typed, value = value, si(value, UNITS[key], f"--set {key}")
             if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
                 raise InputError(
                     f"--set {key}",
                     f"expected a finite number, got {value!r}",
                     "give it in SI units, or with a unit: 8mm, 5deg",
                 )
+            require_within(typed, value, UNITS[key], RANGES[key], f"--set {key}")
             draws[key] = float(value)
         else:
             known = {*fields, *QUANTITIES}

@@ -32,7 +32,13 @@ class DeclaredDrive:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeclaredPayload:
-    """What a machine carries: `mass` [kg] of load in the inertia of a link, and `rating`, the most it may be [kg]."""
+    """What a machine carries.
+
+    Attributes:
+        link: whose inertia has the load in it.
+        mass: of the load [kg, 0 to 1000t].
+        rating: the most that it may be [kg, 0 to 1000t]; the largest cranes lift that much.
+    """
 
     link: str
     mass: float
@@ -78,7 +84,8 @@ class MachineNoise:
 
     Attributes:
         encoder: of each minimal coordinate [rad or m], a step over the square root of 12 if steps are all its noise.
-        pressure: of each chamber [Pa]; corner_hz: of the filters [Hz].
+        pressure: of each chamber [Pa].
+        corner_hz: of the filters [Hz].
     """
 
     encoder: float = 1e-4

@@ -45,13 +45,14 @@ class Control:
     """[control] of robot.toml. What is None takes the default, and is for velocities and positions only.
 
     Attributes:
-        rate_hz: of the impedance loop, or of the commands that the arm takes [Hz].
+        rate_hz: of the impedance loop, or of the commands that the arm takes [Hz, 1 to 100kHz]; none here is faster.
         interface: what the arm takes.
         delay_s: from a command to the first motion, the sensor's own included [s].
         bandwidth_hz: of the arm's inner loop [Hz].
         contact_stiffness: of part, tool, sensor and arm in series [N/m].
         contact_turning_stiffness: the same about the centre of compliance [Nm/rad].
-        push_n, push_nm: largest push that the law adds to the contact [N, Nm].
+        push_n: largest force that the law adds to the contact [N].
+        push_nm: largest torque that the law adds to the contact [N m].
     """
 
     rate_hz: float = TICK_HZ

@@ -23,6 +23,7 @@ from skillframe.robot.driven import (
     MachineNoise,
     impossible,
 )
+from skillframe.robot.home import home_in_si
 from skillframe.robot.interface import Control, check_control
 from skillframe.robot.joint_settings import Dynamics, impossible_joints
 from skillframe.robot.numbers import LARGEST
@@ -46,9 +47,11 @@ class Limits:
     """Limits that stop a run. None switches one off.
 
     Attributes:
-        force_n: contact force at the tool [N]; torque_n_m: contact torque at the tool [N m].
+        force_n: contact force at the tool [N].
+        torque_n_m: contact torque at the tool [N m].
         torque_rate_nm_s: change of a joint's commanded torque [N m/s].
-        workspace_m: box the tool point stays in, (lower, upper) corners in base [m].
+        workspace_m: box the tool point stays in, (lower, upper) corners in base [m, -1000m to 1000m], in which the
+            largest machines fit.
         energy_j: energy the controller may put into the robot [J].
     """
 
@@ -61,9 +64,11 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Workspace:
-    """Where work is done: `fixture` is the place in base [m] where a world's fixture stands.
+    """Where work is done.
 
-    `attitude` (x, y, z, w) turns it from upright, for a fixture that a second arm holds sideways.
+    Attributes:
+        fixture: the place in base where a world's fixture stands [m, -100m to 100m]; no machine reaches further.
+        attitude: (x, y, z, w), turns it from upright, for a fixture that a second arm holds sideways.
     """
 
     fixture: Vector = (0.0, 0.0, 0.0)
@@ -75,7 +80,9 @@ class LinkInertia:
     """Inertia of a link that replaces the URDF's, in link axes.
 
     Attributes:
-        mass: [kg]; com: centre of mass [m]; inertia: xx, yy, zz, xy, xz, yz about the centre of mass [kg m^2].
+        mass: of the link [kg].
+        com: centre of mass [m].
+        inertia: xx, yy, zz, xy, xz, yz about the centre of mass [kg m^2].
         guessed: the mass is a guess, as `robots check` prints it; what fails with it says so.
     """
 
@@ -253,7 +260,7 @@ def _from_urdf(path: Path) -> RobotSpec:
 
 
 def _from_toml(path: Path) -> RobotSpec:
-    values = read_toml(path)
+    values = home_in_si(read_toml(path), path)
     declared = build(RobotFile, values, str(path))
     folder = path.resolve().parent
     urdf = folder / declared.urdf
@@ -266,8 +273,7 @@ def _from_toml(path: Path) -> RobotSpec:
 
 def _check_values(declared: RobotFile, where: str) -> None:
     """Values that have the right type and are still impossible."""
-    positive = {"control.rate_hz": declared.control.rate_hz}
-    positive |= {
+    positive = {
         f"limits.{k}": getattr(declared.limits, k) for k in ("force_n", "torque_n_m", "torque_rate_nm_s", "energy_j")
     }
     for key, value in positive.items():

@@ -10,22 +10,19 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from skillframe.config.ranges import require_within
 from skillframe.errors import InputError, UnknownName
 from skillframe.frames import Float, Pose, matrix_from_quaternion
 from skillframe.robot.kinematics import inverse_kinematics
 from skillframe.robot.model import RobotModel
-from skillframe.signals.delay import require_delay
 from skillframe.world.convert import held
 from skillframe.world.faults import fault_problem
 from skillframe.world.plant import displacement
-from skillframe.world.quantities import FAULTS, QUANTITIES
+from skillframe.world.quantities import FAULTS, QUANTITIES, RANGES, UNITS
 from skillframe.world.scene import Scene
 
 _FAULTS = frozenset({"fault.time", "fault.cylinder", *(each.name for each in FAULTS)})
 _ACTUATOR = tuple(name for name in QUANTITIES if name.startswith("actuator."))
-NOT_NEGATIVE = frozenset({"sensor.force_noise", "sensor.torque_noise", "robot.joint_friction", "world.friction"})
-LARGEST = dict.fromkeys(("start", "fixture", "grasp", "sensor", "robot", "world"), 1e6)
-"""Of any quantity in SI units, whatever it is; supply pressures alone are larger."""
 
 
 def check_quantities(draws: Mapping[str, Float], robot: RobotModel | None = None) -> None:
@@ -37,26 +34,17 @@ def check_quantities(draws: Mapping[str, Float], robot: RobotModel | None = None
 
     Raises:
         UnknownName: with the nearest name.
-        InputError: a negative friction or noise, no mass, a delay that no valve has, or a value beyond all machines.
+        InputError: a value beyond the quantity's range, or a quantity that the robot lacks.
     """
     for key, values in draws.items():
         if key not in QUANTITIES:
             raise UnknownName("quantity", key, QUANTITIES)
         if robot is not None and (lacking := _lacking(key, robot)):
             raise InputError(key, f"{robot.spec.name} {lacking}", "leave it out")
-        least, largest = float(np.min(values)), float(np.max(np.abs(values)))
-        if not largest <= LARGEST.get(key.partition(".")[0], np.inf):
-            raise InputError(key, f"cannot be {largest:g}", "give it in SI units, angles in radians")
-        if ".tilt_" in key and largest > np.pi:
-            raise InputError(key, f"cannot be {largest:g} rad", "give an angle in radians, not in degrees")
-        if key == "actuator.delay":
-            require_delay(least if least < 0.0 else largest, key)
+        for value in (float(np.min(values)), float(np.max(values))):
+            require_within(value, value, UNITS[key], RANGES[key], key)
         if key in _FAULTS and (problem := fault_problem(key, np.asarray(values, dtype=float), robot)):
             raise InputError(key, *problem)
-        if least < 0.0 and key in NOT_NEGATIVE:
-            raise InputError(key, f"cannot be negative, is {least:g}", "give 0 or more")
-        if least <= 0.0 and key == "robot.mass_scale":
-            raise InputError(key, f"must be positive, is {least:g}", "give 1 for the nominal masses")
 
 
 def _lacking(key: str, robot: RobotModel) -> str:

@@ -78,7 +78,7 @@ def test_a_supply_pressure_of_one_run_that_cannot_hold_the_start_is_refused_too(
 
 
 def test_a_start_that_the_cylinders_cannot_reach_is_refused(said):
-    refused(said("hiab_xs031", "--set", "start.offset_x=5m"), "reach")
+    refused(said("hiab_xs031", "--set", "start.offset_x=2.9m"), "reach")
 
 
 def test_a_machine_whose_fmu_is_for_another_platform_is_refused_with_what_is_inside(said, fake, tmp_path):

@@ -24,11 +24,18 @@ skills = ["push.skill.json"]
 "start.tilt_y" = { uniform = [-0.2, 0.2] }
 """
 SLIPS = {
-    "degrees": ("[-0.2, 0.2]", "[-45, 45]", "start.tilt_y: cannot be 45 rad; give an angle in radians"),
+    "degrees": (
+        "[-0.2, 0.2]",
+        "[-45, 45]",
+        "start.tilt_y: -45 rad is beyond -90deg to 90deg, as what leans more lies upside down; did you mean -45deg?",
+    ),
     "a quantity of machines": ("start.tilt_y", "actuator.supply_pressure", "free_tool has no actuators of its own"),
     "a payload of none": ("start.tilt_y", "robot.payload", "the robot declares no payload"),
-    "noise below zero": ("start.tilt_y", "sensor.force_noise", "cannot be negative, is -0.2"),
-    "beyond all machines": ("[-0.2, 0.2]", "[0, 1e9]", "start.tilt_y: cannot be 1e+09"),
+    "noise below zero": ("start.tilt_y", "sensor.force_noise", "sensor.force_noise: -0.2 N is beyond 0N to 100N"),
+    "beyond all machines": ("[-0.2, 0.2]", "[0, 1e9]", "start.tilt_y: 1e+09 rad is beyond -90deg to 90deg"),
+    "metres": ("start.tilt_y", 'start.offset_x" = { choice = [5] }\n"start.tilt_y', "did you mean 5mm?"),
+    "a piece of a world": ("[vary]", "[set]\nworld.radius = 5\n[vary]", "radius: 5 m is beyond 0.1mm to 0.2m; did you"),
+    "a far centre": ("seed = 7", 'seed = 7\ncoc = "10,0,0"', "point 10,0,0: x: 10 m is beyond -3m to 3m"),
     "no group": ("start.tilt_y", "tilt", "unknown quantity 'tilt'; did you mean 'start.tilt_z'? (there are: start.*"),
     "twice": ("[vary]", "[vary.start]\ntilt_y = { grid = [0.1, 0.2] }\n[vary]", "vary.start.tilt_y: is written twice"),
     "a skill cut off": ("push.skill", "cut.skill", "cut.skill.json: is cut off at line 1"),
@@ -72,6 +79,6 @@ def test_a_delay_in_milliseconds_is_refused_before_anything_is_made(
         text = text.replace(old, new)
     campaign.write_text(text)
     assert run(["campaign", "run", str(campaign), "--out", str(campaign.parent / "out")]) == 2
-    words = "actuator.delay: cannot be 5 s, a delay lies between 0 and 1 s; give it in seconds: 5 ms is 0.005"
+    words = "actuator.delay: 5 s is beyond 0s to 1s, as buses and valves take milliseconds; did you mean 5ms?"
     assert words in capsys.readouterr().err
     assert not (campaign.parent / "out").exists()

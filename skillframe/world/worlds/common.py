@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.config.fields import require_ranges
 from skillframe.errors import InputError
 from skillframe.frames import Float, norm
 from skillframe.world.scene import Geom, State, Tool, Way
@@ -65,12 +67,18 @@ def anywhere(state: State) -> NDArray[np.bool_]:
     return np.ones(len(state.tip.position), dtype=bool)
 
 
-def require(world: str, checks: dict[str, bool]) -> None:
+def require(world: str, checks: dict[str, bool], params: Any = None) -> None:
     """Refuse parameters that make no sense.
 
+    Args:
+        world: its name, for messages.
+        checks: whether each rule holds, by the rule in words.
+        params: a dataclass whose ranges are checked before that.
+
     Raises:
-        InputError: names the first check that fails.
+        InputError: names the first parameter beyond its range, or the first check that fails.
     """
+    require_ranges(params, f"world {world}")
     for text, fine in checks.items():
         if not fine:
             raise InputError(f"world {world}", f"needs {text}", "change the parameter with --set world.KEY=VALUE")

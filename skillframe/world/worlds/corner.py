@@ -19,12 +19,14 @@ TIP, WALL = 0.12, 0.01
 class CornerParams:
     """Parameters of `corner`.
 
+    Ranges end where parts are too small for a gripper, or too large for an arm (our choice).
+
     Attributes:
-        size: length of the box's edges [m].
-        friction: Coulomb coefficient.
-        away: nominal distance of the box from both walls [m].
-        above: nominal height of the box over the table [m].
-        tolerance: distance from each wall and the table that counts as there [m].
+        size: length of the box's edges [m, 10mm to 100mm].
+        friction: Coulomb coefficient [0 to 5].
+        away: nominal distance of the box from both walls [m, 0.1mm to 100mm].
+        above: nominal height of the box over the table [m, 0.1mm to 100mm].
+        tolerance: distance from each wall and the table that counts as there [m, 1um to 100mm].
     """
 
     size: float = 0.05
@@ -36,14 +38,7 @@ class CornerParams:
 
 def build(params: CornerParams) -> Scene:
     """The walls stand where x and y of the box's lower middle would be zero. The table's top is z = 0."""
-    require(
-        "corner",
-        {
-            "0.01 < size < 0.1 m": 0.01 < params.size < 0.1,
-            "0 < away < 0.1 m and 0 < above < 0.1 m": 0.0 < params.away < 0.1 and 0.0 < params.above < 0.1,
-            "friction >= 0 and tolerance > 0": params.friction >= 0.0 and params.tolerance > 0.0,
-        },
-    )
+    require("corner", {}, params)
     half = 0.5 * params.size
     box = Geom(kind="box", size=(half, half, half), position=(0.0, 0.0, TIP - half), rgba=TOOL_COLOUR)
 

@@ -16,11 +16,13 @@ from skillframe.world.worlds.common import WRIST_TO_TIP, require, tool
 class EdgeParams:
     """Parameters of `edge`.
 
+    Ranges end where parts are too small for a gripper, or too large for an arm (our choice).
+
     Attributes:
-        friction: Coulomb coefficient.
-        radius: of the rod [m].
-        tilt: attitude of the rod at the start, tip up from the horizontal [rad].
-        lever: distance along the rod from the wrist to the point on the edge [m].
+        friction: Coulomb coefficient [0 to 5].
+        radius: of the rod [m, 0.1mm to 200mm].
+        tilt: attitude of the rod at the start, tip up from the horizontal [rad, 0.2 to 1.3].
+        lever: distance along the rod from the wrist to the point on the edge [m, 30mm to 180mm].
     """
 
     friction: float = 0.2
@@ -34,14 +36,7 @@ def build(params: EdgeParams) -> Scene:
 
     The rod is turned down about +y until it lies level on the edge.
     """
-    require(
-        "edge",
-        {
-            "0.2 < tilt < 1.3 rad": 0.2 < params.tilt < 1.3,
-            "0.03 < lever < 0.18 m": 0.03 < params.lever < 0.18,
-            "radius > 0 and friction >= 0": params.radius > 0.0 and params.friction >= 0.0,
-        },
-    )
+    require("edge", {}, params)
     table = Geom(kind="box", size=(0.1, 0.1, 0.02), position=(-0.1, 0.0, -0.02), rgba=FIXTURE_COLOUR)
     rod = Geom(
         kind="capsule", size=(params.radius, 0.5 * WRIST_TO_TIP - 0.5 * params.radius), rgba=TOOL_COLOUR,

@@ -17,7 +17,7 @@ class FreeParams:
     """Parameters of `free`.
 
     Attributes:
-        direction: unit vector along which the simulated teacher moves, fixture frame.
+        direction: unit vector along which the simulated teacher moves, fixture frame [-1 to 1].
     """
 
     direction: tuple[float, float, float] = (0.0, 0.0, -1.0)

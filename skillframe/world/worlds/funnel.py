@@ -16,13 +16,15 @@ from skillframe.world.worlds.common import TOOL_DOWN, WRIST_TO_TIP, require, too
 class FunnelParams:
     """Parameters of `funnel`.
 
+    Ranges end where parts are too small for a gripper, or too large for an arm (our choice).
+
     Attributes:
-        slope: angle of the faces from the horizontal [rad].
-        faces: number of plane faces around the vertical.
-        friction: Coulomb coefficient.
-        radius: of the ball at the tip [m].
-        length: of each face along the slope [m].
-        tolerance: horizontal distance from the middle that counts as there [m].
+        slope: angle of the faces from the horizontal [rad, 0.01 to 1.4].
+        faces: number of plane faces around the vertical [3 to 16].
+        friction: Coulomb coefficient [0 to 5].
+        radius: of the ball at the tip [m, 0.1mm to 200mm].
+        length: of each face along the slope [m, 1mm to 2m].
+        tolerance: horizontal distance from the middle that counts as there [m, 1um to 100mm].
     """
 
     slope: float = 0.7853981633974483
@@ -35,15 +37,7 @@ class FunnelParams:
 
 def build(params: FunnelParams) -> Scene:
     """The funnel with its deepest point at the fixture's origin."""
-    require(
-        "funnel",
-        {
-            "0 < slope < 1.4 rad": 0.0 < params.slope < 1.4,
-            "3 to 16 faces": 3 <= params.faces <= 16,
-            "friction >= 0": params.friction >= 0.0,
-            "radius, length and tolerance > 0": min(params.radius, params.length, params.tolerance) > 0.0,
-        },
-    )
+    require("funnel", {}, params)
     resting = params.radius / np.cos(params.slope)
     width = 2.0 * params.length * np.cos(params.slope) * np.tan(np.pi / params.faces)
     azimuths = 2.0 * np.pi * np.arange(params.faces) / params.faces

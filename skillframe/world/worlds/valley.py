@@ -21,14 +21,16 @@ from skillframe.world.worlds.common import TOOL_DOWN, WRIST_TO_TIP, require, too
 class ValleyParams:
     """Parameters of `valley`.
 
+    Ranges end where parts are too small for a gripper, or too large for an arm (our choice).
+
     Attributes:
-        slope: angle of both sides from the horizontal [rad].
-        friction: Coulomb coefficient.
-        radius: of the ball at the tip [m].
-        length: of each side along the slope [m].
-        tolerance: horizontal distance from the bottom that counts as there [m].
-        along: distance along the valley, towards +y, to a wall that the ball is to be slid to [m]; 0: there is no wall,
-            and the bottom is the goal (seed, Fig. 17: two phases).
+        slope: angle of both sides from the horizontal [rad, 0.01 to 1.4].
+        friction: Coulomb coefficient [0 to 5].
+        radius: of the ball at the tip [m, 0.1mm to 200mm].
+        length: of each side along the slope [m, 1mm to 2m].
+        tolerance: horizontal distance from the bottom that counts as there [m, 1um to 100mm].
+        along: distance along the valley, towards +y, to a wall that the ball is to be slid to [m, 0m to 70mm]; 0: there
+            is no wall, and the bottom is the goal (seed, Fig. 17: two phases).
     """
 
     slope: float = 0.7853981633974483
@@ -41,15 +43,7 @@ class ValleyParams:
 
 def build(params: ValleyParams) -> Scene:
     """The valley with its line along y through the fixture's origin."""
-    require(
-        "valley",
-        {
-            "0 < slope < 1.4 rad": 0.0 < params.slope < 1.4,
-            "friction >= 0": params.friction >= 0.0,
-            "radius, length and tolerance > 0": min(params.radius, params.length, params.tolerance) > 0.0,
-            "0 <= along < 0.07 m": 0.0 <= params.along < 0.07,
-        },
-    )
+    require("valley", {"along < 0.07 m": params.along < 0.07}, params)
     resting = params.radius / np.cos(params.slope)
     ball = Geom(kind="sphere", size=(params.radius,), position=(0.0, 0.0, WRIST_TO_TIP), rgba=TOOL_COLOUR)
 

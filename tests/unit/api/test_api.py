@@ -229,11 +229,11 @@ def test_a_scene_of_one_s_own_takes_quantities_and_no_parameters(skill):
 
 
 def test_a_bare_number_that_looks_like_millimetres_is_warned_of_at_the_line_of_the_user(skill):
-    with pytest.warns(SkillframeWarning, match="5mm") as caught:
-        run(skill, *FREE, set={"start.offset_x": 5}, **SHORT)
+    with pytest.warns(SkillframeWarning, match="2mm") as caught:
+        run(skill, *FREE, set={"start.offset_x": 2}, **SHORT)
     assert caught[0].filename == __file__
-    with pytest.warns(SkillframeWarning, match="5mm") as caught:
-        record(*FREE, set={"start.offset_x": 5})
+    with pytest.warns(SkillframeWarning, match="2mm") as caught:
+        record(*FREE, set={"start.offset_x": 2})
     assert caught[0].filename == __file__
 
 
@@ -248,8 +248,8 @@ def test_the_command_line_says_what_the_functions_warn_of_even_when_quiet(demons
     assert command(["learn", str(file), str(file), "--out", str(tmp_path / "a.json")]) == 0
     assert "warning: " in capsys.readouterr().err
     words = ["run", str(tmp_path / "a.json"), "--world", "free", "--robot", "free_tool", "--duration", "0.1"]
-    command([*words, "--quiet", "--set", "start.offset_x=5"])
-    assert "warning: start.offset_x is 5 m" in capsys.readouterr().err
+    command([*words, "--quiet", "--set", "start.offset_x=2"])
+    assert "warning: start.offset_x is 2 m" in capsys.readouterr().err
 
 
 def test_a_person_in_detail_is_the_person_of_the_command(tmp_path):

@@ -98,8 +98,9 @@ TOP = {
     ("trials = {trials}", "trails = 3"): "did you mean 'trials'?",
     ("seed = 7", "seed = -1"): "seed: is -1",
     ("seed = 7", ""): "missing seed",
-    ("duration_s = 5.0", "duration_s = 0.0"): "give seconds above zero",
-    ("duration_s = 5.0", "duration_s = inf"): "give seconds above zero",
+    ("duration_s = 5.0", "duration_s = 0.0"): "duration_s: 0 s is beyond 1ms to 86400s",
+    ("duration_s = 5.0", "duration_s = inf"): "duration_s: inf s is beyond 1ms to 86400s",
+    ("duration_s = 5.0", 'duration_s = "5mm"'): "duration_s: expected a quantity in s, got 5mm",
     ('["a.skill.json", "replay:demo.npz"]', "[]"): "name at least one skill",
     ('["a.skill.json", "replay:demo.npz"]', '["b.skill.json"]'): "no such file: b.skill.json",
     ('["a.skill.json", "replay:demo.npz"]', '["a.skill.json", "./a.skill.json"]'): "a second skill is called",
@@ -239,3 +240,10 @@ def test_a_missing_campaign_file_is_named(tmp_path):
         read(tmp_path / "absent.toml")
     with pytest.raises(InputError, match="not a campaign's folder"):
         load(tmp_path, FakeParams)
+
+
+def test_a_campaign_s_duration_takes_a_unit(tmp_path):
+    from campaign_fakes import TEXT
+
+    text = TEXT.replace("duration_s = 5.0", 'duration_s = "1500ms"')
+    assert read(write_campaign(tmp_path, text=text)).duration_s == 1.5

@@ -4,13 +4,17 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import fields
 
+import numpy as np
 import pytest
 
 from skillframe.cli.main import cli, run
 from skillframe.cli.names import ROBOT
 from skillframe.cli.plugins import distribution_rows
-from skillframe.errors import UnknownName
+from skillframe.config.units import UNITS as WORDS
+from skillframe.errors import InputError, UnknownName
+from skillframe.execution.prepare import split_settings
 from skillframe.extend.homes import HOMES, where_to_get
 from skillframe.extend.registry import Registry, registry
 from skillframe.world.placement import check_quantities
@@ -59,7 +63,9 @@ def test_skills_and_coordinators_are_listed(capsys):
 
 def test_every_setting_that_a_run_takes_is_listed_with_a_line_about_it(capsys):
     rows = listed(capsys, "settings")
-    assert {row["name"] for row in rows if row["world"] is None} == QUANTITIES
+    of_runs = {row["name"]: row["option"] for row in rows if "option" in row}
+    assert of_runs == {"duration_s": "--duration", "rate_hz": "--rate", "coc": "--coc"}
+    assert {row["name"] for row in rows if row["world"] is None} == QUANTITIES | set(of_runs)
     worlds = {row["world"] for row in rows} - {None}
     assert worlds == set(registry().names("world"))
     assert all(row["about"] and "unit" in row and "default" in row for row in rows)
@@ -74,6 +80,32 @@ def test_every_setting_that_a_run_takes_is_listed_with_a_line_about_it(capsys):
 def test_a_listing_in_a_pipe_is_no_wider_than_a_terminal(words, capsys):
     assert run(words.split()) == 0
     assert max(map(len, capsys.readouterr().out.splitlines())) <= 80
+
+
+def test_every_number_that_a_run_or_campaign_accepts_is_listed_with_a_unit_and_a_range_around_its_default(capsys):
+    rows, checked = listed(capsys, "settings"), 0
+    for row in rows:
+        of_one_kind = row["default"] if isinstance(row["default"], list) else [row["default"]]
+        if any(isinstance(value, bool | str) for value in of_one_kind):
+            continue  # no quantity
+        assert row["unit"] in {unit for unit, _ in WORDS.values()} | {""}, row
+        assert row["range"] is not None, row
+        least, most = row["range"]
+        assert least < most and all(least <= value <= most for value in of_one_kind if value is not None), row
+        checked += 1
+    accepted = {f"world.{field.name}" for world in registry().records("world") for field in fields(world.params)}
+    assert {row["name"] for row in rows} >= QUANTITIES | accepted and checked > 80
+
+
+@pytest.mark.parametrize("each", VARIED, ids=lambda each: each.name)
+def test_every_range_of_a_trial_has_its_reason_and_is_kept_by_a_run(each):
+    least, most, why = each.range
+    assert why
+    for value in (least, most):
+        split_settings("free", {each.name: value})
+    for value in (np.nextafter(least, -np.inf), np.nextafter(most, np.inf)):
+        with pytest.raises(InputError, match=f"--set {each.name}: .* is beyond"):
+            split_settings("free", {each.name: float(value)})
 
 
 def test_every_nominal_value_is_one_that_a_run_accepts():

@@ -186,7 +186,7 @@ def test_show_says_what_can_be_set_of_a_world_with_defaults_and_meaning(capsys):
     row = json.loads(capsys.readouterr().out)
     assert (row["kind"], row["distribution"]) == ("world", "skillframe")
     settings = {each["name"]: each for each in row["settings"]}
-    assert settings["clearance"]["default"] == 0.00025 and "[m]" in settings["clearance"]["about"]
+    assert settings["clearance"]["default"] == 0.00025 and settings["clearance"]["unit"] == "m"
     assert all(each["about"] for each in row["settings"])
     assert run(["plugins", "show", "world:peg_in_hole"]) == 0
     assert "--set world.clearance=0.00025" in capsys.readouterr().out

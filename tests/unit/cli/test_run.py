@@ -62,12 +62,17 @@ def test_a_film_that_could_not_be_written_is_refused_before_the_run(
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--duration", "nan"], "'--duration': nan is not a finite number"),
-        (["--duration", "-1"], "'--duration': -1.0 is not in the range"),
-        (["--rate", "0"], "'--rate': 0.0 is not in the range"),
+        (["--duration", "nan"], "'--duration': nan s is beyond 1ms to 86400s"),
+        (["--duration", "-1"], "'--duration': -1 s is beyond 1ms to 86400s"),
+        (["--duration", "5mm"], "'--duration': expected a quantity in s, got 5mm"),
+        (["--duration", "long"], "'--duration': 'long' is no number; give one, bare or with one of s, ms"),
+        (["--rate", "0"], "'--rate': 0 Hz is beyond 0.01Hz"),
         (["--seed", "-1"], "'--seed': -1 is not in the range"),
-        (["--set", "start.tilt_y=1e300"], "start.tilt_y: cannot be 1e+300"),
-        (["--set", "sensor.force_noise=-1"], "sensor.force_noise: cannot be negative"),
+        (["--set", "start.tilt_y=1e300"], "start.tilt_y: 1e+300 rad is beyond -90deg to 90deg"),
+        (["--set", "start.tilt_y=172deg"], "start.tilt_y: 172deg is beyond -90deg to 90deg"),
+        (["--set", "sensor.force_noise=-1"], "sensor.force_noise: -1 N is beyond 0N to 100N"),
+        (["--coc", "10,0,0"], "point 10,0,0: x: 10 m is beyond -3m to 3m, as no tool is longer; did you mean 10mm?"),
+        (["--coc", "0,0,5deg"], "expected a quantity in m, got 5deg"),
         (["--set", "actuator.delay=1"], "has no actuators of its own"),
     ],
 )
@@ -122,12 +127,15 @@ def test_a_run_where_nothing_is_deep_names_robot_and_world_alone(
 def test_millimetres_typed_as_metres_are_warned_of_and_degrees_refused(
     skill: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    run(["run", skill, *FREE, "--duration", "0.02", "--set", "start.offset_y=8", "--quiet"])
-    assert "warning: start.offset_y is 8 m as typed; if millimetres are meant, type start.offset_y=8mm" in (
+    run(["run", skill, *FREE, "--duration", "0.02", "--set", "start.offset_y=2", "--quiet"])
+    assert "warning: start.offset_y is 2 m as typed; if millimetres are meant, type start.offset_y=2mm" in (
         capsys.readouterr().err
     )
+    assert run(["run", skill, *FREE, "--duration", "0.02", "--set", "start.offset_y=8"]) == 2
+    assert "start.offset_y: 8 m is beyond -3m to 3m" in (said := capsys.readouterr().err)
+    assert said.endswith("did you mean 8mm?\n")
     assert run(["run", skill, *FREE, "--duration", "0.02", "--set", "start.tilt_y=5"]) == 2
-    assert "type start.tilt_y=5deg" in capsys.readouterr().err
+    assert "did you mean 5deg?" in capsys.readouterr().err
     run(["run", skill, *FREE, "--duration", "0.02", "--set", "start.offset_y=8mm", "--set", "start.tilt_y=5deg"])
     assert "as typed" not in capsys.readouterr().err
 

@@ -125,14 +125,14 @@ def test_an_arm_has_none_of_these_faults(name, robot):
     ("name", "value", "message"),
     [
         ("sensor.pressure_frozen", 0.5, "is 0.5, and something is broken or not; give 1 or 0"),
-        ("actuator.runaway", 2.0, "cannot be 2; give -1 to 1"),
-        ("actuator.burst_a", 1.3, "cannot be 1.3; give an area in m2"),
-        ("actuator.supply_loss", -0.1, "cannot be -0.1; give a share"),
-        ("sensor.encoder_step", 90.0, "cannot be 90; give a jump in rad or m"),
+        ("actuator.runaway", 2.0, "2 is beyond -1 to 1, the spool's travel"),
+        ("actuator.burst_a", 1.3, "1.3 m2 is beyond 0 m2 to 0.01 m2, a hole of 11 cm"),
+        ("actuator.supply_loss", -0.1, "-0.1 is beyond 0 to 1, a share"),
+        ("sensor.encoder_step", 90.0, "90 rad is beyond .*; did you mean 90deg"),
         ("fault.cylinder", 4.0, "is 4, which is none of its cylinders; give one of 1 lift_piston, 2 tilt_piston, 3"),
         ("fault.cylinder", 1.5, "is 1.5, which is none"),
-        ("fault.time", -100.0, "cannot be -100; give seconds"),
-        ("fault.time", np.nan, "cannot be nan"),
+        ("fault.time", -100.0, "-100 s is beyond -60s to 3600s"),
+        ("fault.time", np.nan, "nan s is beyond"),
     ],
 )
 def test_a_fault_that_cannot_be_is_refused_with_what_it_takes(name, value, message):

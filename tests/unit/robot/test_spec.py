@@ -1,5 +1,6 @@
 """robot.toml: what is read, what is refused, and with which sentence."""
 
+import math
 import subprocess
 import sys
 
@@ -56,7 +57,7 @@ DRIVEN = '[[actuation]]\njoint = "j"\nfmu = "x"\n'
         ("[[arm]]\nname = 'a'\ntool_frame = 'x'\n[[arm]]\nname = 'a'\ntool_frame = 'y'", "two arms"),
         ("[inertia]\nl0 = { mass = 1.0 }", "missing inertia"),
         ("mimic = 1", "expected true or false"),
-        ("[control]\nrate_hz = 0", "positive"),
+        ("[control]\nrate_hz = 0", "control.rate_hz: 0 Hz is beyond 1Hz to 100000Hz; give 1Hz to"),
         (f"{DRIVEN}[sensors]\nencoder = -1e-4", r"sensors\.encoder: is -0\.0001; give 0 to 0\.1 rad"),
         (f"{DRIVEN}[sensors]\ncorner_hz = 0.0", r"sensors\.corner_hz: is 0; give 5 Hz or more"),
         (f"{DRIVEN}[sensors]\nencoder = 4096.0", r"sensors\.encoder: is 4096; give 0 to 0\.1 rad"),
@@ -103,3 +104,43 @@ def test_reading_a_spec_loads_no_robot_library():
     code = "import sys; from skillframe.robot import load_robot; load_robot('panda'); print('pinocchio' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
+
+
+SLIDE = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
+<joint name="turn" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
+<limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+<joint name="slide" type="prismatic"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/>
+<limit lower="-3" upper="3" effort="1" velocity="1"/></joint></robot>"""
+
+
+def slider(tmp_path, toml):
+    (tmp_path / "slide.urdf").write_text(SLIDE)
+    (tmp_path / "robot.toml").write_text(f'urdf = "slide.urdf"\n{toml}')
+    return tmp_path / "robot.toml"
+
+
+def test_numbers_of_robot_toml_take_units_and_those_of_home_are_their_joint_s(tmp_path):
+    spec = load_robot(slider(tmp_path, """
+home = { turn = "90deg", slide = "30mm" }
+limits = { force_n = "0.2kN", workspace_m = [["-50cm", 0, 0], [1, 1, "900mm"]] }
+workspace = { fixture = ["50cm", 0, 0.2] }
+control = { rate_hz = "1kHz" }"""))  # fmt: skip
+    assert spec.home == {"turn": math.pi / 2.0, "slide": 0.03}
+    assert spec.limits.force_n == 200.0
+    assert spec.limits.workspace_m == ((-0.5, 0.0, 0.0), (1.0, 1.0, 0.9))
+    assert (spec.workspace.fixture, spec.control.rate_hz) == ((0.5, 0.0, 0.2), 1000.0)
+
+
+@pytest.mark.parametrize(
+    ("toml", "sentence"),
+    [
+        ('home.turn = "30mm"', r"home\.turn: expected a quantity in rad, got 30mm"),
+        ('home.slide = "30deg"', r"home\.slide: expected a quantity in m, got 30deg"),
+        ('limits.force_n = "80mm"', r"limits\.force_n: expected a quantity in N, got 80mm"),
+        ("workspace.fixture = [500, 0, 200]", r"fixture\[0\]: 500 m is beyond -100m to 100m; did you mean 500mm\?"),
+        ('control.rate_hz = "1MHz"', r"control\.rate_hz: expected a number, got '1MHz'"),
+    ],
+)
+def test_a_unit_that_is_not_the_quantity_s_and_a_place_that_no_machine_reaches_are_refused(tmp_path, toml, sentence):
+    with pytest.raises(InputError, match=sentence):
+        load_robot(slider(tmp_path, toml))

@@ -52,8 +52,8 @@ def test_a_tilted_or_shifted_start_is_lifted_clear_of_the_fixture(plant, world, 
 @pytest.mark.parametrize(
     ("world", "params", "said"),
     [
-        ("peg_in_hole", {"clearance": 0.0}, "clearance > 0"),
-        ("peg_in_hole", {"fillet": 0.02}, "0 < fillet < radius"),
+        ("peg_in_hole", {"clearance": 0.0}, "clearance: 0 m is beyond 1um to 50mm"),
+        ("peg_in_hole", {"fillet": 0.02}, "needs fillet < radius"),
         ("peg_in_hole", {"done_depth": 0.07}, "done_depth"),
         ("valley", {"slope": 1.5}, "slope"),
         ("valley", {"friction": -0.1}, "friction"),
