@@ -33,7 +33,7 @@ LEASH_SLACK = 5e-3
 """[rad or m] that a command may be ahead besides: sensors, sag."""
 
 
-class Range(NamedTuple):
+class JointRange(NamedTuple):
     """Limits of n joints.
 
     Attributes:
@@ -55,7 +55,7 @@ class JointSteps:
         dt: [s] between two commands.
     """
 
-    def __init__(self, start: Float, limits: Range, delay: float, dt: float) -> None:
+    def __init__(self, start: Float, limits: JointRange, delay: float, dt: float) -> None:
         self._home, self._limits, self._dt = start.copy(), limits, dt
         self._leash = limits.velocity * delay + LEASH_SLACK
         self._scale = np.repeat([1.0, TURN_LENGTH], 3)[:, None]

@@ -31,6 +31,7 @@ def describe(robot: RobotModel) -> str:
         f"  control {spec.control.rate_hz:g} Hz, fixture at {_triple(spec.workspace.fixture)} m in base",
         *([] if spec.control.interface == "torque" else [f"  {spec.control.admittance.told()}"]),
         f"  limits: {_limits(robot)}",
+        *_measured(spec),
     ]
     lines += [f"  {note}"] if (note := guess_note(spec)) else []
     lines += ["", "  joints that turn in rad, rad/s and Nm, joints that slide in m, m/s and N"]
@@ -73,6 +74,19 @@ def _machine(robot: RobotModel) -> list[str]:
     return ["", *lines] if lines else []
 
 
+def _measured(spec: RobotSpec) -> list[str]:
+    """What the controller of an arm knows of its joints, and how late its torques are. None for machines."""
+    if spec.hydraulic or spec.other_drive:
+        return []
+    known = "exact positions and velocities" if spec.encoders is None else str(spec.encoders)
+    ms = 1e3 * spec.control.late_s
+    late = f"{ms:g} ms from command to torque" if ms else "no delay of the loop"
+    lines = [f"  encoders: {known}; {late}"]
+    if spec.dynamics.compensate:
+        lines.append("  joint friction and damping: the controller adds the nominal ones to its torques")
+    return lines
+
+
 def _how(actuation: Actuation, spec: RobotSpec) -> str:
     if spec.servo:
         return ", which takes a position" if "target" in actuation.inputs else ", which takes a torque"
@@ -90,6 +104,7 @@ def as_json(robot: RobotModel) -> dict[str, Any]:
         "mass_kg": _mass(robot), "moving_bodies": _moving(robot), "rate_hz": spec.control.rate_hz,
         "interface": spec.control.figures(),
         "fixture_m": [float(x) for x in spec.workspace.fixture], "limits": asdict(spec.limits),
+        "encoders": spec.encoders and asdict(spec.encoders), "delay_s": spec.control.late_s,
         "joints": [_joint_values(robot, index) for index in range(1, model.njoints)],
         "arms": [_arm_values(robot, i) for i in range(len(spec.arm))],
         **(_machine_values(spec) if spec.loop or spec.actuation or spec.payload else {}),

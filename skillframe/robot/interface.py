@@ -19,6 +19,7 @@ from dataclasses import dataclass, fields
 from typing import Literal
 
 from skillframe.errors import InputError
+from skillframe.signals.delay import require_delay
 
 TICK_HZ = 1000.0
 """Of the simulated robot and its servos, whatever the rate of commands."""
@@ -42,12 +43,13 @@ LARGEST_DELAY, LARGEST_BANDWIDTH = 1.0, 200.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Control:
-    """[control] of robot.toml. What is None takes the default, and is for velocities and positions only.
+    """[control] of robot.toml. What is None takes the default. All but rate and delay is for velocities and positions.
 
     Attributes:
         rate_hz: of the impedance loop, or of the commands that the arm takes [Hz, 1 to 100kHz]; none here is faster.
         interface: what the arm takes.
-        delay_s: from a command to the first motion, the sensor's own included [s].
+        delay_s: from a command to its torque, none by default; where the arm takes velocities or positions, from a
+            command to the first motion, the sensor's own included [s].
         bandwidth_hz: of the arm's inner loop [Hz].
         contact_stiffness: of part, tool, sensor and arm in series [N/m].
         contact_turning_stiffness: the same about the centre of compliance [Nm/rad].
@@ -63,6 +65,11 @@ class Control:
     contact_turning_stiffness: float | None = None
     push_n: float | None = None
     push_nm: float | None = None
+
+    @property
+    def late_s(self) -> float:
+        """Delay from a command to its torque, where the arm takes torques [s]."""
+        return self.delay_s or 0.0 if self.interface == "torque" else 0.0
 
     @property
     def tick_hz(self) -> float:
@@ -180,7 +187,8 @@ def check_control(control: Control, where: str) -> None:
     given = {f.name: getattr(control, f.name) for f in fields(control) if f.name != "interface"}
     extra = [name for name, value in given.items() if value is not None and name != "rate_hz"]
     if control.interface == "torque":
-        if extra:
+        require_delay(control.late_s, f"{where}: control.delay_s")
+        if extra := [name for name in extra if name != "delay_s"]:
             text = f"is for arms that take velocities or positions, and the interface is {control.interface!r}"
             raise InputError(f"{where}: control.{extra[0]}", text, 'leave it out, or set interface = "position"')
         return

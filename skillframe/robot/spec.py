@@ -25,7 +25,7 @@ from skillframe.robot.driven import (
 )
 from skillframe.robot.home import home_in_si
 from skillframe.robot.interface import Control, check_control
-from skillframe.robot.joint_settings import Dynamics, impossible_joints
+from skillframe.robot.joint_settings import Dynamics, Encoders, impossible_encoders, impossible_joints
 from skillframe.robot.numbers import LARGEST
 from skillframe.robot.surroundings import DeclaredCollisions, Obstacle, unfit_obstacles
 
@@ -108,6 +108,7 @@ class RobotFile:
     friction_share: dict[str, float] = field(default_factory=dict)
     motor_inertia: dict[str, float] = field(default_factory=dict)
     dynamics: Dynamics = field(default_factory=Dynamics)
+    encoders: Encoders | None = None
     inertia: dict[str, LinkInertia] = field(default_factory=dict)
     payload: DeclaredPayload | None = None
     loop: tuple[LoopClosure, ...] = ()
@@ -134,6 +135,7 @@ class RobotSpec:
         motor_inertia: what motor and gear add to a joint's inertia, by name: the rotor's times the gear ratio squared
             [kg m^2, or kg where the joint slides]; 0 for joints not named.
         dynamics: friction and damping of joints in place of the URDF's, and whether the controller compensates them.
+        encoders: of the joints; None where the controller knows positions and velocities exactly.
         payload: what is carried, where it can be changed.
         inertia: overlay by link name; loop: closed chains; actuation: what drives joints, of the kind in `drive`.
         sensors, gains: of a machine with actuators.
@@ -155,6 +157,7 @@ class RobotSpec:
     friction_share: dict[str, float] = field(default_factory=dict)
     motor_inertia: dict[str, float] = field(default_factory=dict)
     dynamics: Dynamics = field(default_factory=Dynamics)
+    encoders: Encoders | None = None
     inertia: dict[str, LinkInertia] = field(default_factory=dict)
     payload: DeclaredPayload | None = None
     loop: tuple[LoopClosure, ...] = ()
@@ -295,8 +298,7 @@ def _check_values(declared: RobotFile, where: str) -> None:
         if not 0.0 <= inertia_of_motor <= LARGEST:
             text = f"is {inertia_of_motor:g}"
             raise InputError(f"{where}: motor_inertia.{joint}", text, "give 0 or more, as felt at the joint [kg m^2]")
-    for key, problem, fix in impossible_joints(declared.dynamics):
-        raise InputError(f"{where}: {key}", problem, fix)
+    _check_joints(declared, where)
     place = declared.workspace
     if not all(abs(x) <= LARGEST for x in place.fixture):
         raise InputError(f"{where}: workspace.fixture", "is beyond any physical size", "give metres in base")
@@ -314,12 +316,29 @@ def _check_values(declared: RobotFile, where: str) -> None:
             raise InputError(f"{where}: inertia.{link}", "holds a number beyond any physical size", "correct it")
 
 
+def _check_joints(declared: RobotFile, where: str) -> None:
+    """Joints' dynamics and encoders, and the loop's delay, which are those of the torque law."""
+    problems = list(impossible_joints(declared.dynamics))
+    if declared.encoders is not None:
+        problems += impossible_encoders(declared.encoders, declared.control.tick_hz)
+    kind = declared.drive.kind if declared.drive is not None else "hydraulic" if declared.actuation else ""
+    if kind == "hydraulic":
+        own = "a hydraulic machine's "
+        told = {"dynamics.compensate": f"{own}law identifies friction by itself"}
+        told |= {"encoders": f"{own}encoders are in [sensors]"}
+        told |= {"control.delay_s": f"{own}delay is the quantity actuator.delay"}
+    else:
+        told = dict.fromkeys(("dynamics.compensate", "encoders", "control.delay_s"), f"its drive is {kind!r}")
+    given = (declared.dynamics.compensate, declared.encoders is not None, declared.control.late_s > 0.0)
+    if kind not in ("", "servo"):
+        problems += [(key, told[key], "leave it out") for key, is_given in zip(told, given, strict=True) if is_given]
+    for key, problem, fix in problems:
+        raise InputError(f"{where}: {key}", problem, fix)
+
+
 def _check_machine(declared: RobotFile, where: str) -> None:
     """Sensors and gains of a hydraulic machine, and of nothing else."""
     kind = None if declared.drive is None else declared.drive.kind
-    if declared.dynamics.compensate and declared.actuation and kind in (None, "hydraulic"):
-        text = "a hydraulic machine's law identifies friction by itself"
-        raise InputError(f"{where}: dynamics.compensate", text, "leave it out")
     if kind in OWN_DRIVES and not declared.actuation:
         raise InputError(f"{where}: drive", "there is no [[actuation]] that it could be the kind of", "leave it out")
     if kind == "servo" and (declared.loop or len(declared.arm) > 1):

@@ -40,6 +40,10 @@ class CommandDelay:
         self._ticks, self._now, self._rows, self._at_once = ticks, 0, np.arange(len(ticks)), not ticks.any()
         self._line: Float = np.zeros((int(ticks.max(initial=0)) + 1, len(ticks), k))
 
+    def start(self, command: Float) -> None:
+        """As if this had been sent all the time before."""
+        self._line[:] = command
+
     def step(self, command: Float) -> Float:
         """What arrives now, when this is sent."""
         if self._at_once:

@@ -17,7 +17,7 @@ from skillframe.control.admittance import AdmittanceLaw, Bounds
 from skillframe.control.controller import Reading
 from skillframe.control.endings import Broken
 from skillframe.control.inner_loop import InnerLoop
-from skillframe.control.joint_steps import JointSteps, Range
+from skillframe.control.joint_steps import JointSteps, JointRange
 from skillframe.control.motors import joint_limits
 from skillframe.execution.drives.torque import OneArm, TorqueDrive
 from skillframe.execution.setup import Setup
@@ -112,10 +112,10 @@ def moved(pose: Pose, jacobian: Float, step: Float) -> Pose:
     return Pose(pose.position + way[:, :3], rotation_matrix(way[:, 3:]) @ pose.rotation)
 
 
-def _range(setup: Setup, plant: Plant) -> Range:
+def _range(setup: Setup, plant: Plant) -> JointRange:
     """Of the joints that move the tool."""
     limits = joint_limits(setup.robot, plant.model)
     if not limits:
         free = np.full(len(plant.dofs), np.inf)
-        return Range(free, -free, free)
-    return Range(*(np.asarray(part)[plant.dofs] for part in (limits[0].velocity, limits[0].lower, limits[0].upper)))
+        return JointRange(free, -free, free)
+    return JointRange(*(np.asarray(part)[plant.dofs] for part in (limits[0].velocity, limits[0].lower, limits[0].upper)))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from skillframe.control.endings import Broken
 from skillframe.errors import SkillframeError
 from skillframe.execution.drive import Shares, Trials
-from skillframe.execution.drives.plants import varied_plants
+from skillframe.execution.drives.plants import encoders_of, varied_plants
 from skillframe.execution.drives.torque import Gauge, TorqueDrive
 from skillframe.execution.recorder import Recorder
 from skillframe.execution.result import ArmsResult, Result
@@ -48,6 +48,7 @@ class SeveralArms:
         self.count = len(rngs)
         self.plant, self.nominal = varied_plants(setup, draws, self.count)
         self.views = self.plant.arms()
+        self._encoders = encoders_of(setup, self.plant)
         self.nominal_views = self.nominal.arms() if self.nominal is not self.plant else self.views
         self.dofs: Sequence[NDArray[np.int64]] | None = [view.dofs for view in self.views]
         self.arms = len(self.views)
@@ -75,7 +76,7 @@ class SeveralArms:
         """Rows of the nominal robots where the plant's are now; each with its own arm's joints."""
         views = self.views
         if self.nominal is not self.plant:
-            qpos, qvel = self.plant.state
+            qpos, qvel = self.plant.state if self._encoders is None else self._encoders.state
             self.nominal.set_state(qpos, qvel, active)
             views = self.nominal_views
         found = [view.kinematics(point) for view, point in zip(views, self.points, strict=True)]
@@ -104,6 +105,8 @@ class SeveralArms:
             whole[:, view.dofs] = torque[arm :: self.arms]
             self.path[active, arm] += np.abs(velocity[:, view.dofs])[active] * self.dt
         self.plant.step(whole, active)
+        if self._encoders is not None:
+            self._encoders.sample(*self.plant.state)
         return []
 
     def turns(self) -> Float:

@@ -97,7 +97,9 @@ class ServoLimb:
         coupled.load[:, self.driven] = 0.0
         position = coupled.where()[0].reshape(self._shape)
         self.told = self.servos.command(torque.take(self.driven, axis=1), position, self._velocity)
-        return self.actuated.step(self.told, active)
+        broken = self.actuated.step(self.told, active)
+        self.arm.read_encoders()
+        return broken
 
 
 class ServoDrive:

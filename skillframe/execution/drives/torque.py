@@ -20,11 +20,12 @@ from skillframe.control.joint_friction import FrictionCompensation
 from skillframe.control.limits import LimitGuard
 from skillframe.control.motors import Motors, joint_limits, unstated
 from skillframe.execution.drive import Shares, Trials
-from skillframe.execution.drives.plants import varied_plants
+from skillframe.execution.drives.plants import encoders_of, varied_plants
 from skillframe.execution.recorder import Recorder
 from skillframe.execution.result import Result
 from skillframe.execution.setup import Setup
 from skillframe.frames import Float, Pose, norm
+from skillframe.signals.delay import CommandDelay
 from skillframe.signals.kalman import WrenchFilter
 from skillframe.skill import Command, Impedance, Observation, no_reasons
 from skillframe.world.plant import Draws, Kinematics, Plant
@@ -93,6 +94,8 @@ class TorqueDrive:
         self.motors = Motors(limits, rate, self.rows, self.dt) if limits else None
         known = setup.robot.spec.dynamics.compensate
         self._friction = FrictionCompensation(self.plant.model, limb.dofs, self.rows) if known else None
+        self._late = round(setup.robot.spec.control.late_s / self.dt)
+        self._delay: CommandDelay | None = None
         self._unstated = unstated(setup.robot) if limits else []
         self.guard = LimitGuard(setup.limits, self.rows, self.dt, self.motors)
 
@@ -100,6 +103,7 @@ class TorqueDrive:
         """Hold still, let the readings settle, and take their mean as the sensor's bias."""
         active = np.arange(self.plant.count)
         kinematics = self.limb.kinematics(active)
+        self._start_late(kinematics.bias)
         hold = Pose(kinematics.pose.position.copy(), kinematics.pose.rotation.copy()).at(self.limb.point)
         still = np.zeros((self.rows, 6))
         command = Command(hold, still, HOLD, still, np.zeros(self.rows, dtype=np.int64), no_reasons(self.rows))
@@ -116,6 +120,12 @@ class TorqueDrive:
         self.limb.sensors.set_tare(total / TARE_TICKS, self.limb.kinematics(active).pose.rotation)
         return broken
 
+    def _start_late(self, holding: Float) -> None:
+        """Torques that are under way at the start are those (rows, nv) that hold the robots still."""
+        if self._late:
+            self._delay = CommandDelay(np.full(self.rows, self._late), holding.shape[-1])
+            self._delay.start(holding)
+
     def sense(self, tick: int, active: Trials) -> Observation:
         """Pose and twist of the centre of compliance, and the filtered wrench there."""
         kinematics = self.limb.kinematics(active)
@@ -131,6 +141,8 @@ class TorqueDrive:
         self._torque, self._law = self.controller.torque(command, self._reading, ramp)
         if self._friction is not None:
             self._torque = self._torque + self._friction.torque(self._reading.velocity)
+        if self._delay is not None:
+            self._torque = self._delay.step(self._torque)
         if self.motors is not None:
             self._torque = self.motors.held(self._torque, self._reading.velocity, self.limb.joint_positions())
         return self._law
@@ -197,15 +209,21 @@ class OneArm:
     def __init__(self, setup: Setup, draws: Draws, rngs: Sequence[np.random.Generator]) -> None:
         self.rows = len(rngs)
         self.plant, self.nominal = varied_plants(setup, draws, self.rows)
+        self._encoders = encoders_of(setup, self.plant)
         self.point = np.asarray(setup.center_of_compliance, dtype=float)
         self.sensors: Gauge = Sensors(setup.sensors, self.plant, rngs, draws)
 
     def kinematics(self, active: Trials) -> Kinematics:
-        """Of the nominal robots where the plant's are now."""
+        """Of the nominal robots where the encoders say that the plant's are now."""
         if self.nominal is not self.plant:
-            qpos, qvel = self.plant.state
+            qpos, qvel = self.plant.state if self._encoders is None else self._encoders.state
             self.nominal.set_state(qpos, qvel, active)
         return self.nominal.kinematics(self.point)
+
+    def read_encoders(self) -> None:
+        """A tick of the plant is over."""
+        if self._encoders is not None:
+            self._encoders.sample(*self.plant.state)
 
     def mass_matrix(self) -> Float:
         """(N, nv, nv) of the nominal robots."""
@@ -218,4 +236,5 @@ class OneArm:
     def push(self, torque: Float, active: Trials) -> list[Broken]:
         """Move the plant by a tick under generalised forces (N, nv); nothing fails."""
         self.plant.step(torque, active)
+        self.read_encoders()
         return []

@@ -187,7 +187,7 @@ def completed(*words):
     ("words", "names"),
     [
         (["plu"], ["plugins"]),
-        (["run", "x.json", "--robot", "pan"], ["panda", "panda_position", "panda_servo"]),
+        (["run", "x.json", "--robot", "pan"], ["panda", "panda_encoders", "panda_position", "panda_servo"]),
         (["run", "x.json", "--world", "peg"], ["peg_in_hole"]),
         (["robots", "show", "hiab"], ["hiab_xs031"]),
         (["worlds", "show", "val"], ["valley"]),

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from skillframe.control.joint_steps import LEASH_SLACK, POSTURE, JointSteps, Range
+from skillframe.control.joint_steps import LEASH_SLACK, POSTURE, JointSteps, JointRange
 
 DT = 2e-3
-FREE = Range(np.full(7, np.inf), np.full(7, -np.inf), np.full(7, np.inf))
+FREE = JointRange(np.full(7, np.inf), np.full(7, -np.inf), np.full(7, np.inf))
 
 
 def jacobian(joints=7, seed=1):
@@ -16,12 +16,12 @@ def jacobian(joints=7, seed=1):
 
 
 def steps(limits, joints=7, start=None, delay=0.03):
-    limits = Range(*(part[:joints] for part in limits))
+    limits = JointRange(*(part[:joints] for part in limits))
     return JointSteps(np.zeros((1, joints)) if start is None else start, limits, delay, DT)
 
 
 def range_of(velocity=np.inf, lower=-np.inf, upper=np.inf):
-    return Range(*(np.full(7, float(value)) for value in (velocity, lower, upper)))
+    return JointRange(*(np.full(7, float(value)) for value in (velocity, lower, upper)))
 
 
 TWIST = np.array([[0.01, -0.02, 0.005, 0.1, 0.05, -0.2]])
@@ -67,7 +67,7 @@ def test_a_joint_at_the_end_of_its_range_is_held_and_the_others_make_the_twist()
     free, _ = steps(FREE).velocities(TWIST, j, REST, REST)
     upper = np.full(7, np.inf)
     upper[np.argmax(free[0])] = 0.0
-    speed, made = steps(Range(np.full(7, np.inf), np.full(7, -np.inf), upper)).velocities(TWIST, j, REST, REST)
+    speed, made = steps(JointRange(np.full(7, np.inf), np.full(7, -np.inf), upper)).velocities(TWIST, j, REST, REST)
     assert speed[0, np.argmax(free[0])] == 0.0
     np.testing.assert_allclose(made, TWIST, rtol=0.01, atol=1e-4)
 

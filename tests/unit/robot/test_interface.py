@@ -62,7 +62,7 @@ def test_what_is_given_is_taken(robot):
 @pytest.mark.parametrize(
     ("control", "words"),
     [
-        ("rate_hz = 1000\ndelay_s = 0.01\n", "control.delay_s is for arms that take velocities or positions"),
+        ("rate_hz = 1000\npush_n = 10\n", "control.push_n is for arms that take velocities or positions"),
         ('interface = "force"\n', 'control.interface'),
         ('interface = "position"\nrate_hz = 300\n', "rate_hz is 300, and the simulated arm's 1000 Hz is no whole"),
         ('interface = "position"\nrate_hz = 2000\n', "control.rate_hz is 2000"),
