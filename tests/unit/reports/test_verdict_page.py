@@ -176,6 +176,19 @@ def test_what_varied_is_not_listed_as_standing_still_and_the_rest_is(folder):
     assert "fixture offset x" not in text[still:blind]
 
 
+def test_a_robot_s_quantity_that_varies_or_is_set_elsewhere_is_not_said_to_stand_at_its_nominal_value(folder):
+    spec = (folder / "campaign.toml").read_text(encoding="utf-8")
+    moved = spec.replace(
+        "[vary]\n", '[set]\n"sensor.force_noise" = 0.6\n[vary]\n"robot.mass_scale" = { uniform = [0.9, 1.1] }\n'
+    )
+    (folder / "campaign.toml").write_text(moved, encoding="utf-8")
+    text = plain(page(noted(folder)))
+    assert "robot mass scale: 0.9 to 1.1, uniform" in text
+    assert "robot mass scale at" not in text
+    assert "sensor force noise at 0.6 N (as the campaign sets it)" in text
+    assert "sensor force noise at 0.3" not in text
+
+
 def test_both_halves_of_an_end_are_counted(folder):
     table = [[t, PEG, 7, 0.1 * t, 0.0, 1, "", 3.0, 1.0, 0.0, 0.0, 1, int(t > 0)] for t in range(3)]
     write_csv(folder / "results.csv", table, [*COLUMNS, "goal_reached", "ended_itself"])
