@@ -25,7 +25,7 @@ from skillframe.demonstration.assemble import NOTES
 from skillframe.demonstration.checks import GAP, angles_between
 from skillframe.demonstration.record import Demonstration
 from skillframe.demonstration.stalls import POSE, alive, as_meta, stalls
-from skillframe.demonstration.suspicions import AUDITS, spike_indices
+from skillframe.demonstration.suspicions import AUDITS, broken_samples
 from skillframe.frames import Float, norm
 
 LEAST_BIAS = np.repeat([0.5, 0.05], 3)
@@ -125,7 +125,7 @@ def audit(demonstration: Demonstration) -> DemonstrationAudit:
         gaps=[[float(d.time[i]), float(step[i])] for i in np.flatnonzero(step > GAP * period)],
         path_m=path, turned_rad=turned, frames=sorted(d.meta.get("frames", {})), wrench=dict(d.meta.get("wrench", {})),
         bias=level.tolist(), noise=noise.quiet.tolist(), noise_typical=noise.typical.tolist(),
-        drift=None if drift is None else drift.tolist(), spikes=len(spike_indices(d.wrench[:, :3])),
+        drift=None if drift is None else drift.tolist(), spikes=len(broken_samples(d)),
         peak_force_n=float(norm(d.wrench[:, :3]).max()),
         contact_threshold_n=contact_strength(d.time, d.wrench, noise, level, live)[1],
         contacts=[list(contact) for contact in contacts], stalls=as_meta(found), onsets_unseen=unseen,

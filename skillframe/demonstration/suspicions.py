@@ -12,6 +12,7 @@ import numpy as np
 from skillframe.demonstration.checks import GAP
 from skillframe.demonstration.columns import WRENCH
 from skillframe.demonstration.contradiction import WORK_COSINE, Turning, weight_evidence, work_cosine
+from skillframe.demonstration.landings import Indices, landings
 from skillframe.demonstration.record import Demonstration
 from skillframe.demonstration.stalls import alive
 from skillframe.frames import Float, norm
@@ -138,8 +139,8 @@ def magnitudes(d: Demonstration) -> Iterator[str]:
 
 
 def spikes(d: Demonstration) -> Iterator[str]:
-    """Forces that stand out of their neighbours for one or two samples."""
-    found = spike_indices(d.wrench[:, :3])
+    """Forces that stand out of their neighbours for one or two samples, but for those of a tool that lands."""
+    found = broken_samples(d)
     if found.size:
         strength = norm(d.wrench[found, :3])
         worst = int(found[np.argmax(strength)])
@@ -147,16 +148,22 @@ def spikes(d: Demonstration) -> Iterator[str]:
         yield f"spikes: {count}, the largest {strength.max():.1f} N at t = {d.time[worst]:.3f} s"
 
 
-def spike_indices(force: Float) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-    """Samples of (T, 3) farther than 5 N and 12 robust sigmas from the median of the nine around them."""
+def broken_samples(d: Demonstration) -> Indices:
+    """Samples whose force stands out, and that no landing of the tool explains."""
+    found, sigma = spike_indices(d.wrench[:, :3])
+    return np.setdiff1d(found, landings(d, found, sigma))
+
+
+def spike_indices(force: Float) -> tuple[Indices, float]:
+    """Samples of (T, 3) over 5 N and 12 robust sigmas away from the median of nine around them, and that sigma."""
     if len(force) < SPIKE_WIDTH:
-        return np.empty(0, dtype=np.intp)
+        return np.empty(0, dtype=np.intp), 0.0
     half = SPIKE_WIDTH // 2
     padded = np.pad(force, ((half, half), (0, 0)), mode="edge")
     around = np.median(np.lib.stride_tricks.sliding_window_view(padded, SPIKE_WIDTH, axis=0), axis=-1)
     away = norm(force - around)
-    sigma = 1.4826 * np.median(away)
-    return np.flatnonzero(away > max(SPIKE_FORCE, SPIKE_SIGMAS * sigma))
+    sigma = 1.4826 * float(np.median(away))
+    return np.flatnonzero(away > max(SPIKE_FORCE, SPIKE_SIGMAS * sigma)), sigma
 
 
 def frame_and_sign(d: Demonstration) -> Iterator[str]:

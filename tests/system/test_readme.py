@@ -47,7 +47,6 @@ def test_the_readme_s_steps_can_be_typed_one_by_one(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.needs_plugins
-@pytest.mark.filterwarnings("default::skillframe.errors.SkillframeWarning")  # of a recording
 def test_the_readme_s_python_inserts_the_peg_and_is_about_ten_lines(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     exec(compile(PYTHON, "README.md", "exec"), {})
