@@ -17,7 +17,7 @@ from skillframe.control.admittance import AdmittanceLaw, Bounds
 from skillframe.control.controller import Reading
 from skillframe.control.endings import Broken
 from skillframe.control.inner_loop import InnerLoop
-from skillframe.control.joint_steps import JointSteps, JointRange
+from skillframe.control.joint_steps import JointRange, JointSteps
 from skillframe.control.motors import joint_limits
 from skillframe.execution.drives.torque import OneArm, TorqueDrive
 from skillframe.execution.setup import Setup
@@ -118,4 +118,5 @@ def _range(setup: Setup, plant: Plant) -> JointRange:
     if not limits:
         free = np.full(len(plant.dofs), np.inf)
         return JointRange(free, -free, free)
-    return JointRange(*(np.asarray(part)[plant.dofs] for part in (limits[0].velocity, limits[0].lower, limits[0].upper)))
+    whole = limits[0].velocity, limits[0].lower, limits[0].upper
+    return JointRange(*(np.asarray(part)[plant.dofs] for part in whole))

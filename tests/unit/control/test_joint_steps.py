@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from skillframe.control.joint_steps import LEASH_SLACK, POSTURE, JointSteps, JointRange
+from skillframe.control.joint_steps import LEASH_SLACK, POSTURE, JointRange, JointSteps
 
 DT = 2e-3
 FREE = JointRange(np.full(7, np.inf), np.full(7, -np.inf), np.full(7, np.inf))
