@@ -30,6 +30,7 @@ from skillframe.document.source import parse_source
 from skillframe.errors import InputError
 from skillframe.files import remove_temporary, sync_folder, write_whole
 from skillframe.files.documents import read_json
+from skillframe.robot.meshes import LARGEST_FILE, mesh_names, resolve_mesh
 from skillframe.robot.spec import robot_folder
 
 CAMPAIGN, SCENE = "campaign.toml", "scene.json"
@@ -136,7 +137,7 @@ def _copy_skills(spec: CampaignSpec, target: Path) -> tuple[str, ...]:
 
 
 def _copy_robot(spec: CampaignSpec, target: Path) -> str:
-    """Copy the robot's description. Meshes are for looks and stay behind."""
+    """Copy the robot's description, with the meshes by which collisions know its links."""
     given = spec.folder / spec.robot
     if given.is_dir() and (given / "robot.toml").is_file():
         given = given / "robot.toml"
@@ -158,9 +159,12 @@ def _copy_robot_file(source: Path, target: Path) -> str:
         if not isinstance(urdf, str) or not (source.parent / urdf).is_file():
             raise InputError(f"{source}: urdf", f"no such file: {urdf!r}", "it is relative to robot.toml")
         _copy_beside(source, place, urdf, "urdf")
+        _copy_meshes(source.parent / urdf, place / urdf, target / "robots")
         for fmu in {str(row.get("fmu")) for row in given.get("actuation", []) if isinstance(row, dict)}:
             if (source.parent / fmu).is_file():  # else a name in fmus/
                 _copy_beside(source, place, fmu, "fmu")
+    else:
+        _copy_meshes(source, place / source.name, target / "robots")
     return (place / source.name).relative_to(target).as_posix()
 
 
@@ -175,6 +179,20 @@ def _copy_beside(source: Path, place: Path, file: str, key: str) -> None:
         )
     inside.parent.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(source.parent / file, inside)
+
+
+def _copy_meshes(urdf: Path, copied: Path, robots: Path) -> None:
+    """Meshes of a URDF that are there and can be read, where their names find them again from the copied URDF."""
+    for uri in mesh_names(urdf):
+        file, (scheme, separator, rest) = resolve_mesh(uri, urdf), uri.partition("://")
+        if file is None or scheme == "file" or file.stat().st_size > LARGEST_FILE:
+            continue
+        inside = copied.parent / (rest if separator else uri)
+        if not inside.resolve().is_relative_to(robots.resolve()):
+            what = "lies outside the robot's folder, and a campaign's folder keeps all that it needs"
+            raise InputError(f"{urdf}: mesh {uri!r}", what, "put robot.toml, URDF and meshes into one folder")
+        inside.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(file, inside)
 
 
 def _all_fixed(spec: CampaignSpec, params: type) -> dict[str, Value]:

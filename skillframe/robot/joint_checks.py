@@ -27,7 +27,7 @@ def joint_warnings(robot: RobotModel) -> Iterator[Problem]:
     yield from _mimic(robot)
     yield from _resisting(robot)
     for uri, link in missing_meshes(robot.urdf).items():
-        text = f"mesh {uri!r} is not found; the robot works without it, its drawing and size do not know this shape"
+        text = f"mesh {uri!r} is not found; the robot works without it, its drawing, size and collisions do not know it"
         yield _warning(
             "missing_mesh", link, text, "put its package's parent folder into SKILLFRAME_PATH or ROS_PACKAGE_PATH"
         )

@@ -2,12 +2,14 @@
 
 `package://NAME/REST` and `model://NAME/REST` are looked for as NAME/REST under every folder of `SKILLFRAME_PATH` and
 `ROS_PACKAGE_PATH`, under `share` of every folder of `AMENT_PREFIX_PATH`, and every folder above the URDF; a folder that
-is itself called NAME counts as the package. Other names are relative to the URDF. Only STL and OBJ are measured.
+is itself called NAME counts as the package. Other names are relative to the URDF. Only STL and OBJ are
+measured, and no file beyond `LARGEST_FILE`.
 """
 
 from __future__ import annotations
 
 import os
+import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -17,6 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float
+
+LARGEST_FILE = 100_000_000  # bytes: two million triangles, read in seconds; a link needs no more than some thousand
 
 
 def resolve_mesh(uri: str, urdf: Path) -> Path | None:
@@ -32,6 +36,15 @@ def resolve_mesh(uri: str, urdf: Path) -> Path | None:
     else:
         return None
     return next((path for path in candidates if _is_file(path)), None)
+
+
+def mesh_names(urdf: Path) -> list[str]:
+    """What the meshes of a URDF are called, each once; none where it is no XML, which its reader says."""
+    try:
+        root = ET.parse(urdf).getroot()
+    except ET.ParseError:
+        return []
+    return sorted({mesh.get("filename", "") for mesh in root.iter("mesh")})
 
 
 def _is_file(path: Path) -> bool:
@@ -61,7 +74,7 @@ def mesh_vertices(path: Path) -> Float | None:
     readers = {".stl": _stl_vertices, ".obj": _obj_vertices}
     reader = readers.get(path.suffix.lower())
     try:
-        vertices = reader(path.read_bytes()) if reader else None
+        vertices = reader(path.read_bytes()) if reader and path.stat().st_size <= LARGEST_FILE else None
     except (OSError, ValueError):
         return None
     usable = vertices is not None and vertices.size > 0 and bool(np.isfinite(vertices).all())

@@ -25,7 +25,7 @@ def thinned(points: Float) -> Float:
     while len(spread) > MOST:
         cell *= 1.5
         spread = one_per_cell(fine, cell)
-    farthest = fine[np.unique(np.argmax(fine @ _directions().T, axis=0))]
+    farthest = fine[np.unique([np.argmax(fine @ way) for way in _directions()])]  # at once it would take a gigabyte
     return np.unique(np.concatenate([spread, farthest]), axis=0)
 
 

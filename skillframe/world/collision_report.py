@@ -9,6 +9,7 @@ from skillframe.robot.model import RobotModel
 from skillframe.robot.problems import Problem
 from skillframe.robot.surroundings import Obstacle
 from skillframe.world.collisions import AtHome, at_home
+from skillframe.world.link_shapes import odd_meshes
 from skillframe.world.parts import HOLDS, HOME, IGNORED, LOOP, NEIGHBOURS
 
 _ORDER = (NEIGHBOURS, LOOP, HOME, HOLDS, IGNORED)
@@ -47,9 +48,11 @@ def collision_values(robot: RobotModel) -> dict[str, Any]:
 
 
 def collision_problems(robot: RobotModel) -> Iterator[Problem]:
-    """Bodies that stand in each other at home, which no run could start from."""
+    """Meshes that count otherwise than they are drawn, and bodies that stand in each other at home."""
     if not robot.spec.collisions.enabled:
         return
+    for odd in odd_meshes(robot):
+        yield Problem(code=odd.code, severity="warning", where=odd.link, message=odd.message, fix=odd.fix)
     known = at_home(robot)
     for overlap, text in zip(known.overlaps, _touching(known), strict=True):
         one, two = (known.parts[i].key for i in overlap.pair)

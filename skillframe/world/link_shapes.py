@@ -9,23 +9,29 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
+from collections.abc import Callable, Iterator
 from functools import lru_cache
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from skillframe.frames import Float, Pose, cross, norm
 from skillframe.robot.bodies import mesh_scale
 from skillframe.robot.bodies import placement as origin_of
-from skillframe.robot.convexity import hull_of, is_convex
-from skillframe.robot.meshes import mesh_triangles, resolve_mesh
+from skillframe.robot.convexity import hull_of, is_convex, open_edges
+from skillframe.robot.meshes import LARGEST_FILE, mesh_triangles, resolve_mesh
 from skillframe.robot.model import RobotModel
+from skillframe.robot.thinning import FINE, MOST, thinned
 from skillframe.world.scene import Geom
 from skillframe.world.visuals import bones, placed_geom
 
-SPACING, MOST, MOST_PIECES = 0.005, 5000, 200
-"""Distance of points on a link's mesh [m], how many there are if they would be more, and parts of an edge."""
+SPACING, MOST_PIECES = 0.005, 200
+"""Distance of points on a link's mesh [m], and parts of an edge at most."""
+MANY = 20_000
+"""Triangles beyond which a mesh is thinned out."""
 
 
 class LinkShape(NamedTuple):
@@ -90,25 +96,106 @@ def _shape(robot: RobotModel, element: ET.Element, placement: pin.SE3) -> tuple[
         geom = placed_geom(element, placement, {})
         return None if geom is None or min(geom.size) <= 0.0 else (geom, None)
     file = resolve_mesh(mesh.get("filename", ""), robot.urdf.path)
-    corners = None if file is None else mesh_triangles(file)
-    if corners is None:
+    read = None if file is None else read_mesh(file)
+    if read is None:
         return None
     at = Pose(np.array(placement.translation), np.array(placement.rotation)).compose(origin_of(element))
-    placed = (corners * mesh_scale(mesh)) @ at.rotation.T + at.position
-    return _mesh(np.ascontiguousarray(placed).tobytes())
+    placed = np.ascontiguousarray((read.corners * mesh_scale(mesh)) @ at.rotation.T + at.position)
+    return _cloud(placed.tobytes()) if read.thinned else _mesh(placed.tobytes())
 
 
-@lru_cache(maxsize=256)  # a campaign asks for the same links in every chunk
+class ReadMesh(NamedTuple):
+    """A mesh of a file: corners of its triangles (T, 3, 3), or of very many some points (P, 3), and how many it has."""
+
+    corners: Float
+    triangles: int
+    thinned: bool
+
+
+def read_mesh(file: Path) -> ReadMesh | None:
+    """The mesh of a file, or None where it cannot be read."""
+    try:
+        about = file.stat()
+    except OSError:
+        return None
+    return _read(file, about.st_mtime_ns, about.st_size)
+
+
+@lru_cache(maxsize=64)
+def _read(file: Path, changed: int, size: int) -> ReadMesh | None:
+    corners = mesh_triangles(file)
+    if corners is None:
+        return None
+    many = len(corners) > MANY
+    return ReadMesh(thinned(corners.reshape(-1, 3)) if many else corners, len(corners), many)
+
+
+@lru_cache(maxsize=64)  # a campaign asks for the same links in every chunk
 def _mesh(content: bytes) -> tuple[Geom, Float | None] | None:
     """The hull of triangles (T, 3, 3), and points of the surface if that fills something, or None if it is flat."""
     triangles = np.frombuffer(content).reshape(-1, 3, 3)
     corners = triangles.reshape(-1, 3)
+    return _hulled(corners, np.arange(len(corners)).reshape(-1, 3), lambda: points_on(triangles))
+
+
+@lru_cache(maxsize=64)
+def _cloud(content: bytes) -> tuple[Geom, Float | None] | None:
+    """The same of some points (P, 3) of a mesh."""
+    points = np.frombuffer(content).reshape(-1, 3)
+    return _hulled(points, np.repeat(np.arange(len(points)), 3).reshape(-1, 3), lambda: points)
+
+
+def _hulled(corners: Float, faces: NDArray[np.int64], surface: Callable[[], Float]) -> tuple[Geom, Float | None] | None:
     hull = hull_of(corners)
     if hull is None:
         return None
-    faces = np.arange(len(corners)).reshape(-1, 3)
     geom = Geom(kind="mesh", vertices=hull.vertices, faces=hull.faces)
-    return geom, None if is_convex(corners, faces, hull) else points_on(triangles)
+    if is_convex(corners, faces, hull):
+        return geom, None
+    points = surface()
+    return geom, thinned(points) if len(points) > 2 * MOST else points
+
+
+class OddMesh(NamedTuple):
+    """A mesh that collisions know otherwise than it is drawn: whose, a fixed word, what is wrong, and the cure."""
+
+    link: str
+    code: str
+    message: str
+    fix: str
+
+
+def odd_meshes(robot: RobotModel) -> Iterator[OddMesh]:
+    """Meshes of links that are there and that collisions do not take as they are."""
+    for name, link in robot.urdf.links.items():
+        if not robot.model.existBodyName(name):
+            continue
+        placement = robot.model.frames[robot.model.getBodyId(name)].placement
+        for tag in ("collision", "visual"):
+            elements = link.findall(tag)
+            for element in elements:
+                yield from _odd(robot, name, element)
+            if any(_shape(robot, element, placement) is not None for element in elements):
+                break
+
+
+def _odd(robot: RobotModel, link: str, element: ET.Element) -> Iterator[OddMesh]:
+    mesh = element.find("geometry/mesh")
+    file = None if mesh is None else resolve_mesh(mesh.get("filename", ""), robot.urdf.path)
+    if file is None:  # a mesh that is not there is named by the audit
+        return
+    read, fix = read_mesh(file), "give the link a <collision> of boxes, cylinders or spheres, or of a coarse mesh"
+    if read is None:
+        text = f"mesh {file.name!r} cannot be read as STL or OBJ, or is larger than {LARGEST_FILE // 10**6} MB: "
+        yield OddMesh(link, "unread_mesh", text + "collisions take what else is drawn, or a capsule", fix)
+    elif read.thinned:
+        text = f"mesh {file.name!r} has {read.triangles} triangles: collisions take some thousand of its corners, "
+        yield OddMesh(link, "large_mesh", text + f"right to about 1/{FINE} of its size", fix)
+    elif hull_of(read.corners.reshape(-1, 3)) is None:
+        yield OddMesh(link, "flat_mesh", f"mesh {file.name!r} is flat: collisions do not know it", fix)
+    elif count := open_edges(read.corners.reshape(-1, 3), np.arange(3 * len(read.corners)).reshape(-1, 3)):
+        text = f"mesh {file.name!r} is not closed ({count} open edges): collisions know its surface, not its inside"
+        yield OddMesh(link, "open_mesh", text, fix)
 
 
 def points_on(triangles: Float) -> Float:
