@@ -23,6 +23,7 @@ from skillframe.robot.link_checks import (
     inertia_fix,
     missing_inertias,
     oversized_inertias,
+    tiny_masses,
     toy_masses,
 )
 from skillframe.robot.mass_matrix import ILL_CONDITIONED, SINGULAR, joint_of, smallest_pivots
@@ -65,6 +66,7 @@ def audit(robot: RobotSpec | RobotModel, total_kg: float | None = None) -> Audit
         *impossible_inertias(robot, given, bodies),
         *oversized_inertias(robot, given, bodies),
         *missing_inertias(robot, given, bodies),
+        *tiny_masses(robot, bodies),
         *toy_masses(robot, given),
         *joint_warnings(robot),
     ]

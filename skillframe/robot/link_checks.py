@@ -23,6 +23,7 @@ from skillframe.robot.problems import Problem, overlay_fix
 _ROUNDING = 1e-3  # relative: URDFs carry three to four digits, and flat plates meet the triangle inequality exactly
 _NEGLIGIBLE = 1e-15  # of the whole robot: exporters leave rounding such as 1e-18 kg m^2 on decorative links
 _GYRATION = 3.0  # contract: radius of gyration over size
+TINY = 1e-6  # mass of a body over that of all that moves; a finger's tip is 1e-4 of a large arm. Ours
 _SLENDER = 5.0  # length of a guessed cylinder over size, whose radius of gyration is 0.3 times its length
 
 
@@ -165,6 +166,21 @@ def missing_inertias(robot: RobotModel, given: Mapping[str, Given], bodies: list
         text = f"link {name!r} moves and has no {'mass' if name in given else 'inertia'}"
         fix = inertia_fix([name], given, bodies)
         yield Problem(code="no_inertia", severity="warning", where=name, message=text, fix=fix)
+
+
+def tiny_masses(robot: RobotModel, bodies: list[Body]) -> Iterator[Problem]:
+    """Moving bodies, links fixed to each other taken together, that weigh next to nothing beside the robot."""
+    masses = [(body, index) for body in bodies if (index := _joint_index(robot, body)) is not None]
+    whole = sum(max(float(robot.model.inertias[index].mass), 0.0) for _, index in masses)
+    fix = "fix its joint, or give it the mass of the real part, in the URDF or in robot.toml's [inertia]"
+    for body, index in masses:
+        mass = float(robot.model.inertias[index].mass)
+        if 0.0 < mass < TINY * whole:
+            text = (
+                f"body {_some(body.links)} weighs {mass:.1g} kg and the robot {whole:.3g} kg: a placeholder, which any "
+            )
+            text += "torque on its joint throws about"
+            yield Problem(code="tiny_mass", severity="warning", where=body.links[0], message=text, fix=fix)
 
 
 def toy_masses(robot: RobotModel, given: Mapping[str, Given]) -> Iterator[Problem]:

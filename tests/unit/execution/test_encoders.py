@@ -134,6 +134,23 @@ def test_two_arms_and_servos_read_encoders_too():
     assert norm(before - truth)[0] > 1e-5
 
 
+@pytest.mark.parametrize("name", ["panda", "panda_servo"])
+def test_what_is_read_follows_the_joints_tick_by_tick(name):
+    """A push on joint 7 turns it by many counts of 14 bits; what is read is never farther off than half a count."""
+    loop = begin(HoldSkill(), told(name, bits=14), {}, generators(1))
+    loop.prepare()
+    limb, count = loop.drive.limb, 2.0 * np.pi / 2**14
+    start = loop.plant.configuration[0, 6]
+    for _ in range(100):
+        bias = loop.plant.kinematics(limb.point).bias
+        limb.push(bias + np.array([0, 0, 0, 0, 0, 0, 1.0]), loop.active)
+        nominal = getattr(limb, "arm", limb).nominal
+        limb.kinematics(loop.active)
+        # and rounding of the count
+        assert np.abs(nominal.configuration - loop.plant.configuration).max() <= 0.5 * count * (1.0 + 1e-9)
+    assert abs(loop.plant.configuration[0, 6] - start) > 10.0 * count
+
+
 def test_commands_that_were_sent_before_the_start_arrive_first():
     delay = CommandDelay(np.array([2]), 1)
     delay.start(np.array([[5.0]]))

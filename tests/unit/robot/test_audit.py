@@ -215,6 +215,20 @@ def test_template_inertias_are_named_as_toys(save, urdf):
     assert codes(result) == {"toy_inertia", "toy_mass"}
 
 
+@pytest.mark.parametrize(("mass", "named"), [(1e-8, True), (0.9e-6, True), (2e-6, False), (0.0, False)])
+def test_a_body_that_weighs_next_to_nothing_is_named_and_counts_with_what_is_fixed_to_it(save, urdf, mass, named):
+    """The rest that moves weighs 1 kg. Fixed to a link of 0.1 kg, the same mass is part of a sound body."""
+    small = urdf.inertial(mass, 0.02)
+    parts = [
+        urdf.link("base"), urdf.link("arm", urdf.inertial(1.0, 0.3)), urdf.link("tip", small),
+        urdf.joint("j", "base", "arm"), urdf.joint("k", "arm", "tip", axis="0 1 0"),
+    ]  # fmt: skip
+    problems = [p for p in check(save(urdf.robot(*parts))).problems if p.code == "tiny_mass"]
+    assert [(p.where, p.severity) for p in problems] == [("tip", "warning")] * named
+    more = [urdf.link("pad", urdf.inertial(0.1, 0.05)), urdf.joint("f", "tip", "pad", "fixed", inside="")]
+    assert "tiny_mass" not in codes(check(save(urdf.robot(*parts, *more))))
+
+
 @pytest.mark.parametrize(
     ("joint", "code"),
     [
