@@ -118,6 +118,12 @@ static inline void chambers(const Model *m, const Motion *w, const double p[3], 
         for (int j = 0; j < 3; j++) c->jacobian[i][j] = gain * by[i][j];
         c->jacobian[i][i] += bulk.slope / volume[i] * net;
         c->drift[i] = gain * (drift[i] - area[i] * w->acceleration - net * area[i] * w->velocity / volume[i]);
+        Curve left = boiling_law(p[i], net);
+        if (left.y < 1.0) {
+            for (int j = 0; j < 3; j++) c->jacobian[i][j] *= left.y;
+            c->jacobian[i][i] += left.slope * c->rate[i];
+            c->rate[i] *= left.y, c->drift[i] *= left.y;
+        }
     }
     c->rate[S] = c->drift[S] = c->jacobian[S][A] = c->jacobian[S][B] = c->jacobian[S][S] = 0.0;
     if (v[PUMP_FLOW] > 0.0)

@@ -47,6 +47,7 @@ static inline double rosenbrock(const Model *m, const Chambers *begin, const Mot
     solve(w, n, u4);
     for (int i = 0; i < n; i++) {
         after[i] = y[i] + u4[i];
+        if (i != S && after[i] < VAPOUR - BOILING) after[i] = VAPOUR - BOILING;   /* what the step's error may overshoot */
         error = fmax(error, fabs(u4[i]));
     }
     for (int i = n; i < 3; i++) after[i] = p[i];

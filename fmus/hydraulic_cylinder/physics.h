@@ -8,8 +8,20 @@
 #define POLYTROPIC 1.4        /* entrained air is compressed without heat exchange */
 #define HOLE 0.0325           /* 0.67 sqrt(2 / (850 kg/m3)), flow through a sharp hole per area and sqrt(Pa) */
 #define LEAST_ABSOLUTE 100.0  /* Pa, keeps the air law finite when a chamber is torn empty */
+#define VAPOUR (-0.9e5)       /* Pa gauge, below which oil begins to boil, README eq. 4 */
+#define BOILING 0.1e5         /* Pa, and so much further down it bears no more */
 
 typedef struct { double y, slope; } Curve;
+
+/* Share of a falling pressure's rate that is left as the oil boils, README eq. 4; 1 while it does not. */
+static inline Curve boiling_law(double p, double net)
+{
+    Curve c = {1.0, 0.0};
+    if (p >= VAPOUR || net >= 0.0) return c;
+    c.y = 1.0 + (p - VAPOUR) / BOILING, c.slope = 1.0 / BOILING;
+    if (c.y < 0.0) c.y = c.slope = 0.0;
+    return c;
+}
 
 /* Edge flow per sqrt-conductance, dp / (dp^2 + transition^2)^(1/4), README eq. 3. */
 static inline Curve edge_law(double dp, double transition)

@@ -21,6 +21,8 @@ AMBIENT = 101325.0
 POLYTROPIC = 1.4
 LEAST_ABSOLUTE = 100.0
 HOLE = 0.0325  # 0.67 sqrt(2 / (850 kg/m^3)), flow through a sharp hole per area and sqrt(Pa)
+VAPOUR, BOILING = -0.9e5, 0.1e5
+FLOOR = VAPOUR - BOILING
 STATES = ("spool", "spool_velocity", "pressure_a", "pressure_b", "pressure_supply", "deflection")
 
 
@@ -124,6 +126,12 @@ def burst_flow(p: SimpleNamespace, area: Float | float, pressure: Float) -> Floa
     return result
 
 
+def boiling(pressure: Float, net: Float) -> Float:
+    """Eq. 4: share of a falling pressure's rate that is left as the oil boils; 1 while it does not."""
+    result: Float = where(net < 0.0, clip(1.0 + (pressure - VAPOUR) / BOILING, 0.0, 1.0), 1.0)
+    return result
+
+
 def sliding_deflection(p: SimpleNamespace, velocity: Float) -> Float:
     """Eq. 8: deflection of the seals in steady sliding [m], longer near standstill where break-away exceeds Coulomb."""
     if not p.has_stribeck:
@@ -167,7 +175,8 @@ def pressure_rates(p: SimpleNamespace, y: Float, motion: PistonMotion) -> Float:
     net_b = flows.b + port_flow(p, pb) + p.area_b * motion.velocity + leak + burst_flow(p, motion.burst_b, pb)
     volume_a = p.dead_volume_a + p.area_a * motion.position
     volume_b = p.dead_volume_b + p.area_b * (p.stroke - motion.position)
-    rate_a, rate_b = bulk_modulus(pa, p) / volume_a * net_a, bulk_modulus(pb, p) / volume_b * net_b
+    rate_a = bulk_modulus(pa, p) / volume_a * net_a * boiling(pa, net_a)
+    rate_b = bulk_modulus(pb, p) / volume_b * net_b * boiling(pb, net_b)
     rate_s: Float | float = 0.0
     if p.has_pump:
         pump = minimum(p.pump_slope * (p.supply_pressure - ps), p.pump_flow)

@@ -80,7 +80,9 @@ def substep(p: SimpleNamespace, stage: Vector, memory: Vector, given: Vector) ->
     k3 = eq.rates(p, y + 0.5 * h * k2, middle)
     k4 = eq.rates(p, y + h * k3, there)
     z, integral, work = _slide(p, y[5], here.velocity, a, h)
-    after = stack([*_rows(y + h / 6.0 * (k1 + 2 * k2 + 2 * k3 + k4), 5), z])
+    moved = y + h / 6.0 * (k1 + 2 * k2 + 2 * k3 + k4)
+    chambers = [where(moved[i] < eq.FLOOR, eq.FLOOR, moved[i]) for i in (2, 3)]  # what a step's error may overshoot
+    after = stack([moved[0], moved[1], *chambers, moved[4], z])
     rates = eq.rates(p, after, there)
     push = _push(p, after, rates, there, a)
     more = [
@@ -88,8 +90,8 @@ def substep(p: SimpleNamespace, stage: Vector, memory: Vector, given: Vector) ->
         for j, seals in ((0, integral), (1, work))
     ]
     totals = [stage[16] + more[0], stage[17] + more[1]]
-    moved = stack([*_rows(after), *_rows(rates), *push, *totals, stage[18], stage[19], turn + 1.0])
-    return where(turn < stage[19], moved, stage)
+    next_one = stack([*_rows(after), *_rows(rates), *push, *totals, stage[18], stage[19], turn + 1.0])
+    return where(turn < stage[19], next_one, stage)
 
 
 def finish(p: SimpleNamespace, stage: Vector, memory: Vector, given: Vector) -> Vector:
@@ -128,6 +130,8 @@ def _count(p: SimpleNamespace, y: Vector, motion: eq.PistonMotion, rates: Vector
     slope = slope + eq.HOLE * maximum(motion.burst_a, motion.burst_b) / sqrt(p.laminar_pressure)
     volume_a = p.dead_volume_a + p.area_a * motion.position
     volume_b = p.dead_volume_b + p.area_b * (p.stroke - motion.position)
+    drawn = p.area_a * absolute(motion.velocity) + p.leakage * absolute(pa - pb)  # m3/s that may make a chamber boil
+    slope = slope + where(minimum(pa - soon_a, pb - soon_b) < eq.VAPOUR, drawn / eq.BOILING, 0.0)
     rate = p.bulk_modulus / minimum(volume_a, volume_b) * slope
     line = p.bulk_modulus / p.supply_volume * (p.pump_slope + p.edge / sqrt(p.laminar_pressure))
     rate = rate + where(p.pump_flow > 0, line, 0.0)
