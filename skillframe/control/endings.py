@@ -26,6 +26,8 @@ class Ended(StrEnum):
     DIVERGED = "diverged"
     COMMAND = "command"  # what the skill handed back is no command
     MACHINE = "machine"  # its FMUs, their coupling, its swing
+    SENSOR = "sensor"  # of a machine: its readings cannot be
+    WATCHDOG = "watchdog"  # a machine that does not do what it is told
     INTERRUPTED = "interrupted"
     LOST = "lost"  # the process that ran it left no outcome
 

@@ -16,7 +16,7 @@ from skillframe.robot.driven import MachineNoise
 from skillframe.signals.rates import RateFilter
 
 BLOCK = 100
-RECENT = 10
+RECENT = 20
 
 
 class MachineSensors:
@@ -36,13 +36,14 @@ class MachineSensors:
         self._noise: Float = np.zeros((BLOCK, len(self._rngs), n + 2 * k))
         self._next = BLOCK
         self.fault: Callable[[Float], Float] | None = None
-        self.raw: Float = np.zeros((RECENT, len(self._rngs), n + 2 * k))
-        """The last `RECENT` readings before the filters, (N, n + 2k) each; what is read next goes to row `turn`."""
+        self.raw: Float = np.zeros((RECENT + 1, len(self._rngs), n + 2 * k))
+        """The last `RECENT` + 1 readings before the filters, (N, n + 2k) each; what is read next goes to row `turn`."""
         self.turn = 0
 
     def start(self, z: Float, pressure_a: Float, pressure_b: Float) -> None:
         """Stand still at true values."""
         self._filter.start(np.concatenate([z, pressure_a, pressure_b], axis=-1))
+        self.raw[:] = self._filter.value
 
     def sample(self, z: Float, pressure_a: Float, pressure_b: Float) -> None:
         """Take in true values (N, n), (N, k) and (N, k)."""
@@ -58,7 +59,7 @@ class MachineSensors:
             raw = self.fault(raw)
         self._filter.step(raw)
         self.raw[self.turn] = raw
-        self.turn = (self.turn + 1) % RECENT
+        self.turn = (self.turn + 1) % len(self.raw)
 
     @property
     def z(self) -> Float:
@@ -77,7 +78,12 @@ class MachineSensors:
         return self._filter.rate[:, : self._n]
 
     @property
+    def chambers(self) -> Float:
+        """Of all chambers a, then all chambers b, (N, 2k) [Pa]."""
+        return self._filter.value[:, self._n :]
+
+    @property
     def pressures(self) -> tuple[Float, Float]:
         """Of both chambers, (N, k) each [Pa]."""
-        value = self._filter.value[:, self._n :]
+        value = self.chambers
         return value[:, : self._k], value[:, self._k :]

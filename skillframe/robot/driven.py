@@ -86,11 +86,13 @@ class MachineNoise:
         encoder: of each minimal coordinate [rad or m], a step over the square root of 12 if steps are all its noise.
         pressure: of each chamber [Pa].
         corner_hz: of the filters [Hz].
+        watch: whether readings, oil and motion that do not fit each other end a trial (`skillframe.machine.watch`).
     """
 
     encoder: float = 1e-4
     pressure: float = 0.22e5
     corner_hz: float = 24.0
+    watch: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,7 +11,7 @@ the tool follows from its joints and is not commanded.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,7 +21,7 @@ from skillframe.control.limits import LimitGuard
 from skillframe.errors import InputError
 from skillframe.execution.drive import Shares, Trials
 from skillframe.execution.drives.actuated import Actuated
-from skillframe.execution.drives.machine_faults import BrokenParts
+from skillframe.execution.drives.machine_faults import BrokenParts, moved_joints
 from skillframe.execution.drives.machine_reference import LEAST_DAMPING, plane_reference
 from skillframe.execution.drives.machine_start import closed_configurations, holding_force
 from skillframe.execution.drives.recording import WithColumns
@@ -47,8 +47,9 @@ from skillframe.machine.force.valve import ValveIdentification, ValveSettings
 from skillframe.machine.law.gains import law_gains
 from skillframe.machine.law.hydraulic import Demand, Measured, Reference, plane_task
 from skillframe.machine.law.hydraulic_compiled import CompiledLaw
-from skillframe.machine.law.vdc_actuator import cylinders
+from skillframe.machine.law.vdc_actuator import Cylinders, cylinders
 from skillframe.machine.sensors import MachineSensors
+from skillframe.machine.watch.watch import MachineWatch
 from skillframe.robot.chain import ClosedChain
 from skillframe.robot.driven import fast_filters
 from skillframe.signals.delay import CommandDelay
@@ -112,11 +113,16 @@ class MachineDrive:
         late = np.asarray(draws.get("actuator.delay", np.zeros(self.count)))
         self._delay = CommandDelay(np.round(late / self.dt).astype(np.int64), len(known.area_a))
         self.sigma = StatedSigma(self.count, self.dt)
+        self.watch = self._watch(known) if spec.sensors.watch else None
         self.findings: list[list[str]] = [[] for _ in rngs]
         meant = [a.unused for a in spec.actuation if a.fmu != CYLINDER]
         rows = unmapped(foreign_specs(spec), meant, spec.folder)
         self._unmapped = [text for row in rows for text in row._replace(outputs=()).sentences]
         self._begin(draws)
+
+    def _watch(self, known: Cylinders) -> MachineWatch:
+        noise = self.setup.robot.spec.sensors
+        return MachineWatch(self.law, known, self.gauges, noise, moved_joints(self.chain), self.dt)
 
     def _begin(self, draws: Draws) -> None:
         """FMUs in equilibrium with the load, the step judged against it, sensors and law at rest."""
@@ -185,7 +191,7 @@ class MachineDrive:
                     np.zeros_like(self.joint) + joint_rate,
                 )
             )  # fmt: skip
-            if failed := self.advance(self.active):
+            if failed := [*self._suspect(tick, ringing), *self.advance(self.active)]:
                 broken += failed
                 self._leave(failed)
             ringing.step(self.terms.tip_rate, velocity)
@@ -210,6 +216,13 @@ class MachineDrive:
         """The trials that rang in the swing: nothing was identified, and nothing should be touched."""
         said = swung.sentences(self.law)
         return [Broken(int(i), Ended.MACHINE, said[i]) for i in self.active if said[i]]
+
+    def _suspect(self, tick: int, swung: Ringing) -> list[Broken]:
+        """Trials that the watch ends in the swing. Of one that rings, once that can be told, ringing is the cause."""
+        broken = self._watched(swing=True)
+        rings = {one.row: one for one in self._ringing(swung)} if broken and tick * self.dt > 0.5 * SWING_S else {}
+        when = f"(in the swing, {SWING_S - tick * self.dt:.3f} s before the start)"
+        return [rings.get(one.row, one._replace(cause=f"{one.cause} {when}")) for one in broken]
 
     def _look_at_valves(self, tick: int) -> None:
         """Identify them, and let the law go by what is known so far: what it learns of inertias depends on it."""
@@ -241,7 +254,17 @@ class MachineDrive:
 
     def _valve(self, reference: Reference) -> None:
         measured = self._seen._replace(z=self.gauges.now, force=self.estimate.answered, sigma=self.estimate.sigma)
+        self._wanted = reference
         self.demand = self.law.step(measured, reference, self.active)
+
+    def _watched(self, *, swing: bool = False, alarms: Collection[int] = ()) -> list[Broken]:
+        """Trials whose readings, oil and motion do not fit each other; where the coupling is to blame, for that."""
+        if self.watch is None:
+            return []
+        seen, valve = self._seen._replace(force=self.estimate.answered), self.demand.valve
+        found = self.watch.look(seen, self.terms, self._wanted, valve, self.active, swing=swing, alarms=alarms)
+        coupled = {one.row: one for one in self.actuated.violations(0, self.active)} if found else {}
+        return [coupled.get(one.row, one) for one in found]
 
     def sense(self, tick: int, active: Trials) -> Observation:
         """Pose and twist as the encoders say, wrench as the pressures say."""
@@ -261,7 +284,7 @@ class MachineDrive:
         """The robot's limits, held to the estimate, and the energy that the coupling makes."""
         seen = self._seen_tool
         broken = self.guard.violations(seen.pose.position, seen.twist, seen.wrench, self._wrench, active)
-        return [*broken, *self.actuated.violations(tick, active)]
+        return [*self._watched(alarms=[one.row for one in broken]), *broken, *self.actuated.violations(tick, active)]
 
     def _observe(self, time: float) -> Observation:
         """Pose and twist as the encoders say, wrench as the pressures say."""

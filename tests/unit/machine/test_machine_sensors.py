@@ -2,10 +2,27 @@
 
 import numpy as np
 
-from skillframe.machine.sensors import MachineSensors
+from skillframe.machine.sensors import RECENT, MachineSensors
 from skillframe.robot.driven import MachineNoise
 
 DT = 1e-3
+
+
+def test_every_jump_between_two_readings_is_among_the_latest_whenever_one_looks():
+    """A look every `RECENT` readings: the last of one and the first of the next stand side by side in some look."""
+    gauges, still = (
+        MachineSensors(MachineNoise(encoder=0.0, pressure=0.0), [np.random.default_rng(0)], 1, 1, DT),
+        np.zeros((1, 1)),
+    )
+    gauges.start(still, still, still)
+    for jump in range(3 * RECENT):
+        seen = []
+        for k in range(3 * RECENT):
+            gauges.sample(np.full((1, 1), float(k >= jump)), still, still)
+            if k % RECENT == RECENT - 1:
+                latest = np.roll(gauges.raw, -gauges.turn, axis=0)
+                seen.append(np.abs(np.diff(latest[:, 0, 0])).max())
+        assert max(seen) == 1.0
 
 
 def test_a_machine_that_moves_steadily_is_known_to_be_where_it_is_and_not_where_it_was():
