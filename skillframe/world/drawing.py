@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from skillframe.frames import Float
 from skillframe.robot.convexity import hull_of
 from skillframe.world.convert import BASE, FIXTURE, SPRUNG, TOOL
+from skillframe.world.parts import obstacle_geoms
 from skillframe.world.plant import Plant
 from skillframe.world.scene import Geom
 from skillframe.world.visuals import link_geoms
@@ -20,7 +21,8 @@ def drawn_bodies(plant: Plant) -> list[dict[str, Any]]:
     """Name and geoms of every body of the plant but the world, in the order of `Plant.body_poses`."""
     scene = plant.scene
     links = link_geoms(plant.robot)
-    known = {**links, BASE: links[plant.robot.model.names[0]], FIXTURE: scene.fixture, TOOL: scene.tool.geoms}
+    still = (*links[plant.robot.model.names[0]], *obstacle_geoms(plant.robot).values())
+    known = {**links, BASE: still, FIXTURE: scene.fixture, TOOL: scene.tool.geoms}
     known.update({SPRUNG + part.name: part.geoms for part in scene.sprung})
     bodies = []
     for body in range(1, plant.model.nbody):

@@ -217,6 +217,8 @@ def test_the_tool_that_comes_down_on_a_table_ends_the_trial_with_both_names():
     assert result.failure[0].startswith("the tool is ")
     assert "inside the obstacle 'table' (at 0." in result.failure[0]
     assert result.traces[0].meta["touched"] == ["the tool", "the obstacle 'table'"]
+    drawn = next(body for body in result.traces[0].meta["bodies"] if body["name"] == "robot_base")
+    assert [0.2, 0.2, 0.05] in [geom["size"] for geom in drawn["geoms"]]
 
 
 def test_bodies_that_touch_push_on_nothing_and_change_no_bit():
@@ -270,6 +272,7 @@ def test_show_lists_pairs_that_are_not_looked_at_and_obstacles(robot, tmp_path):
     assert "obstacle 'table': box of 0.2 x 0.2 x 0.2 m at (0.6, 0.2, 0) m" in text
     values = collision_values(robot("panda"))
     assert values["not_looked_at"]["touch at home"] == [["link5", "link7"]]
+    assert values["not_looked_at"]["holds it"] == [["link6", "flange"], ["link7", "flange"]]
     off = chain(tmp_path, more="[collisions]\nenabled = false\n")
     assert "not looked at" in collision_lines(off)[-1]
     assert collision_values(off)["enabled"] is False
