@@ -94,7 +94,8 @@ def check(robot: str, total_kg: float | None, kind: str | None, as_json: bool) -
             click.echo(json.dumps(_not_loaded(robot, str(error)), indent=2))
         raise
     if as_json:
-        click.echo(json.dumps({**_plain(result), "interface": spec.control.figures()}, indent=2))
+        own = {} if spec.control.interface == "torque" else {"interface": spec.control.figures()}
+        click.echo(json.dumps({**_plain(result), **own}, indent=2))
     else:
         _print_audit(robot, result, spec)
     return 0 if result.usable else 1

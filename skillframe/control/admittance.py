@@ -82,12 +82,9 @@ class AdmittanceLaw:
 
     def _cut(self, drive: Float) -> Float:
         """Force and torque held to the push, each in its direction."""
-        result = drive.copy()
-        for part, most in zip((slice(0, 3), slice(3, 6)), self._bounds.push, strict=True):
-            size = norm(drive[:, part])
-            over = size > most
-            if np.count_nonzero(over):
-                result[over, part] *= (most / size[over])[:, None]
+        halves = drive.reshape(-1, 2, 3)
+        share = norm(halves) / self._bounds.push
+        result: Float = (halves / np.maximum(share, 1.0)[..., None]).reshape(-1, 6)
         return result
 
     def _design(self, impedance: Impedance) -> None:

@@ -82,9 +82,9 @@ class JointSteps:
         if np.count_nonzero(stuck):
             speed = self._around(jacobian, twist, spare, command, speed, stuck)
         ahead = command - measured
-        late = ((np.abs(ahead) > self._leash) & (ahead * speed > 0.0)).any(-1)
-        if np.count_nonzero(late):
-            speed[late] = 0.0
+        far = np.abs(ahead) > self._leash
+        if np.count_nonzero(far):
+            speed[(far & (ahead * speed > 0.0)).any(-1)] = 0.0
         return speed, (jacobian @ speed[..., None])[..., 0]
 
     def _inverted(self, scaled: Float) -> Float:
@@ -103,8 +103,9 @@ class JointSteps:
     def _at_end(self, command: Float, speed: Float) -> NDArray[np.bool_]:
         """(N, n) joints that a step would carry over the end of their range."""
         ahead = command + self._dt * speed
-        over: NDArray[np.bool_] = (ahead > self._limits.upper) & (speed > 0.0)
-        return over | ((ahead < self._limits.lower) & (speed < 0.0))
+        over, under = ahead > self._limits.upper, ahead < self._limits.lower
+        result: NDArray[np.bool_] = over | under
+        return (over & (speed > 0.0)) | (under & (speed < 0.0)) if np.count_nonzero(result) else result
 
     def _around(
         self, jacobian: Float, twist: Float, spare: Float, command: Float, speed: Float, stuck: NDArray[np.bool_]

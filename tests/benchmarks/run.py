@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from skillframe.world.sensors import SensorSettings  # noqa: E402
-from tests.benchmarks import crane, segmenter  # noqa: E402
+from tests.benchmarks import crane, interfaces, segmenter  # noqa: E402
 from tests.benchmarks.timing import Recorded, one_trial_loop, replay, timed_run  # noqa: E402
 from tests.laws.pushing import Push, impedance  # noqa: E402
 from tests.laws.runs import setup  # noqa: E402
@@ -223,6 +223,7 @@ def main():
     single("arm in the valley", 6.0)
     single("arm with the peg", 4.0)
     two_arms()
+    interfaces.ratios(show)
     crane.rows(show)
     segmenter.measure(show)
     memory()

@@ -21,7 +21,7 @@ from skillframe.control.joint_steps import JointRange, JointSteps
 from skillframe.control.motors import joint_limits
 from skillframe.execution.drives.torque import OneArm, TorqueDrive
 from skillframe.execution.setup import Setup
-from skillframe.frames import Float, Pose, norm, rotation_matrix
+from skillframe.frames import Float, Pose, norm, skew
 from skillframe.skill import Command
 from skillframe.world.plant import Draws, Kinematics, Plant
 
@@ -84,7 +84,8 @@ class AdmittanceDrive(TorqueDrive):
         measured = self.limb.joint_positions().take(dofs, axis=1)  # in C order, or rounding would depend on N
         joints, jacobian = self._joints.take(dofs, axis=1), self._reading.jacobian.take(dofs, axis=-1)
         paced = command._replace(twist=command.twist / self._pace)
-        self._law = law.step(paced, moved(self._pose, jacobian, joints - measured), self._wrench, ramp)
+        pose = moved(self._tool.at(self.limb.point), jacobian, joints - measured)
+        self._law = law.step(paced, pose, self._wrench, ramp)
         speed, law.twist = self._steps.velocities(law.twist, jacobian, joints, measured)
         self._joints = self._joints.copy()
         self._joints[:, dofs] = joints + self._dt_command * speed
@@ -95,7 +96,7 @@ class AdmittanceDrive(TorqueDrive):
             self._sent[:, dofs] = speed
 
     def _read(self, kinematics: Kinematics, measured: Pose) -> Reading:
-        self._pose = kinematics.pose.at(self.limb.point)
+        self._tool = kinematics.pose
         return super()._read(kinematics, measured)
 
     def _drive(self) -> None:
@@ -107,9 +108,11 @@ class AdmittanceDrive(TorqueDrive):
 
 
 def moved(pose: Pose, jacobian: Float, step: Float) -> Pose:
-    """A pose after small steps (N, n) of the joints, to first order: a lag of 1 mrad bends it by less than 1 um."""
+    """A pose after small steps (N, n) of the joints, by their Jacobian: a lag of 1 mrad bends it by less than 1 um."""
     way = (jacobian @ step[..., None])[..., 0]
-    return Pose(pose.position + way[:, :3], rotation_matrix(way[:, 3:]) @ pose.rotation)
+    turn = skew(way[:, 3:])  # 1 + K + K^2 / 2: exact to 1e-10 for milliradians
+    rotation = pose.rotation + turn @ (pose.rotation + 0.5 * (turn @ pose.rotation))
+    return Pose(pose.position + way[:, :3], rotation)
 
 
 def _range(setup: Setup, plant: Plant) -> JointRange:
