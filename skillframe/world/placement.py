@@ -56,6 +56,9 @@ def _lacking(key: str, robot: RobotModel) -> str:
     if robot.spec.servo:
         lacking = key == "robot.nominal_payload" or (key in _ACTUATOR and key != "actuator.friction_scale")
         return "is driven by servos, which have no such quantity" if lacking else ""
+    number = key.rpartition("_")[2]
+    if key in _ACTUATOR and number.isdigit() and int(number) > len(robot.spec.actuation):
+        return f"has {len(robot.spec.actuation)} cylinders"
     if key.startswith("sensor.") and key not in _FAULTS:
         return "has no wrench sensor: its contact force is estimated from pressures"
     return "moves in a plane, and does not turn its tool to a start" if key.startswith("start.tilt_") else ""

@@ -69,6 +69,29 @@ FAULTS = (
            Range(0.0, 1.0, "a share")),
 )  # fmt: skip
 """Faults of a hydraulic machine: what breaks at `fault.time`, at the cylinder `fault.cylinder`."""
+_SCALED = {
+    "friction_scale": (
+        "true friction of a machine's cylinders over what its controller knows",
+        Range(0.0, 100.0, "as no guess of it is a hundredfold off"),
+    ),
+    "valve_scale": (
+        "true rated flow of a hydraulic machine's valves over what its controller knows",
+        Range(0.01, 100.0, "as no data sheet is a hundredfold off"),
+    ),
+    "bulk_scale": (
+        "true bulk modulus of a hydraulic machine's oil over what its controller knows",
+        Range(0.01, 100.0, "as no oil is a hundredfold off"),
+    ),
+}
+CYLINDERS = 3
+"""Of a machine in a plane at most; each has factors of its own."""
+_CYLINDERS = [
+    Varied(
+        f"actuator.{name}_{i}", "", 1.0, f"{about}: of cylinder {i} in robot.toml alone, besides actuator.{name}", limits
+    )
+    for name, (about, limits) in _SCALED.items()
+    for i in range(1, CYLINDERS + 1)
+]
 _LOAD = Range(0.0, 20_000.0, "what the largest machines lift")
 VARIED = (
     *_POSES,
@@ -88,8 +111,8 @@ VARIED = (
            Range(1e5, 1e8, "from the air's own pressure to twice what pumps of cranes give")),
     Varied("actuator.deadband", "", None, "dead band of a hydraulic machine's valves, of their full stroke",
            Range(0.0, 1.0, "a share of the stroke")),
-    Varied("actuator.friction_scale", "", 1.0, "true friction of a machine's cylinders over what its controller knows",
-           Range(0.0, 100.0, "as no guess of it is a hundredfold off")),
+    *(Varied(f"actuator.{name}", "", 1.0, about, limits) for name, (about, limits) in _SCALED.items()),
+    *_CYLINDERS,
     Varied("actuator.delay", "s", 0.0, "delay between command and valve of a hydraulic machine",
            Range(0.0, LONGEST_DELAY, "as buses and valves take milliseconds")),
     *FAULTS,

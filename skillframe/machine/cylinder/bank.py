@@ -68,23 +68,35 @@ def instance_parameters(spec: RobotSpec, draws: Mapping[str, Float], hold: Float
     """Parameters of every instance, trial by trial: `actuator.*` draws, and equilibrium with holding forces (N, k)."""
     result = []
     for trial, forces in enumerate(hold):
-        for actuation, force in zip(spec.actuation, forces, strict=True):
+        for number, (actuation, force) in enumerate(zip(spec.actuation, forces, strict=True), 1):
             held = actuation.initial_force or ("initial_force" if actuation.fmu == CYLINDER else "")
-            result.append(_drawn(completed(actuation), draws, trial) | ({held: float(force)} if held else {}))
+            own = _drawn(completed(actuation), draws, trial, number)
+            result.append(own | ({held: float(force)} if held else {}))
     return result
 
 
-def _drawn(parameters: Mapping[str, Any], draws: Mapping[str, Float], trial: int) -> dict[str, float]:
+_SCALED = {
+    "friction_scale": ("coulomb_friction", "viscous_friction", "static_friction"),
+    "valve_scale": ("rated_flow",),
+    "bulk_scale": ("bulk_modulus",),
+}
+"""Parameters that a factor `actuator.*` scales: of all cylinders, or, with its number in robot.toml, of one."""
+
+
+def _drawn(parameters: Mapping[str, Any], draws: Mapping[str, Float], trial: int, number: int) -> dict[str, float]:
     changed = {
         name: float(np.asarray(draws[f"actuator.{name}"])[trial])
         for name in ("supply_pressure", "deadband")
         if f"actuator.{name}" in draws
     }
-    if "actuator.friction_scale" in draws:
-        scale = float(np.asarray(draws["actuator.friction_scale"])[trial])
-        frictions = [n for n in ("coulomb_friction", "viscous_friction", "static_friction") if n in parameters]
-        if not frictions:
-            text = "no actuator parameter is called coulomb_friction, viscous_friction or static_friction"
-            raise InputError("actuator.friction_scale", text, "vary something that the FMU has under that name")
-        changed |= {name: scale * float(parameters[name]) for name in frictions}
+    for factor, names in _SCALED.items():
+        keys = [key for key in (f"actuator.{factor}", f"actuator.{factor}_{number}") if key in draws]
+        own = [name for name in names if name in parameters]
+        if keys and not own:
+            called = " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+            text = f"no actuator parameter is called {called}"
+            raise InputError(keys[0], text, "vary something that the FMU has under that name")
+        if keys:
+            scale = float(np.prod([np.asarray(draws[key])[trial] for key in keys]))
+            changed |= {name: scale * float(parameters[name]) for name in own}
     return changed
