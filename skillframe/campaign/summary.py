@@ -21,6 +21,8 @@ from skillframe.execution.scores import about
 from skillframe.execution.tracemeta import SHARES
 from skillframe.files import write_whole
 from skillframe.files.documents import read_json
+from skillframe.robot.guesses import guess_note
+from skillframe.robot.spec import load_robot
 
 SUMMARY = "summary.json"
 PEAKS = ("peak_force_n", "peak_force_10ms_n", "peak_force_filtered_n", *SHARES)
@@ -132,6 +134,7 @@ def summarize(
     opened = [session for session in sessions if "environment" in session]
     last = opened[-1] if opened else {}
     figures = rates(spec, rows, complete)
+    guess = _guessed(spec, rows)
     return {
         "format": FORMAT,
         "version": VERSION,
@@ -146,6 +149,7 @@ def summarize(
         **_verdict(spec, figures, complete),
         "comparisons": comparisons(spec, rows, complete),
         **({"scores": scores(spec, rows, complete)} if spec.scores else {}),
+        **({"guessed_masses": guess} if guess else {}),
         "wall_s": sum(s.get("wall_s", 0.0) for s in sessions),
         "workers": last.get("workers"),
         "versions": last.get("environment", {}),
@@ -161,6 +165,12 @@ def _verdict(spec: CampaignSpec, figures: Mapping[str, Mapping[str, Any]], compl
     label = spec.expect.skill or spec.labels[0]
     word, why = judged(spec.expect.rate, figures[label], complete=complete)
     return {"verdict": {"skill": label, "required_rate": spec.expect.rate, "verdict": word, "why": why}}
+
+
+def _guessed(spec: CampaignSpec, rows: Sequence[Row]) -> str:
+    """What to say of the robot's guessed masses where a trial failed, else ""."""
+    failed = any(not row["success"] for row in rows)
+    return guess_note(load_robot(str(spec.folder / spec.robot))) if failed else ""
 
 
 def write_summary(folder: Path, summary: Mapping[str, Any]) -> None:

@@ -21,7 +21,6 @@ def conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any], as_json:
     """Tell the outcome of a campaign that has ended. Returns its exit code."""
     from skillframe.campaign.folder import robot_notes
     from skillframe.campaign.summary import below_bar
-    from skillframe.robot.guesses import guess_note
     from skillframe.robot.model import load_model
     from skillframe.robot.resistance import resistance_note
     from skillframe.robot.spec import load_robot
@@ -35,7 +34,7 @@ def conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any], as_json:
         note(f"note: {text}")
     failed = any(skill["failures"] for skill in summary["skills"].values())
     robot = load_model(load_robot(str(spec.folder / spec.robot))) if failed else None
-    doubts = [] if robot is None else [guess_note(robot.spec), resistance_note(robot)]
+    doubts = [] if robot is None else [summary.get("guessed_masses"), resistance_note(robot)]
     for text in filter(None, [*doubts, *robot_notes(folder)]):
         note(f"note: {text}")
     short = below_bar(spec, summary)

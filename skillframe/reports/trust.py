@@ -38,6 +38,7 @@ def trust_section(chapter: Chapter) -> Markup:
             _map(chapter, results),
             _comparison(results),
             _failures(results, chapter.folder),
+            note(guessed) if (guessed := str(chapter.summary.get("guessed_masses", ""))) else "",
             _forces(chapter, results),
             motors_table(chapter, results),
             scores_table(chapter, results),

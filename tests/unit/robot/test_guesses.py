@@ -1,5 +1,6 @@
 """Masses that nobody gave: per link, near those of real arms, and named where a run fails with them."""
 
+import json
 import re
 import tomllib
 
@@ -325,3 +326,10 @@ def test_a_run_and_a_campaign_that_fail_name_the_guessed_masses(tmp_path, capsys
     told = capsys.readouterr()
     assert ("note: my_panda runs on guessed masses" in told.err) == guessed
     assert "2 x link 'link4' is inside the fixture" in told.out
+    summary = json.loads((tmp_path / "c" / "summary.json").read_text())
+    assert ("link5, link6, 2.9 kg together" in summary.get("guessed_masses", "")) == guessed
+    assert run(["report", str(tmp_path / "c"), "--out", str(tmp_path / "c.html")]) == 0
+    assert ("my_panda runs on guessed masses" in (tmp_path / "c.html").read_text()) == guessed
+    capsys.readouterr()
+    assert run(["robots", "show", str(folder)]) == 0
+    assert ("my_panda runs on guessed masses: link5, link6" in capsys.readouterr().out) == guessed
