@@ -136,6 +136,8 @@ def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) ->
     notes = list(meta.get("notes") or [])
     for text in notes:
         note(f"note: {text}")
+    if meta["success"] and meta["ended_by"] == "time":
+        note("note: the goal is reached, but the skill had not ended by itself when the time was up")
     if not any(files.values()):
         note("not saved; add --out run.npz")
     if as_json:

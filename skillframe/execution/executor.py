@@ -33,7 +33,6 @@ from skillframe.world.rates import ratio
 __all__ = ["QUANTITIES", "Loop", "Result", "Setup", "begin", "simulate"]
 
 RAMP_S = 0.05
-NOT_BY_ITSELF = "the goal is reached, but the skill had not ended by itself when the time was up"
 
 
 def simulate(
@@ -271,9 +270,7 @@ class Loop:
     def _notes(self, i: int, success: bool) -> list[str]:
         """Sentences about what a result holds and leaves out."""
         mark = over(float(self.contact.peak[i]), self.setup.robot.spec.limits.force_n) if success else ""
-        late = NOT_BY_ITSELF if success and self.ended_by[i] == Ended.TIME else ""
-        said = (late, mark, self.collisions.note)
-        return [*(text for text in said if text), *self.drive.notes(i)]
+        return [*(text for text in (mark, self.collisions.note) if text), *self.drive.notes(i)]
 
     def _meta(self, i: int, success: bool, failure: str) -> dict[str, Any]:
         scene, actuators = self.setup.scene, list(self.drive.actuators)

@@ -86,12 +86,11 @@ _SCALED = {
 CYLINDERS = 3
 """Of a machine in a plane at most; each has factors of its own."""
 _CYLINDERS = [
-    Varied(
-        f"actuator.{name}_{i}", "", 1.0, f"{about}: of cylinder {i} in robot.toml alone, besides actuator.{name}", limits
-    )
+    Varied(f"actuator.{name}_{i}", "", 1.0, f"{about}: of cylinder {i} in robot.toml alone, besides actuator.{name}",
+           limits)
     for name, (about, limits) in _SCALED.items()
     for i in range(1, CYLINDERS + 1)
-]
+]  # fmt: skip
 _LOAD = Range(0.0, 20_000.0, "what the largest machines lift")
 VARIED = (
     *_POSES,

@@ -5,8 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from skillframe.execution.executor import NOT_BY_ITSELF, Setup, simulate
-from skillframe.execution.trace import Trace
+from skillframe.execution.executor import Setup, simulate
 from skillframe.extend.worlds import make_scene, world_types
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import Limits, load_robot
@@ -46,8 +45,3 @@ def run(skill, setting, draws=None, count=1, seed=0, **options):
     """`simulate` with draws given as numbers or arrays."""
     draws = {key: np.broadcast_to(np.asarray(v, dtype=float), (count,)).copy() for key, v in (draws or {}).items()}
     return simulate(skill, setting, draws, generators(count, seed), **options)
-
-
-def notes(trace: Trace) -> list[str]:
-    """What a trial says of itself, besides that time was up while it stood at its goal."""
-    return [text for text in trace.meta["notes"] if text != NOT_BY_ITSELF]

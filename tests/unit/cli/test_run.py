@@ -150,3 +150,12 @@ def test_a_report_names_robot_and_world(skill: str, tmp_path: Path, capsys: pyte
     said = json.loads(capsys.readouterr().out)
     assert said["chapters"][0]["scenes"] == [{"robot": "free_tool", "world": "free"}]
     assert (said["file"], said["bytes"]) == (page, Path(page).stat().st_size)
+
+
+def test_a_run_says_both_halves_of_its_end(skill: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """The goal of "free" holds everywhere, and a tenth of a second is too short for the skill to end."""
+    run(["run", skill, *FREE, "--duration", "0.1", "--json"])
+    captured = capsys.readouterr()
+    said = json.loads(captured.out)
+    assert (said["goal_reached"], said["ended_itself"], said["ended_by"]) == (True, False, "time")
+    assert "had not ended by itself" in captured.err + said["failure"]

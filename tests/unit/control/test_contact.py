@@ -8,7 +8,7 @@ from skillframe.frames import norm
 from skillframe.robot.spec import Limits
 from skillframe.world.sensors import SensorSettings
 from tests.laws.pushing import Push, impedance
-from tests.laws.runs import notes, run, setup
+from tests.laws.runs import run, setup
 
 DT, EVERY = 1e-3, 10
 
@@ -144,7 +144,7 @@ def test_an_impact_shorter_than_the_rule_is_marked_and_no_failure():
     marked = rammed(limit, "panda", speed=0.06, cap=60.0)
     assert marked.success[0], marked.failure[0]
     peak = marked.peak_force_n[0]
-    assert notes(marked.traces[0]) == [f"true force peaked at {peak:.1f} N, above {limit:g} N, for under 10 ms"]
+    assert marked.traces[0].meta["notes"] == [f"true force peaked at {peak:.1f} N, above {limit:g} N, for under 10 ms"]
 
 
 def test_a_true_torque_above_its_limit_is_a_failure_while_the_estimate_reads_less():

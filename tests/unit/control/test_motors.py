@@ -15,7 +15,7 @@ from skillframe.world.convert import build_spec
 from skillframe.world.scene import Holder
 from skillframe.world.sensors import SensorSettings
 from tests.laws.pushing import Hold, Push, impedance
-from tests.laws.runs import notes, run, setup
+from tests.laws.runs import run, setup
 
 DT, TICKS = 1e-3, round(MOTOR_S / 1e-3)
 STIFF = np.diag([1000.0] * 3 + [50.0] * 3)
@@ -154,7 +154,7 @@ def test_zero_means_not_given_and_the_result_says_so(given):
                  duration_s=0.2, trace_hz=10)  # fmt: skip
     assert result.success[0]
     assert np.isnan(result.peak_torque_share[0])
-    (note,) = notes(result.traces[0])
+    (note,) = result.traces[0].meta["notes"]
     assert note.startswith("the URDF gives no effort or no velocity for joint1, joint2, joint3 and 4 more")
 
 
@@ -169,7 +169,7 @@ def test_a_joint_whose_range_is_not_given_is_named_and_the_others_are_judged(tmp
     assert unstated(robot) == ["the URDF gives no range for joint4; it counts as free within +-2 pi rad or +-10 m"]
     result = run(Hold(STIFF), replace(setup("panda", "free"), robot=robot), duration_s=0.05, trace_hz=1000)
     trace = result.traces[0]
-    assert notes(trace) == unstated(robot)
+    assert trace.meta["notes"] == unstated(robot)
     limits = [robot.urdf.joints[f"joint{k}"].element.find("limit") for k in range(1, 8)]
     low, high = (np.array([float(x.get(end, "nan")) for x in limits]) for end in ("lower", "upper"))
     share = (np.abs(trace.q - (low + high) / 2) / ((high - low) / 2)).max(axis=0)
@@ -182,7 +182,7 @@ def test_a_joint_whose_range_is_not_given_is_named_and_the_others_are_judged(tmp
 def test_a_free_flying_tool_has_no_motors_and_nothing_to_say():
     result = run(Hold(STIFF), setup(world="free"), duration_s=0.05, trace_hz=10)
     assert np.isnan(result.peak_torque_share[0])
-    assert notes(result.traces[0]) == []
+    assert result.traces[0].meta["notes"] == []
 
 
 def test_a_motor_at_its_effort_is_not_said_to_change_its_torque_too_fast():

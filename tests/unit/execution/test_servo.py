@@ -23,7 +23,7 @@ from skillframe.testing import HoldSkill
 from skillframe.world.sensors import SensorSettings
 from tests.fmu_cache import compiler, own_cache  # noqa: F401
 from tests.laws.pushing import FORCE_CAP, Push
-from tests.laws.runs import SILENT, generators, notes, scene
+from tests.laws.runs import SILENT, generators, scene
 
 pytestmark = pytest.mark.usefixtures("own_cache", "compiler")
 KINDS = ["panda_servo", "panda_position"]
@@ -83,7 +83,7 @@ def test_what_a_servo_is_told_and_gives_is_in_the_trace(runs, tmp_path):
     for name in KINDS:
         trace = runs[name]
         assert trace.meta["actuators"] == [f"joint{i}" for i in range(1, 8)]
-        assert notes(trace) == []
+        assert trace.meta["notes"] == []
         trace.save(tmp_path / "t.npz")
         columns = type(trace).load(tmp_path / "t.npz").machine
         assert set(columns) == {"servo_command", "servo_force", "servo_motor_position", "servo_motor_velocity"}

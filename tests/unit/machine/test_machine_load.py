@@ -16,7 +16,6 @@ from skillframe.robot.model import load_model
 from skillframe.robot.payload import with_payload
 from skillframe.robot.spec import load_robot
 from tests.fmu_cache import own_cache  # noqa: F401
-from tests.laws.runs import notes
 from tests.oracle.hydraulic_law import terms
 from tests.unit.execution.test_machine import rngs, setup, standing
 
@@ -55,7 +54,7 @@ def test_what_was_not_as_told_or_is_beyond_a_bound_is_said_and_nothing_else_is()
         "robot.payload": np.array([475.0, 200.0, 475.0]), "actuator.friction_scale": np.array([1.0, 1.0, 2.0]),
     }  # fmt: skip
     result = simulate(Follow(standing, MOVING), setup(), draws, rngs(range(3)), duration_s=0.1, trace_hz=100.0)
-    sound, light, rough = (notes(trace) for trace in result.traces)
+    sound, light, rough = (trace.meta["notes"] for trace in result.traces)
     assert sound == []
     assert light == [
         "the controller was told of 475 kg in the grip; at rest the cylinders' pressures hold 200 kg, and it goes by "

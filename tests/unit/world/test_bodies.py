@@ -15,7 +15,7 @@ from skillframe.world.placement import fixture_poses
 from skillframe.world.plant import Plant
 from skillframe.world.scene import Geom
 from tests.laws.pushing import Hold, Push
-from tests.laws.runs import notes, run, setup
+from tests.laws.runs import run, setup
 
 STIFF = np.diag([1000.0] * 3 + [20.0] * 3)
 INERTIAL = '<inertial><mass value="2"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
@@ -199,7 +199,7 @@ def test_a_run_without_the_switch_says_so_and_one_with_it_says_nothing():
         (DeclaredCollisions(ignore=(("link1", "link4"),)), "link1 with link4"),
     ):
         result = run(Hold(STIFF), with_spec(now, collisions=collisions), duration_s=0.02, trace_hz=100.0)
-        found = notes(result.traces[0])
+        found = result.traces[0].meta["notes"]
         assert (found == []) if said is None else said in found[0]
 
 
