@@ -1,16 +1,21 @@
 """Motors that saturate, joints that are too fast or pressed against their end: each ends a trial with its joint."""
 
+import json
+import shutil
 from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
+from skillframe.cli.main import run as command
+from skillframe.conformance.examples import example_demonstrations
 from skillframe.control.motors import MOTOR_S, JointLimits, Motors, joint_limits, unstated
 from skillframe.execution.tracemeta import SHARE_JOINTS, SHARES
+from skillframe.extend.reading import write_demonstration
 from skillframe.frames import norm
 from skillframe.robot.model import load_model
-from skillframe.robot.spec import Limits, load_robot
+from skillframe.robot.spec import Limits, load_robot, robot_names
 from skillframe.world.convert import build_spec
 from skillframe.world.scene import Holder
 from skillframe.world.sensors import SensorSettings
@@ -235,3 +240,28 @@ def test_rows_with_motors_are_independent():
     assert norm(both.traces[0].position - alone.traces[0].position).max() == 0.0
     for name in (*SHARES, *SHARE_JOINTS):
         assert getattr(both, name)[0] == getattr(alone, name)[0]
+
+
+@pytest.mark.slow  # a campaign and its report
+@pytest.mark.needs_plugins
+@pytest.mark.parametrize("given", [True, False])
+def test_a_campaign_its_report_and_a_run_say_what_the_urdf_does_not_limit(tmp_path, capsys, given):
+    folder = tmp_path / "my_panda"
+    shutil.copytree(robot_names()["panda"], folder)
+    tree = ElementTree.parse(folder / "panda.urdf")
+    if not given:
+        tree.find("joint[@name='joint3']/limit").attrib.pop("velocity")
+    tree.write(folder / "panda.urdf")
+    write_demonstration(example_demonstrations()[0], tmp_path / "left.npz")
+    skill = f"lmc:{tmp_path / 'left.npz'}"
+    text = "the URDF gives no effort or no velocity for joint3; what it does not give counts as unlimited"
+    told = ["--world", "edge", "--robot", str(folder), "--duration", "0.1", "--json"]
+    assert command(["run", skill, *told]) == 1
+    assert (text in json.loads(capsys.readouterr().out)["notes"]) != given
+    plan = ['name = "c"', "seed = 1", "trials = 2", "duration_s = 0.1", 'robot = "my_panda"', 'world = "edge"']
+    plan += [f'skills = ["{skill}"]', "[vary]", '"world.friction" = { uniform = [0.1, 0.2] }', ""]
+    (tmp_path / "c.toml").write_text("\n".join(plan))
+    assert command(["campaign", "run", str(tmp_path / "c.toml"), "--out", str(tmp_path / "c")]) == 0
+    assert (f"note: {text}" in capsys.readouterr().err) != given
+    assert command(["report", str(tmp_path / "c"), "--out", str(tmp_path / "c.html")]) == 0
+    assert (f"T{text[1:]}." in (tmp_path / "c.html").read_text(encoding="utf-8")) != given
