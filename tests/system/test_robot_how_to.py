@@ -93,3 +93,15 @@ def test_the_robot_toml_and_the_python_of_the_robot_page_run(tmp_path, capsys):
     assert audit(robot).usable and robot.home[3] == -1.8
     exec(compile(block(ROBOT, "python"), "own-robot.md", "exec"), {})
     assert capsys.readouterr().out == "True\n"
+
+
+def test_the_blocks_on_joints_and_encoders_are_read_with_the_figures_that_they_show(tmp_path):
+    folder = tmp_path / "my_arm"
+    shutil.copytree(robot_names()["panda"], folder)
+    text = (folder / "robot.toml").read_text(encoding="utf-8").replace("[control]\nrate_hz = 1000\n", "")
+    shown = [block(ROBOT, "toml", word) for word in ("[dynamics]", "[encoders]")]
+    (folder / "robot.toml").write_text("\n".join([text, *shown]), encoding="utf-8")
+    model = load_model(load_robot(folder))
+    assert (model.model.friction[0], model.model.damping[0]) == (0.2, 0.1)
+    assert (model.spec.encoders.bits, model.spec.encoders.step_m, model.spec.control.delay_s) == (17, 1e-6, 0.001)
+    assert not model.spec.dynamics.compensate
