@@ -51,6 +51,22 @@ def test_the_law_moves_as_its_equation_says_and_twice_as_near_at_half_the_step(a
     assert errors[1] / errors[0] == pytest.approx(0.5, abs=0.05)  # an implicit step is of first order
 
 
+def test_a_step_meets_the_equation_with_the_velocity_at_its_own_end():
+    """Implicit Euler, also in the spring: M (v' - v)/h = K (e - h v') + D (v_d - v') + f_ff + f_ext, to rounding."""
+    h, mass = 8e-3, np.diag(np.repeat([VIRTUAL_MASS, VIRTUAL_INERTIA], 3))
+    law = AdmittanceLaw(1, h, WIDE)
+    error, twist, push = (np.array(row) for row in (
+        [0.02, -0.01, 0.005, 0.0, 0.0, 0.1], [0.01, 0, 0.02, 0, 0, 0.3], [1.0, 2, 3, 0.1, 0.2, 0.3]
+    ))  # fmt: skip
+    law.twist[0] = before = np.array([0.1, 0.2, -0.1, 0.3, -0.2, 0.1])
+    wrench = np.array([[5.0, -4, 3, 0.2, 0.1, -0.3]])
+    wanted = command(position=error[:3], turn=error[3:], twist=twist, push=push)
+    law.step(wanted, Pose(np.zeros((1, 3)), np.eye(3)[None]), wrench)
+    after = law.twist[0]
+    force = K @ (error - h * after) + D @ (twist - after) + push + wrench[0]
+    np.testing.assert_allclose(mass @ (after - before) / h, force, atol=1e-10)
+
+
 def test_a_step_of_eight_milliseconds_is_stable_where_an_explicit_one_would_not_be():
     """M of 5 kg and D of 1e4 Ns/m: explicitly, v would grow 15 times a step."""
     damping = np.diag([1e4] * 3 + [50.0] * 3)
