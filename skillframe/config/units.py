@@ -14,6 +14,7 @@ from skillframe.errors import InputError
 
 _FACTORS: dict[str, dict[str, float]] = {
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6},
+    "m2": {"m2": 1.0, "cm2": 1e-4, "mm2": 1e-6},
     "rad": {"rad": 1.0, "deg": math.pi / 180.0, "mrad": 1e-3},
     "N": {"N": 1.0, "kN": 1e3, "mN": 1e-3},
     "N m": {"Nm": 1.0, "kNm": 1e3, "Nmm": 1e-3},
@@ -27,7 +28,7 @@ _FACTORS: dict[str, dict[str, float]] = {
 }
 UNITS = {word: (unit, factor) for unit, words in _FACTORS.items() for word, factor in words.items()}
 """SI unit and factor of every word."""
-TYPED = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z/]+)\s*")
+TYPED = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z/]+2?)\s*")
 SAID = re.compile(r"\[([^\]]+)\]")
 """What stands in brackets in a text about a quantity: its unit, and its range (`skillframe.config.ranges`)."""
 

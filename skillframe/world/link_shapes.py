@@ -30,6 +30,7 @@ from skillframe.world.visuals import bones, placed_geom
 
 SPACING, MOST_PIECES = 0.005, 200
 """Distance of points on a link's mesh [m], and parts of an edge at most."""
+SMALLEST_VOLUME = 1e-12  # m3; of a cube of 0.1 mm
 MANY = 20_000
 """Triangles beyond which a mesh is thinned out."""
 
@@ -147,7 +148,7 @@ def _cloud(content: bytes) -> tuple[Geom, Float | None] | None:
 
 def _hulled(corners: Float, faces: NDArray[np.int64], surface: Callable[[], Float]) -> tuple[Geom, Float | None] | None:
     hull = hull_of(corners)
-    if hull is None:
+    if hull is None or hull.volume < SMALLEST_VOLUME:
         return None
     geom = Geom(kind="mesh", vertices=hull.vertices, faces=hull.faces)
     if is_convex(corners, faces, hull):
@@ -172,14 +173,14 @@ def odd_meshes(robot: RobotModel) -> Iterator[OddMesh]:
             continue
         placement = robot.model.frames[robot.model.getBodyId(name)].placement
         for tag in ("collision", "visual"):
-            elements = link.findall(tag)
-            for element in elements:
-                yield from _odd(robot, name, element)
-            if any(_shape(robot, element, placement) is not None for element in elements):
+            known = [(element, _shape(robot, element, placement) is not None) for element in link.findall(tag)]
+            for element, shaped in known:
+                yield from _odd(robot, name, element, shaped)
+            if any(shaped for _, shaped in known):
                 break
 
 
-def _odd(robot: RobotModel, link: str, element: ET.Element) -> Iterator[OddMesh]:
+def _odd(robot: RobotModel, link: str, element: ET.Element, shaped: bool) -> Iterator[OddMesh]:
     mesh = element.find("geometry/mesh")
     file = None if mesh is None else resolve_mesh(mesh.get("filename", ""), robot.urdf.path)
     if file is None:  # a mesh that is not there is named by the audit
@@ -188,11 +189,11 @@ def _odd(robot: RobotModel, link: str, element: ET.Element) -> Iterator[OddMesh]
     if read is None:
         text = f"mesh {file.name!r} cannot be read as STL or OBJ, or is larger than {LARGEST_FILE // 10**6} MB: "
         yield OddMesh(link, "unread_mesh", text + "collisions take what else is drawn, or a capsule", fix)
+    elif not shaped:
+        yield OddMesh(link, "flat_mesh", f"mesh {file.name!r} has no volume: collisions do not know it", fix)
     elif read.thinned:
         text = f"mesh {file.name!r} has {read.triangles} triangles: collisions take some thousand of its corners, "
         yield OddMesh(link, "large_mesh", text + f"right to about 1/{FINE} of its size", fix)
-    elif hull_of(read.corners.reshape(-1, 3)) is None:
-        yield OddMesh(link, "flat_mesh", f"mesh {file.name!r} is flat: collisions do not know it", fix)
     elif count := open_edges(read.corners.reshape(-1, 3), np.arange(3 * len(read.corners)).reshape(-1, 3)):
         text = f"mesh {file.name!r} is not closed ({count} open edges): collisions know its surface, not its inside"
         yield OddMesh(link, "open_mesh", text, fix)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from skillframe.errors import InputError
 from skillframe.frames import Float
 from skillframe.world.convert import add_geom
 from skillframe.world.parts import BITS, OBSTACLE, STANDING, Pair, Solid
@@ -38,6 +39,9 @@ class Probe:
         parts: all of them.
         skip: pairs that are not looked at, first the smaller index.
 
+    Raises:
+        InputError: MuJoCo refuses a shape.
+
     Attributes:
         free: indices of the parts that move, in the order of the rows that `overlaps` takes.
         posed: indices of those that stand where each trial puts them.
@@ -54,7 +58,12 @@ class Probe:
             spec.add_exclude(bodyname1=_body(one), bodyname2=_body(two))
         point = spec.worldbody.add_geom(name=_POINT, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[1e-9, 0, 0])
         point.contype = point.conaffinity = 0
-        self._model = spec.compile()
+        try:
+            self._model = spec.compile()
+        except ValueError as error:
+            text = f"cannot be compared: {' '.join(str(error).removeprefix('Error: ').split())}"
+            fix = "correct them in the URDF, or write enabled = false under [collisions] in robot.toml"
+            raise InputError("the shapes of the robot's links", text, fix) from None
         self._data = mujoco.MjData(self._model)
         self._point = int(self._model.geom(_POINT).id)
         self._index(parts)

@@ -51,7 +51,7 @@ duration_s = 5.0
 def write_campaign(folder: Path, *, trials: int = 128, extra: str = "", text: str = TEXT) -> Path:
     (folder / "robots" / "box").mkdir(parents=True, exist_ok=True)
     (folder / "robots" / "box" / "robot.toml").write_text('urdf = "box.urdf"\n')
-    (folder / "robots" / "box" / "box.urdf").write_text("<robot/>")
+    (folder / "robots" / "box" / "box.urdf").write_text('<robot name="box"><link name="box"/></robot>')
     (folder / "a.skill.json").write_text("{}")
     (folder / "demo.npz").write_bytes(b"\x00")
     path = folder / "campaign.toml"

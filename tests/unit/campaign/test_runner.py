@@ -101,6 +101,16 @@ def test_the_summary_counts_what_the_table_holds(out):
     assert set(summary["hashes"]) == {"campaign", "files", "results.csv"}
 
 
+def test_the_summary_says_which_bodies_nobody_looked_at(campaign, tmp_path):
+    assert "unwatched" not in run(start(campaign(trials=4), tmp_path / "watched"))
+    for text, said in (("enabled = false", "enabled is false"), ('ignore = [["a", "b"]]', "a with b")):
+        path = campaign(trials=4)
+        (tmp_path / "robots" / "box" / "robot.toml").write_text(f'urdf = "box.urdf"\n[collisions]\n{text}\n')
+        folder = start(path, tmp_path / said)
+        run(folder)
+        assert said in read_summary(folder)["unwatched"]
+
+
 def test_traces_are_kept_of_the_first_trials_the_typical_success_and_the_first_failures(out):
     run(out, traces=5)
     rows = [line.split(",") for line in table(out).decode().splitlines()[1:]]

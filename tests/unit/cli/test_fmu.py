@@ -55,7 +55,7 @@ def test_check_lists_every_variable_that_can_be_connected_or_set_with_its_unit_a
     assert code == 0
     assert lines["bore"] == ["bore", "parameter", "0.08", "m", "diameter", "of", "the", "piston"]
     assert lines["velocity"][1:4] == ["input", "0.0", "m/s"] and lines["force"][1:3] == ["output", "N"]
-    assert len(lines) == 5 + 11 + len(tomllib.loads(TABLE.read_text(encoding="utf-8"))["parameter"])
+    assert len(lines) == 8 + 11 + len(tomllib.loads(TABLE.read_text(encoding="utf-8"))["parameter"])
 
 
 def test_simulate_writes_time_and_then_every_output_by_its_name(built, capsys, tmp_path):

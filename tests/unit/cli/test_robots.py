@@ -35,7 +35,10 @@ def test_check_says_0_usable_1_not_usable_2_does_not_load(check):
 
 def test_the_json_of_check_holds_what_the_contract_names(check):
     _, good, _ = check(HONEST.format(mass=2.5, moment=0.01))
-    assert good == {"usable": True, "nq": 1, "nv": 1, "mass_kg": 2.5, "problems": []}
+    interface = {"takes": "torque", "rate_hz": 1000.0}
+    assert good == {
+        "usable": True, "nq": 1, "nv": 1, "mass_kg": 2.5, "problems": [], "interface": interface
+    }  # fmt: skip
     code, bad, _ = check(HONEST.format(mass=1, moment=0.05))
     assert (code, bad["usable"]) == (1, False)
     assert set(bad["problems"][0]) == {"code", "severity", "where", "message", "fix"}
@@ -132,7 +135,7 @@ def test_show_says_of_a_machine_what_drives_it_what_it_measures_with_and_its_gai
     assert run(["robots", "show", "hiab_xs031", "--json"]) == 0
     machine = json.loads(capsys.readouterr().out)
     assert [drive["velocity_gain"] for drive in machine["actuation"]] == [5e-3, 5e-3, 1e-3]  # published
-    assert machine["sensors"] == {"encoder": 1e-4, "pressure": 0.22e5, "corner_hz": 24.0}  # published
+    assert machine["sensors"] == {"encoder": 1e-4, "pressure": 0.22e5, "corner_hz": 24.0, "watch": True}  # published
     assert len(machine["loops"]) == 2 and machine["payload"]["rating"] == 475.0
     assert run(["robots", "show", "panda", "--json"]) == 0
     assert not {"actuation", "sensors", "gains", "payload"} & json.loads(capsys.readouterr().out).keys()

@@ -237,9 +237,9 @@ def test_quantities_of_valves_are_refused(key):
 
 
 def test_a_servo_that_refuses_its_figures_says_which():
-    draws = {"actuator.friction_scale": np.array([-1.0])}
+    spec = changed(parameters={**load_robot("panda_servo").actuation[0].parameters, "viscous_friction": -2.0})
     with pytest.raises(SkillframeError, match=r"joint1 .*parameter viscous_friction is -2; it must be zero or more"):
-        begin(HoldSkill(), setup("panda_servo"), draws, generators(1))
+        begin(HoldSkill(), setup(load_model(spec)), {}, generators(1))
 
 
 def written(tmp_path, text):

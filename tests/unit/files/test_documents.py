@@ -126,7 +126,7 @@ def test_a_number_of_41_digits_on_the_command_line_is_wrong_usage(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     said = refused(*words)
-    assert any(word in said for word in ("large", "usual size", "usual length", "range", "deeply")), said
+    assert any(word in said for word in ("large", "usual size", "usual length", "range", "is beyond", "deeply")), said
     assert list(tmp_path.iterdir()) == []
 
 

@@ -62,7 +62,9 @@ def test_an_open_a_flat_and_an_unreadable_mesh_get_a_sentence_each(tmp_path):
         "open_mesh", "mesh 'm.stl' is not closed (3 open edges): collisions know its surface, not its inside",
     )  # fmt: skip
     stl(tmp_path / "m.stl", TETRA[:1])
-    assert found(robot(tmp_path))[0] == ("flat_mesh", "mesh 'm.stl' is flat: collisions do not know it")
+    assert found(robot(tmp_path))[0] == ("flat_mesh", "mesh 'm.stl' has no volume: collisions do not know it")
+    stl(tmp_path / "m.stl", TETRA)
+    assert found(robot(tmp_path, '<mesh filename="m.stl" scale="1e-7 1e-7 1e-7"/>'))[0][0] == "flat_mesh"
     (tmp_path / "m.dae").write_text("<COLLADA/>")
     ((code, text),) = found(robot(tmp_path, '<mesh filename="m.dae"/>'))
     assert code == "unread_mesh"
