@@ -65,7 +65,7 @@ def record(
 
 def _person(teacher: str | Person | None, robot: RobotModel, scene: Scene) -> Person:
     """The person in detail, and one who can teach this robot."""
-    machine, name = bool(robot.spec.actuation), robot.spec.name
+    machine, name = robot.spec.hydraulic, robot.spec.name
     if isinstance(teacher, str) and teacher not in TEACHERS:
         raise UnknownName("teacher", teacher, TEACHERS)
     if teacher is None or isinstance(teacher, str):

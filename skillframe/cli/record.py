@@ -121,7 +121,7 @@ def command(
     machine = robot_of(robot)
     _refuse_idle(teacher, (noise, delay, scale), (belief, centre))
     person: Person
-    if machine.spec.actuation or any(map(_given, operated.values())):
+    if machine.spec.hydraulic or any(map(_given, operated.values())):
         scene, person = _operated(machine, scene, teacher, {**operated, "noise": noise, "delay": delay, "scale": scale})
     else:
         person = _person(scene, teacher, (noise, delay, scale), (belief, centre))

@@ -29,14 +29,16 @@ def require_delay(seconds: float, where: object) -> None:
 
 
 class CommandDelay:
-    """Commands (N, k) that arrive later, each trial's by its own whole number of samples, or zero before the first.
+    """Commands (N, k) that arrive later, each trial's by its own whole number of samples.
 
     Args:
         ticks: (N,) samples of delay.
         k: commands of a trial.
+        held: before the first command arrives there was the same one, as for a servo that holds; else zero.
     """
 
-    def __init__(self, ticks: NDArray[np.int64], k: int) -> None:
+    def __init__(self, ticks: NDArray[np.int64], k: int, held: bool = False) -> None:
+        self._held = held
         self._ticks, self._now, self._rows, self._at_once = ticks, 0, np.arange(len(ticks)), not ticks.any()
         self._line: Float = np.zeros((int(ticks.max(initial=0)) + 1, len(ticks), k))
 
@@ -49,6 +51,8 @@ class CommandDelay:
         if self._at_once:
             return command
         length = len(self._line)
+        if self._held and self._now == 0:
+            self._line[:] = command
         self._line[self._now % length] = command
         arrived: Float = self._line[(self._now - self._ticks) % length, self._rows]
         self._now += 1

@@ -182,7 +182,7 @@ def _attempt(
     watch: Watch | None,
 ) -> Result:  # fmt: skip
     columns = start_columns(scene, slots, draws)
-    teacher = teacher_for(scene, fixture_poses(robot, columns, len(slots)), settings)
+    teacher = teacher_for(scene, fixture_poses(robot, columns, len(slots)), settings, robot.spec.servo)
     last = (scene.task, *scene.task.then)[-1]
     setup = Setup(
         robot=robot.guided(), scene=scene, center_of_compliance=np.array(scene.tool.frames[scene.tool.hand]),

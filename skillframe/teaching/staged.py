@@ -12,17 +12,22 @@ import numpy as np
 
 from skillframe.frames import Float, Pose, move_wrench, rotate, rotate_spatial
 from skillframe.skill import Command, Observation, Skill, row, stack_commands
-from skillframe.teaching.teacher import Teacher, TeacherSettings
+from skillframe.teaching.teacher import HANDS, Hand, Teacher, TeacherSettings, firm
 from skillframe.world.scene import Scene, State, Task
 
 REACTION_S = 0.2
 
 
-def teacher_for(scene: Scene, fixture: Pose, settings: TeacherSettings) -> Skill:
-    """The person who demonstrates a scene, whose fixture stands at (N, 3), (N, 3, 3)."""
+def teacher_for(scene: Scene, fixture: Pose, settings: TeacherSettings, firmly: bool = False) -> Skill:
+    """The person who demonstrates a scene, whose fixture stands at (N, 3), (N, 3, 3), `firmly` against friction."""
     if not scene.task.then:
-        return Teacher(scene.task, fixture, settings)
-    return StagedTeacher(scene, fixture, settings)
+        return Teacher(scene.task, fixture, settings, hand_of(scene.task, firmly))
+    return StagedTeacher(scene, fixture, settings, firmly)
+
+
+def hand_of(task: Task, firmly: bool) -> Hand | None:
+    """The firm hand of a task, or None for its ordinary one."""
+    return firm(HANDS[task.hand]) if firmly and task.hand in HANDS else None
 
 
 class StagedTeacher(Skill):
@@ -32,13 +37,14 @@ class StagedTeacher(Skill):
         scene: its task says what follows what.
         fixture: true pose of the fixture per trial, (N, 3) and (N, 3, 3).
         settings: how well the person aims.
+        firmly: with the hand for an arm with friction.
     """
 
-    def __init__(self, scene: Scene, fixture: Pose, settings: TeacherSettings) -> None:
+    def __init__(self, scene: Scene, fixture: Pose, settings: TeacherSettings, firmly: bool = False) -> None:
         frames = scene.tool.frames
         reach: Float = np.array(frames["tip"]) - np.array(frames[scene.tool.hand])
         self._hands = [
-            _StagedHand((scene.task, *scene.task.then), Pose(*(v[i : i + 1] for v in fixture)), settings, reach)
+            _StagedHand((scene.task, *scene.task.then), Pose(*(v[i : i + 1] for v in fixture)), settings, reach, firmly)
             for i in range(len(fixture.position))
         ]
 
@@ -59,12 +65,15 @@ class StagedTeacher(Skill):
 class _StagedHand(Skill):
     """One hand, stage by stage (N = 1)."""
 
-    def __init__(self, stages: Sequence[Task], fixture: Pose, settings: TeacherSettings, hand_to_tip: Float) -> None:
+    def __init__(
+        self, stages: Sequence[Task], fixture: Pose, settings: TeacherSettings, hand_to_tip: Float, firmly: bool
+    ) -> None:  # fmt: skip
         self._stages, self._fixture, self._settings, self._hand_to_tip = stages, fixture, settings, hand_to_tip
+        self._firmly = firmly
 
     def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
         self._stage, self._held, self._changes = 0, 0.0, list[float]()
-        self._teacher = Teacher(self._stages[0], self._fixture, self._settings)
+        self._teacher = self._hand(0)
         self._teacher.start(observation, rngs)
 
     def step(self, observation: Observation) -> Command:
@@ -78,9 +87,13 @@ class _StagedHand(Skill):
     def _next_stage(self, observation: Observation) -> None:
         self._stage, self._held = self._stage + 1, 0.0
         self._changes.append(float(observation.time[0]))
-        follower = Teacher(self._stages[self._stage], self._fixture, self._settings)
+        follower = self._hand(self._stage)
         follower.take_over(self._teacher, observation)
         self._teacher = follower
+
+    def _hand(self, stage: int) -> Teacher:
+        task = self._stages[stage]
+        return Teacher(task, self._fixture, self._settings, hand_of(task, self._firmly))
 
     def journal(self, trial: int) -> list[tuple[float, str]]:
         return [(time, f"stage {i} begins") for i, time in enumerate(self._changes, start=2)]

@@ -22,6 +22,7 @@ from skillframe.world.quantities import FAULTS, QUANTITIES, RANGES, UNITS
 from skillframe.world.scene import Scene
 
 _FAULTS = frozenset({"fault.time", "fault.cylinder", *(each.name for each in FAULTS)})
+_OF_SERVOS = ("actuator.friction_scale", "actuator.delay")
 _ACTUATOR = tuple(name for name in QUANTITIES if name.startswith("actuator."))
 
 
@@ -54,7 +55,7 @@ def _lacking(key: str, robot: RobotModel) -> str:
     if not robot.spec.actuation:
         return "has no actuators of its own" if key in (*_ACTUATOR, "robot.nominal_payload") else ""
     if robot.spec.servo:
-        lacking = key == "robot.nominal_payload" or (key in _ACTUATOR and key != "actuator.friction_scale")
+        lacking = key == "robot.nominal_payload" or (key in _ACTUATOR and key not in _OF_SERVOS)
         return "is driven by servos, which have no such quantity" if lacking else ""
     number = key.rpartition("_")[2]
     if key in _ACTUATOR and number.isdigit() and int(number) > len(robot.spec.actuation):

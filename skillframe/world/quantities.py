@@ -112,7 +112,7 @@ VARIED = (
            Range(0.0, 1.0, "a share of the stroke")),
     *(Varied(f"actuator.{name}", "", 1.0, about, limits) for name, (about, limits) in _SCALED.items()),
     *_CYLINDERS,
-    Varied("actuator.delay", "s", 0.0, "delay between command and valve of a hydraulic machine",
+    Varied("actuator.delay", "s", 0.0, "delay between command and valve of a hydraulic machine, or servo of an arm",
            Range(0.0, LONGEST_DELAY, "as buses and valves take milliseconds")),
     *FAULTS,
     Varied("fault.time", "s", 0.0,

@@ -2,6 +2,7 @@
 
 import json
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from skillframe.cli.main import run
 from skillframe.execution.executor import simulate
 from skillframe.execution.prepare import load_robot_model, load_world, prepare
+from skillframe.extend.reading import read_demonstration
 from skillframe.fmu.toolchain import find_compiler
 
 pytestmark = [
@@ -60,3 +62,22 @@ def test_friction_in_the_gears_costs_successes_and_a_position_servo_has_less_of_
     print(*sorted(set(torque.failure) | set(position.failure)), sep="\n")
     assert np.count_nonzero(torque.success) < np.count_nonzero(position.success) <= COUNT
     assert set(torque.ended_by) | set(position.ended_by) == {"skill"}  # at rest in the mouth; nothing else is wrong
+
+
+@pytest.mark.parametrize("robot", ["panda_servo", "panda_position"])
+def test_arms_of_servos_are_led_by_hand_into_the_hole_without_a_failed_attempt(robot, tmp_path, capsys):
+    """A hand that cannot overcome the gears' friction leaves the peg on its rim until the time is over."""
+    words = f"demonstration record --world peg_in_hole --robot {robot} --count 2 --seed 1 --json --out".split()
+    assert run([*words, str(tmp_path / "d.npz")]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["rejected"] == []
+    for file in said["files"]:
+        assert read_demonstration(Path(file)).duration < 12.0
+
+
+@pytest.mark.parametrize("option", ["--angle=5", "--force-scale=2"])
+def test_options_of_machines_are_refused_for_an_arm_of_servos_by_name(option, tmp_path, capsys):
+    words = f"demonstration record --world peg_in_hole --robot panda_servo {option} --out".split()
+    assert run([*words, str(tmp_path / "d.npz")]) == 2
+    refused = f"{option.partition('=')[0]}: is for hydraulic machines, which panda_servo is not"
+    assert refused in capsys.readouterr().err

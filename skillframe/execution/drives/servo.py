@@ -25,6 +25,7 @@ from skillframe.execution.result import Result
 from skillframe.execution.setup import Setup
 from skillframe.fmu.unmapped import unmapped
 from skillframe.frames import Float
+from skillframe.signals.delay import CommandDelay
 from skillframe.skill import Command, Observation
 from skillframe.world.plant import Draws, Kinematics
 
@@ -66,6 +67,9 @@ class ServoLimb:
         self._known: NDArray[np.bool_] = np.zeros(len(self.joints), dtype=bool)
         if self._speeds is not None:
             self._known = np.asarray(np.isfinite(self.bank.y[:, self._speeds].reshape(self._shape)).any(0))
+        late = np.asarray(draws.get("actuator.delay", np.zeros(self.rows)))
+        ticks = np.round(late * spec.control.rate_hz).astype(np.int64)
+        self._delay = CommandDelay(ticks, len(self.joints), held=True)
         self.told = np.zeros(self._shape)
         self._velocity: Float = self.actuated.plant.velocity
 
@@ -96,7 +100,8 @@ class ServoLimb:
         coupled.load[:] = torque
         coupled.load[:, self.driven] = 0.0
         position = coupled.where()[0].reshape(self._shape)
-        self.told = self.servos.command(torque.take(self.driven, axis=1), position, self._velocity)
+        sent = self.servos.command(torque.take(self.driven, axis=1), position, self._velocity)
+        self.told = self._delay.step(sent)
         broken = self.actuated.step(self.told, active)
         self.arm.read_encoders()
         return broken

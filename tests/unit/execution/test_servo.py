@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from skillframe.cosim.coupling import StepTooLarge
-from skillframe.cosim.servos import servos
+from skillframe.cosim.servos import Servos, servos
 from skillframe.errors import InputError, SkillframeError, UnknownName
 from skillframe.execution.executor import Setup, begin, simulate
 from skillframe.execution.prepare import load_robot_model
@@ -20,6 +20,7 @@ from skillframe.reports.plots import run_plots
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot, robot_names
 from skillframe.testing import HoldSkill
+from skillframe.world.quantities import RANGES
 from skillframe.world.sensors import SensorSettings
 from tests.fmu_cache import compiler, own_cache  # noqa: F401
 from tests.laws.pushing import FORCE_CAP, Push
@@ -230,7 +231,7 @@ def test_a_spring_too_stiff_for_the_control_rate_is_refused():
         begin(HoldSkill(), setup(load_model(spec)), {}, generators(1))
 
 
-@pytest.mark.parametrize("key", ["actuator.deadband", "actuator.delay", "robot.nominal_payload"])
+@pytest.mark.parametrize("key", ["actuator.deadband", "actuator.supply_pressure", "robot.nominal_payload"])
 def test_quantities_of_valves_are_refused(key):
     with pytest.raises(InputError, match="is driven by servos, which have no such quantity"):
         begin(HoldSkill(), setup("panda_servo"), {key: np.array([0.01])}, generators(1))
@@ -240,6 +241,28 @@ def test_a_servo_that_refuses_its_figures_says_which():
     spec = changed(parameters={**load_robot("panda_servo").actuation[0].parameters, "viscous_friction": -2.0})
     with pytest.raises(SkillframeError, match=r"joint1 .*parameter viscous_friction is -2; it must be zero or more"):
         begin(HoldSkill(), setup(load_model(spec)), {}, generators(1))
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_delay_holds_back_what_each_trial_s_servos_are_told_and_no_other_s(name, monkeypatch):
+    sent, command = [], Servos.command
+    monkeypatch.setattr(Servos, "command", lambda *given: sent.append(command(*given)) or sent[-1])
+    late = pushed(name, 0.1, 2, {"actuator.delay": np.array([0.0, 0.005])}, trace_hz=1000.0).traces
+    # The last command comes after the last row of a trace.
+    told = np.stack([trace.machine["servo_command"][-50:] for trace in late], axis=1)
+    np.testing.assert_array_equal(told[:, 0], np.array(sent[-51:-1])[:, 0])
+    np.testing.assert_array_equal(told[:, 1], np.array(sent[-56:-6])[:, 1])  # 5 ticks of a millisecond
+    plain = pushed(name, 0.1, 1, trace_hz=1000.0).traces[0].machine["servo_command"][-50:]
+    np.testing.assert_array_equal(told[:, 0], plain)
+
+
+def test_a_servo_arm_that_is_told_late_to_hold_stands_and_one_told_far_too_late_does_not():
+    """Its damping is behind the delay: a few milliseconds pass, with 0.1 s it rings until a limit ends it."""
+    few, many = (pushed("panda_servo", 1.0, 1, {"actuator.delay": np.array([late])}).traces[0] for late in (0.002, 0.1))
+    plain = pushed("panda_servo", 1.0, 1).traces[0]
+    # 2 ms at the push's 50 mm/s are 0.1 mm
+    np.testing.assert_allclose(few.position[-1], plain.position[-1], atol=5e-4)
+    assert many.meta["failure"] and len(many.time) < len(plain.time)
 
 
 def written(tmp_path, text):

@@ -5,7 +5,7 @@ from skillframe.errors import SkillframeError, UnknownName
 from skillframe.frames import Pose, cross, matrix_from_quaternion, norm, rotation_matrix, rotation_vector
 from skillframe.skill import Observation
 from skillframe.teaching.sessions import record
-from skillframe.teaching.teacher import AIM_TIME, HANDS, TREMOR_TIME, Teacher, TeacherSettings
+from skillframe.teaching.teacher import AIM_TIME, HANDS, TREMOR_TIME, Teacher, TeacherSettings, firm
 from skillframe.world.scene import Task
 from tests.laws.runs import SILENT, generators, robot, scene
 
@@ -194,3 +194,10 @@ def test_a_start_asked_for_is_added_to_the_task_s_own():
     near = demonstrate("valley", count=1).demonstrations[0]
     far = demonstrate("valley", count=1, draws={"start.offset_x": 0.005}).demonstrations[0]
     assert far.position[0, 0] - near.position[0, 0] == pytest.approx(0.005, abs=5e-4)  # encoder noise is 0.05 mm
+
+
+def test_a_firm_hand_turns_harder_and_pushes_and_slides_as_before():
+    for hand in HANDS.values():
+        hard = firm(hand)
+        assert (hard.turn_stiffness, hard.turn_damping) == (4.0 * hand.turn_stiffness, 4.0 * hand.turn_damping)
+        assert (hard.torque_max, hard.stiffness, hard.speed) == (2.0 * hand.torque_max, hand.stiffness, hand.speed)
