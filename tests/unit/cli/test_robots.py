@@ -35,10 +35,7 @@ def test_check_says_0_usable_1_not_usable_2_does_not_load(check):
 
 def test_the_json_of_check_holds_what_the_contract_names(check):
     _, good, _ = check(HONEST.format(mass=2.5, moment=0.01))
-    interface = {"takes": "torque", "rate_hz": 1000.0}
-    assert good == {
-        "usable": True, "nq": 1, "nv": 1, "mass_kg": 2.5, "problems": [], "interface": interface
-    }  # fmt: skip
+    assert good == {"usable": True, "nq": 1, "nv": 1, "mass_kg": 2.5, "problems": []}
     code, bad, _ = check(HONEST.format(mass=1, moment=0.05))
     assert (code, bad["usable"]) == (1, False)
     assert set(bad["problems"][0]) == {"code", "severity", "where", "message", "fix"}

@@ -237,10 +237,11 @@ def test_quantities_of_valves_are_refused(key):
         begin(HoldSkill(), setup("panda_servo"), {key: np.array([0.01])}, generators(1))
 
 
-def test_a_servo_that_refuses_its_figures_says_which():
-    spec = changed(parameters={**load_robot("panda_servo").actuation[0].parameters, "viscous_friction": -2.0})
+def test_a_servo_that_refuses_its_figures_says_which(monkeypatch):
+    monkeypatch.setitem(RANGES, "actuator.friction_scale", None)
+    draws = {"actuator.friction_scale": np.array([-1.0])}
     with pytest.raises(SkillframeError, match=r"joint1 .*parameter viscous_friction is -2; it must be zero or more"):
-        begin(HoldSkill(), setup(load_model(spec)), {}, generators(1))
+        begin(HoldSkill(), setup("panda_servo"), draws, generators(1))
 
 
 @pytest.mark.parametrize("name", KINDS)
