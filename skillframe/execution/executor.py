@@ -10,22 +10,20 @@ torques, several arms, electric servos, a hydraulic machine. The loop knows none
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.control.contact import TrueContact, over
+from skillframe.control.contact import TrueContact
 from skillframe.control.endings import Broken, Ended
 from skillframe.execution.drive import Drive
 from skillframe.execution.drives.choose import chosen_drive
+from skillframe.execution.outcome import Outcomes
 from skillframe.execution.result import Result
 from skillframe.execution.setup import Setup
-from skillframe.execution.tracemeta import SHARE_JOINTS, SHARES
 from skillframe.frames import Float
 from skillframe.handover import SLOW_TICKS, CommandCheck, Fault, asked, shown, unknown_end
-from skillframe.skill import Command, Observation, Skill, Status, no_reasons
+from skillframe.skill import Command, Observation, Skill, Status
 from skillframe.world.collisions import Collisions
 from skillframe.world.quantities import QUANTITIES
 from skillframe.world.rates import ratio
@@ -101,16 +99,9 @@ class Loop:
         self.plant, self.dt = drive.plant, drive.dt
         self.collisions = Collisions(self.plant)
         self.contact = TrueContact(setup.robot.spec.limits, count, self.dt)
-        self.touched: dict[int, tuple[str, str]] = {}
+        self.outcomes = Outcomes(setup, drive, self.contact, count)
         self.faults: list[Fault] = []
         self.active = np.arange(count)
-        self.reason, self.status = no_reasons(count), np.zeros(count, dtype=np.int64)
-        self.limited = np.zeros(count, dtype=bool)
-        self.duration, self.ended_by = np.zeros(count), no_reasons(count)
-        self.filtered, self.way = np.full(count, np.nan), np.full(count, np.nan)
-        self.shares = np.full((3, count), np.nan)
-        self.joints = np.full((3, count), "", dtype=object)  # of torque, speed and range, as the shares
-        self.goal, self.errors, self.energy = np.zeros(count, dtype=bool), np.zeros((count, 2)), np.zeros(count)
         rate = setup.robot.spec.control.tick_hz
         self.recorder = None if trace_hz is None else drive.recording(ratio(rate, trace_hz, "control", "the trace"))
         self.interrupted = False
@@ -182,7 +173,7 @@ class Loop:
         if self.setup.stop_when is not None and slow and len(self.active):
             done = self.setup.stop_when(self.plant.tip_state())
             rows = self.active[done[self.active]]
-            self.status[rows] = Status.SUCCESS
+            self.outcomes.status[rows] = Status.SUCCESS
             self._end(rows, time, "done", False, Ended.GOAL)
 
     def _end_broken(self, broken: Sequence[Broken], time: float) -> None:
@@ -194,7 +185,7 @@ class Loop:
     def _end_touching(self, rows: NDArray[np.int64], time: float) -> None:
         """End those of some trials whose bodies touch what they may not, with the names of both."""
         for touch in self.collisions.touches(self.plant, rows):
-            self.touched[touch.row] = touch.first, touch.second
+            self.outcomes.touched[touch.row] = touch.first, touch.second
             self._end_broken([Broken(touch.row, Ended.COLLISION, touch.cause)], time)
 
     def _end_told(self, i: int, time: float, status: int, reason: object) -> None:
@@ -202,7 +193,7 @@ class Loop:
         if wrong := unknown_end(status, reason):
             self._end_broken([Broken(i, Ended.COMMAND, wrong)], time)
             return
-        self.status[i] = status
+        self.outcomes.status[i] = status
         self._end(np.array([i]), time, str(reason) or "the skill ended", False, Ended.SKILL)
 
     def _end_failed(self, failed: Sequence[Broken], time: float) -> None:
@@ -212,27 +203,10 @@ class Loop:
                 self._end(np.array([row]), time, cause, True, code)
 
     def _end(self, rows: NDArray[np.int64], time: float, reason: str, limit: bool, code: Ended) -> None:
-        """Close trials: judge them by the scene's goal as they stand now, and stop stepping them."""
+        """Close trials: judge them as they stand now, and stop stepping them."""
         if not len(rows):
             return
-        state = self.plant.tip_state()
-        self.goal[rows] = self.setup.scene.goal(state)[rows]
-        self.errors[rows] = np.stack(self.setup.scene.goal_error(state), axis=-1)[rows]
-        if self.setup.scene.way is not None:
-            self.way[rows] = self.setup.scene.way.reached(state)[rows]
-        self.duration[rows], self.limited[rows] = time, limit
-        shares = self.drive.shares()
-        self.energy[rows] = shares.energy[rows]
-        for kind, part in enumerate((shares.torque, shares.speed, shares.range)):
-            if part is not None:
-                self.shares[kind, rows] = part[rows]
-        if shares.joints is not None:
-            self.joints[:, rows] = shares.joints[:, rows]
-        self.filtered[rows] = self.contact.estimate[rows]
-        if limit:
-            self.status[rows] = Status.FAILURE
-        for i in rows:
-            self.reason[i], self.ended_by[i] = reason, code.value
+        self.outcomes.close(rows, time, reason, code, limit)
         self.active = np.setdiff1d(self.active, rows)
         self.drive.end(rows)
         if self.recorder is not None:
@@ -240,61 +214,5 @@ class Loop:
 
     def result(self) -> Result:
         """The outcome of every trial."""
-        success = self.goal & ~self.limited & (self.status != Status.FAILURE)
-        failure = no_reasons(self.count)
-        for i in np.flatnonzero(~success):
-            failure[i] = self._failure(int(i))
-        traces = None
-        if self.recorder is not None:
-            traces = [
-                self.recorder.trace(i, self._meta(i, bool(success[i]), str(failure[i]))) for i in range(self.count)
-            ]
-        result = Result(
-            success=success, failure=failure, status=self.status, reason=self.reason, duration_s=self.duration,
-            peak_force_n=self.contact.peak, final_error_m=self.errors[:, 0], final_error_rad=self.errors[:, 1],
-            energy_j=self.energy, peak_force_filtered_n=self.filtered, peak_force_10ms_n=self.contact.mean,
-            ended_by=self.ended_by, **dict(zip(SHARES, self.shares, strict=True)),
-            **dict(zip(SHARE_JOINTS, self.joints, strict=True)),
-            goal_reached=self.goal, ended_itself=self.ended_by == Ended.SKILL.value,
-            traces=traces, interrupted=self.interrupted,
-        )  # fmt: skip
+        result = self.outcomes.result(self.recorder, self.skill.journal, self.collisions.note, self.interrupted)
         return self.drive.outcome(result)
-
-    def _failure(self, i: int) -> str:
-        """Why trial i is no success, in words."""
-        if self.limited[i]:
-            return str(self.reason[i])
-        lacks = "the skill gave up, though the goal is reached" if self.goal[i] else "goal not reached"
-        return f"{lacks}: {self.reason[i]}"
-
-    def _notes(self, i: int, success: bool) -> list[str]:
-        """Sentences about what a result holds and leaves out."""
-        mark = over(float(self.contact.peak[i]), self.setup.robot.spec.limits.force_n) if success else ""
-        return [*(text for text in (mark, self.collisions.note) if text), *self.drive.notes(i)]
-
-    def _meta(self, i: int, success: bool, failure: str) -> dict[str, Any]:
-        scene, actuators = self.setup.scene, list(self.drive.actuators)
-        return {
-            "robot": self.setup.robot.spec.name, "world": scene.name, "params": scene.params,
-            "interface": self.setup.robot.spec.control.figures(),
-            "center_of_compliance": np.asarray(self.setup.center_of_compliance, dtype=float).tolist(),
-            "frames": {k: list(v) for k, v in scene.tool.frames.items()},
-            "hand": scene.tool.hand, "success": success, "failure": failure, "reason": str(self.reason[i]),
-            "status": Status(int(self.status[i])).name, "duration_s": float(self.duration[i]),
-            "peak_force_n": float(self.contact.peak[i]), "peak_force_filtered_n": float(self.filtered[i]),
-            "peak_force_10ms_n": float(self.contact.mean[i]), "ended_by": self.ended_by[i],
-            **{name: _known(share) for name, share in zip(SHARES, self.shares[:, i], strict=True)},
-            **dict(zip(SHARE_JOINTS, self.joints[:, i], strict=True)),
-            "goal_reached": bool(self.goal[i]), "ended_itself": self.ended_by[i] == Ended.SKILL,
-            "notes": self._notes(i, success), "final_error_m": float(self.errors[i, 0]),
-            "final_error_rad": float(self.errors[i, 1]), "analytic": scene.analytic,
-            "progress": None if scene.way is None else scene.way.told(_known(self.way[i])),
-            "events": [[time, text] for time, text in self.skill.journal(i)],
-            "limits": asdict(self.setup.limits), **({"touched": [*self.touched[i]]} if i in self.touched else {}),
-            **({"actuators": actuators} if actuators else {}),
-        }  # fmt: skip
-
-
-def _known(figure: float) -> float | None:
-    """A figure for a file; None where there is none."""
-    return None if np.isnan(figure) else float(figure)

@@ -59,6 +59,6 @@ def test_a_trial_whose_fmu_refuses_to_start_ends_at_once_with_its_sentence_and_t
     rngs = [np.random.default_rng(i) for i in range(2)]
     loop = begin(Follow(diamond, MOVING), Setup(robot=robot, scene=where), draws, rngs, None)
     loop.prepare()
-    assert loop.active.tolist() == [0] and loop.duration[1] == 0.0
-    assert "parameter deadband is 1.5; it must be below 1" in loop.reason[1]
+    assert loop.active.tolist() == [0] and loop.outcomes.duration[1] == 0.0
+    assert "parameter deadband is 1.5; it must be below 1" in loop.outcomes.reason[1]
     assert np.isfinite(loop.drive.actuated.master.force[:3]).all()

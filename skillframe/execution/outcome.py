@@ -1,0 +1,145 @@
+"""What became of each trial of a batch: judged as it ended, and told as a `Result` and in its trace's metadata.
+
+A trial is a success if the scene's goal holds as it ends, no limit was broken, and its skill did not say that it
+failed. Whether the skill had ended by itself stands beside it (`ended_itself`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.control.contact import TrueContact, over
+from skillframe.control.endings import Ended
+from skillframe.execution.drive import Drive, TrialRecorder
+from skillframe.execution.result import Result
+from skillframe.execution.setup import Setup
+from skillframe.execution.tracemeta import SHARE_JOINTS, SHARES
+from skillframe.skill import Status, no_reasons
+
+Journal = Callable[[int], list[tuple[float, str]]]
+
+
+class Outcomes:
+    """Figures of N trials, each taken as its trial ends.
+
+    Args:
+        setup: robot, scene and settings.
+        drive: asked for shares and notes.
+        contact: true contact of the trials, and what the estimate read.
+        count: N.
+
+    Attributes:
+        status: (N,) of the skill (`Status`), set before a trial is closed.
+        touched: of each trial that ended by it, the names of both bodies.
+    """
+
+    def __init__(self, setup: Setup, drive: Drive, contact: TrueContact, count: int) -> None:
+        self.setup, self.drive, self.contact, self.count = setup, drive, contact, count
+        self.touched: dict[int, tuple[str, str]] = {}
+        self.reason, self.status = no_reasons(count), np.zeros(count, dtype=np.int64)
+        self.limited = np.zeros(count, dtype=bool)
+        self.duration, self.ended_by = np.zeros(count), no_reasons(count)
+        self.filtered, self.way = np.full(count, np.nan), np.full(count, np.nan)
+        self.shares = np.full((3, count), np.nan)
+        self.joints = np.full((3, count), "", dtype=object)  # of torque, speed and range, as the shares
+        self.goal, self.errors, self.energy = np.zeros(count, dtype=bool), np.zeros((count, 2)), np.zeros(count)
+
+    def close(self, rows: NDArray[np.int64], time: float, reason: str, code: Ended, limit: bool) -> None:
+        """Judge trials that end now by the scene's goal as they stand.
+
+        Args:
+            rows: of the trials.
+            time: since the start [s].
+            reason: in words.
+            code: what ended them.
+            limit: that was a limit or a fault.
+        """
+        state = self.drive.plant.tip_state()
+        self.goal[rows] = self.setup.scene.goal(state)[rows]
+        self.errors[rows] = np.stack(self.setup.scene.goal_error(state), axis=-1)[rows]
+        if self.setup.scene.way is not None:
+            self.way[rows] = self.setup.scene.way.reached(state)[rows]
+        self.duration[rows], self.limited[rows] = time, limit
+        shares = self.drive.shares()
+        self.energy[rows] = shares.energy[rows]
+        for kind, part in enumerate((shares.torque, shares.speed, shares.range)):
+            if part is not None:
+                self.shares[kind, rows] = part[rows]
+        if shares.joints is not None:
+            self.joints[:, rows] = shares.joints[:, rows]
+        self.filtered[rows] = self.contact.estimate[rows]
+        if limit:
+            self.status[rows] = Status.FAILURE
+        for i in rows:
+            self.reason[i], self.ended_by[i] = reason, code.value
+
+    def result(self, recorder: TrialRecorder | None, journal: Journal, note: str, interrupted: bool) -> Result:
+        """The outcome of every trial.
+
+        Args:
+            recorder: what holds the traces, or None.
+            journal: what the skill notes of a trial.
+            note: a sentence about all trials, or "".
+            interrupted: Ctrl-C came before the end.
+        """
+        success = self.goal & ~self.limited & (self.status != Status.FAILURE)
+        failure = no_reasons(self.count)
+        for i in np.flatnonzero(~success):
+            failure[i] = self._failure(int(i))
+        traces = None
+        if recorder is not None:
+            metas = (self._meta(i, bool(success[i]), str(failure[i]), journal, note) for i in range(self.count))
+            traces = [recorder.trace(i, meta) for i, meta in enumerate(metas)]
+        return Result(
+            success=success, failure=failure, status=self.status, reason=self.reason, duration_s=self.duration,
+            peak_force_n=self.contact.peak, final_error_m=self.errors[:, 0], final_error_rad=self.errors[:, 1],
+            energy_j=self.energy, peak_force_filtered_n=self.filtered, peak_force_10ms_n=self.contact.mean,
+            ended_by=self.ended_by, **dict(zip(SHARES, self.shares, strict=True)),
+            **dict(zip(SHARE_JOINTS, self.joints, strict=True)),
+            goal_reached=self.goal, ended_itself=self.ended_by == Ended.SKILL.value,
+            traces=traces, interrupted=interrupted,
+        )  # fmt: skip
+
+    def _failure(self, i: int) -> str:
+        """Why trial i is no success, in words."""
+        if self.limited[i]:
+            return str(self.reason[i])
+        lacks = "the skill gave up, though the goal is reached" if self.goal[i] else "goal not reached"
+        return f"{lacks}: {self.reason[i]}"
+
+    def _notes(self, i: int, success: bool, note: str) -> list[str]:
+        """Sentences about what a result holds and leaves out."""
+        mark = over(float(self.contact.peak[i]), self.setup.robot.spec.limits.force_n) if success else ""
+        return [*(text for text in (mark, note) if text), *self.drive.notes(i)]
+
+    def _meta(self, i: int, success: bool, failure: str, journal: Journal, note: str) -> dict[str, Any]:
+        scene, actuators = self.setup.scene, list(self.drive.actuators)
+        return {
+            "robot": self.setup.robot.spec.name, "world": scene.name, "params": scene.params,
+            "interface": self.setup.robot.spec.control.figures(),
+            "center_of_compliance": np.asarray(self.setup.center_of_compliance, dtype=float).tolist(),
+            "frames": {k: list(v) for k, v in scene.tool.frames.items()},
+            "hand": scene.tool.hand, "success": success, "failure": failure, "reason": str(self.reason[i]),
+            "status": Status(int(self.status[i])).name, "duration_s": float(self.duration[i]),
+            "peak_force_n": float(self.contact.peak[i]), "peak_force_filtered_n": float(self.filtered[i]),
+            "peak_force_10ms_n": float(self.contact.mean[i]), "ended_by": self.ended_by[i],
+            **{name: _known(share) for name, share in zip(SHARES, self.shares[:, i], strict=True)},
+            **dict(zip(SHARE_JOINTS, self.joints[:, i], strict=True)),
+            "goal_reached": bool(self.goal[i]), "ended_itself": self.ended_by[i] == Ended.SKILL,
+            "notes": self._notes(i, success, note), "final_error_m": float(self.errors[i, 0]),
+            "final_error_rad": float(self.errors[i, 1]), "analytic": scene.analytic,
+            "progress": None if scene.way is None else scene.way.told(_known(self.way[i])),
+            "events": [[time, text] for time, text in journal(i)],
+            "limits": asdict(self.setup.limits), **({"touched": [*self.touched[i]]} if i in self.touched else {}),
+            **({"actuators": actuators} if actuators else {}),
+        }  # fmt: skip
+
+
+def _known(figure: float) -> float | None:
+    """A figure for a file; None where there is none."""
+    return None if np.isnan(figure) else float(figure)
