@@ -64,7 +64,8 @@ class Trace:
             `center_of_compliance`, `skill`, `progress` (`word`, `of_m`, `reached_m`; null in a world without a depth),
             `events` ([[t, text]]),
             `scores` ({name: {`value`, `unit`, `summary`}}, null for a trial without that figure; where asked for),
-            `actuators` (joints with one of their own), `notes` (sentences about what stood in for what), and `bodies`:
+            `actuators` (joints with one of their own), `notes` (sentences about what stood in for what), `touched`
+            (names of two bodies, where that ended it), and `bodies`:
             [{`name`, `geoms`: [{`kind`, `size`, `position`, `quaternion`, `rgba`, `vertices`, `faces`}]}] in the order
             of the body arrays.
     """
