@@ -122,7 +122,7 @@ class MachineDrive:
 
     def _watch(self, known: Cylinders) -> MachineWatch:
         noise = self.setup.robot.spec.sensors
-        return MachineWatch(self.law, known, self.gauges, noise, moved_joints(self.chain), self.dt)
+        return MachineWatch(self.law, self.valves, known, self.gauges, noise, moved_joints(self.chain), self.dt)
 
     def _begin(self, draws: Draws) -> None:
         """FMUs in equilibrium with the load, the step judged against it, sensors and law at rest."""

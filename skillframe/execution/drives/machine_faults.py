@@ -40,8 +40,6 @@ class BrokenParts:
         self._bank, self._spool = bank, bank.outputs.index("spool")
         self._holes = {s: bank.inputs.index(f"burst_{s}") for s in "ab" if f"burst_{s}" in bank.inputs}
         self._drop = bank.inputs.index("supply_drop") if "supply_drop" in bank.inputs else None
-        for column in (*self._holes.values(), *([] if self._drop is None else [self._drop])):
-            bank.u[:, column] = 0.0  # a bank is used again
         gauges.fault = self._faults.read
 
     def tick(self) -> None:

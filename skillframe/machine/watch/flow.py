@@ -13,6 +13,8 @@ what sound cranes leave.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,8 +27,18 @@ WINDOW, LAGS = 5, (1, 2, 3)
 """Looks that a balance spans; lags in looks, 20 to 60 ms, of which spool and filters of the shipped crane take 20."""
 FLOOR, FLOOR_IN_SWING, SHARE = 5e-4, 1e-3, 0.5
 """Way of the piston [m], and share of the flow, that do not count."""
+UNSURE = 1e6
+"""Standard deviation of a supply pressure [Pa] above which a valve may let through anything from nothing to (2)."""
 ALIKE = 0.25
 """Below this share of the other one, a way is none."""
+
+
+class Knowledge(NamedTuple):
+    """Of the valves (N, k): supply pressure and its standard deviation `unsure` [Pa], overlap."""
+
+    supply: Float
+    overlap: Float
+    unsure: Float
 
 
 class FlowWatch:
@@ -46,25 +58,26 @@ class FlowWatch:
         self._told: Float = np.zeros((self._length, 4, count, len(names)))
         self._seen: Float = np.zeros((self._length, 3, count, len(names)))
         self._looks = 0
+        self._vague: NDArray[np.int64] = np.zeros((count, len(names)), dtype=np.int64)
+        """Looks for which what the valves let through is not known from below, (N, k)."""
 
-    def look(
-        self, valve: Float, seen: Measured, terms: Terms, knowledge: tuple[Float, Float], swing: bool
-    ) -> list[Suspicion]:
+    def look(self, valve: Float, seen: Measured, terms: Terms, knowledge: Knowledge, swing: bool) -> list[Suspicion]:
         """Judge the balances.
 
         Args:
             valve: (N, k) mean command since the last look.
             seen: readings.
             terms: where the pistons are.
-            knowledge: supply pressure [Pa] and overlap (N, k).
+            knowledge: of the valves.
             swing: before the skill starts.
         """
         pressures = np.stack([seen.pressure_a, seen.pressure_b])
         now, before = self._looks % self._length, (self._looks - 1) % self._length
-        self._flows(valve, pressures, *knowledge, out=self._told[now])
+        self._flows(valve, pressures, knowledge.supply, knowledge.overlap, out=self._told[now])
         self._told[now] += self._told[before]
         self._seen[now, 0], self._seen[now, 1:] = terms.piston, pressures
         self._looks += 1
+        self._vague = np.where(knowledge.unsure > UNSURE, self._length, np.maximum(self._vague - 1, 0))
         return self._judge(terms.piston, swing) if self._looks >= self._length else []
 
     def _flows(self, valve: Float, pressures: Float, supply: Float, overlap: Float, out: Float) -> None:
@@ -96,7 +109,8 @@ class FlowWatch:
             return []
         every = np.stack([self._told_at(lag) for lag in LAGS])
         low, high, most = every[:, :2].min(axis=0), every[:, :2].max(axis=0), every[:, 2:].max(axis=0)
-        meant = np.clip(taken, low, high)
+        vague = self._vague > 0  # a supply that may be so much lower, or was taken for higher, may feed nothing
+        meant = np.clip(taken, np.where(vague, np.minimum(low, 0.0), low), np.where(vague, np.maximum(high, 0.0), high))
         beyond = np.abs(taken - meant) > spare + SHARE * most
         return [
             self._finding(int(i), int(k), gone[0, i, k], taken[:, i, k], meant[:, i, k], beyond[:, i, k])

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from skillframe.control.endings import Broken, Ended
 from skillframe.frames import Float
+from skillframe.machine.force.valve import ValveIdentification
 from skillframe.machine.law.hydraulic import Measured, Reference, Terms
 from skillframe.machine.law.hydraulic_compiled import CompiledLaw
 from skillframe.machine.law.vdc_actuator import Cylinders
 from skillframe.machine.sensors import RECENT, MachineSensors
-from skillframe.machine.watch.flow import FlowWatch
+from skillframe.machine.watch.flow import FlowWatch, Knowledge
 from skillframe.machine.watch.readings import ReadingWatch, Suspicion
 from skillframe.machine.watch.tool import ToolWatch
 from skillframe.robot.driven import MachineNoise
@@ -23,18 +24,19 @@ class MachineWatch:
     """Of N machines.
 
     Args:
-        law: with what it knows of valves and supply; cylinders: as the controller knows them.
+        law: with what it knows of valves and supply; valves: what finds that out, and how surely.
+        cylinders: as the controller knows them.
         gauges: the sensors; noise: theirs, as robot.toml says it.
         moved: (k,) which coordinate each cylinder moves.
         dt: [s] of a tick.
     """
 
     def __init__(
-        self, law: CompiledLaw, cylinders: Cylinders, gauges: MachineSensors, noise: MachineNoise,
-        moved: NDArray[np.int64], dt: float,
+        self, law: CompiledLaw, valves: ValveIdentification, cylinders: Cylinders, gauges: MachineSensors,
+        noise: MachineNoise, moved: NDArray[np.int64], dt: float,
     ) -> None:  # fmt: skip
         chain, period, count = law.chain, RECENT * dt, gauges.raw.shape[1]
-        self._law, self._gauges, self._tick = law, gauges, 0
+        self._law, self._valves, self._gauges, self._tick = law, valves, gauges, 0
         speed = chain.minimal(chain.model.velocityLimit)
         names = (tuple(chain.independent), tuple(chain.actuated))
         self._readings = ReadingWatch(noise, speed, cylinders.return_pressure, moved, names, dt)
@@ -65,7 +67,7 @@ class MachineWatch:
         raw = np.roll(self._gauges.raw, -self._gauges.turn, axis=0)
         found = self._readings.look(raw, self._gauges.chambers, terms.piston_rate)
         if due:
-            knowledge = self._law.supply, self._law.deadband
+            knowledge = Knowledge(self._law.supply, self._law.deadband, self._valves.supply_deviation)
             found += self._flow.look(self._told / RECENT, seen, terms, knowledge, swing)
             if not swing:  # a machine that swings by itself there is told so at its end, with what to lower
                 found += self._tool.look(terms.tip_rate, reference.position - terms.tip, seen.force, reference)
