@@ -151,11 +151,11 @@ class Admittance:
         """How many times longer than taught a skill takes, 1 at least."""
         return max(1.0, TAUGHT_SPEED / self.speed)
 
-    def told(self) -> str:
-        """The figures in a line, for people."""
+    def told(self, lever: float = 0.0) -> str:
+        """The figures in a line, for people; `lever` as of `turning_damping`."""
         return (
             f"takes a {self.kind} {self.rate:g} times a second and answers {1e3 * self.total_delay:.0f} ms late; "
-            f"damping {self.damping:.0f} Ns/m and {self.turning_damping():.2g} Nms/rad for contacts of "
+            f"damping {self.damping:.0f} Ns/m and {self.turning_damping(lever):.2g} Nms/rad for contacts of "
             f"{self.stiffness:.2g} N/m; at most {1e3 * self.speed:.1f} mm/s at {self.push[0]:g} N, so skills take "
             f"{self.slow_down:.1f} times as long as taught"
         )

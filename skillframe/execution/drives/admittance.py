@@ -75,8 +75,8 @@ class AdmittanceDrive(TorqueDrive):
 
     def notes(self, i: int) -> list[str]:
         """What the arm takes, and by which clock the skill ran."""
-        clock = f"; its clock ran {self.arm.slow_down:.1f} times slower" if self.arm.slow_down > 1.0 else ""
-        return [*super().notes(i), f"the arm {self.arm.told()}{clock}"]
+        clock = f"; the skill's clock ran {self.arm.slow_down:.1f} times slower" if self.arm.slow_down > 1.0 else ""
+        return [*super().notes(i), f"the arm {self.arm.told(self._lever)}{clock}"]
 
     def _tell(self, command: Command, ramp: float) -> None:
         """A step of the law, and the joints on by what it makes."""

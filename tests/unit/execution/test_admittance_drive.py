@@ -119,7 +119,8 @@ def test_time_limits_are_stretched_with_the_skills_clock_and_every_result_says_s
     meta = result.traces[0].meta
     assert meta["interface"]["takes"] == "position"
     assert any(
-        "takes a position 500 times a second" in n and "its clock ran 2.7 times slower" in n for n in meta["notes"]
+        "takes a position 500 times a second" in n and "the skill's clock ran 2.7 times slower" in n
+        for n in meta["notes"]
     )
 
 
