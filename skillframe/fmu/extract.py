@@ -22,7 +22,10 @@ from skillframe.paths import cache_dir
 
 LARGEST = 1_000_000_000  # bytes unpacked; more is taken for a trap
 LARGEST_DESCRIPTION = 100_000_000  # bytes
-THIN, DENSEST = 10_000_000, 200  # a file above so many bytes that was packed to less than a 200th is a trap as well
+THIN, DENSEST = (
+    10_000_000,
+    200,
+)  # what is above so many bytes and was packed to less than a 200th, a file or all of them, is a trap
 OLD_S = 3600.0  # age of what an unpacking left that was killed
 DESCRIBED_BY = ("modelDescription.xml", "sources/buildDescription.xml")
 MOST_FILES = 20_000
@@ -153,6 +156,9 @@ def _check(path: Path, members: list[zipfile.ZipInfo]) -> None:
         if member.file_size > max(THIN, DENSEST * member.compress_size):
             problem = f"holds {member.orig_filename!r}, {member.compress_size} bytes that unpack to {member.file_size}"
             raise InputError(path, problem, "do not trust this file")
+    if total > max(THIN, DENSEST * sum(m.compress_size for m in members)):
+        problem = f"unpacks to {total} bytes, more than {DENSEST} times what it packs them to"
+        raise InputError(path, problem, "do not trust this file")
     described = sum(m.file_size for m in members if m.filename in DESCRIBED_BY)
     if described > LARGEST_DESCRIPTION:
         raise InputError(path, f"has a model description of {described} bytes", f"{LARGEST_DESCRIPTION} are the most")

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+import zipfile
 from contextlib import suppress
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from skillframe.fmu.child import Child, SandboxLimits
 from skillframe.fmu.inspection import inspect_fmu
 from skillframe.fmu.sandbox import SandboxBank
 from skillframe.fmu.toolchain import find_compiler
+from skillframe.paths import cache_dir
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.oracle import fmus
 from tests.oracle.attacks import ATTACKS, SECRET, processes, written
@@ -236,3 +238,56 @@ def cylinder(folder, name, prelude, step):
     (source / "own.h").write_text(OWN)
     (source / f"{name}.c").write_text(prelude + SOURCE.format(step=step, share=1.0))
     return build_fmu(source, 2, out=folder / f"{name}.fmu")
+
+
+HEAD = (
+    '<?xml version="1.0" encoding="UTF-8"?><fmiModelDescription fmiVersion="2.0" modelName="big" guid="x">'
+    '<CoSimulation modelIdentifier="big"/><ModelVariables>'
+)
+TAIL = "</ModelVariables><ModelStructure/></fmiModelDescription>"
+VARIABLE = '<ScalarVariable name="v%d" valueReference="%d"><Real/></ScalarVariable>'
+
+
+def zipped(path, description, resources=()):
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("modelDescription.xml", description)
+        for name, megabytes in resources:
+            with archive.open(name, "w") as file:
+                for _ in range(megabytes):
+                    file.write(bytes(1_000_000))
+    return path
+
+
+WEIGHED = (
+    "import resource, sys; from skillframe.cli.main import run; code = run(['fmu', 'check', *sys.argv[1:]]);"
+    "print('MB', resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024); sys.exit(code)"
+)
+
+
+@pytest.mark.slow
+def test_a_description_of_600_000_variables_costs_this_process_neither_time_nor_memory(mark):
+    """Read here it took two minutes and 2 GB. Importing and asking a child takes some 100 MB and a second."""
+    path = zipped(mark / "big.fmu", HEAD + "".join(VARIABLE % (i, i) for i in range(600_000)) + TAIL)
+    code, out, err, seconds = ended_in(mark, WEIGHED, path)
+    assert code == 2 and "describes 600000 variables, where 100000 are the most" in err
+    # below a fifth of what it took; this machine may be busy
+    assert int(out.rpartition("MB ")[2]) < 400 and seconds < 24.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("resources", "words"),
+    [
+        ([("resources/zeros", 1900)], "unpacks to 2 files of 19000"),
+        ([(f"resources/{i}", 9) for i in range(100)], "more than 200 times what it packs them to"),
+        ([("resources/zeros", 200)], "bytes that unpack to 200000000"),
+    ],
+)
+def test_a_zip_of_zeros_is_refused_and_nothing_of_it_reaches_the_cache(mark, resources, words):
+    """1.9 GB in one file, 900 MB in files that are each small, and 200 MB."""
+    path = zipped(mark / "zeros.fmu", HEAD + VARIABLE % (0, 0) + TAIL, resources)
+    before = set(cache_dir("fmus-unpacked").iterdir())
+    code, _, err, _ = ended_in(mark, WEIGHED, path)
+    assert code == 2 and words in err
+    assert set(cache_dir("fmus-unpacked").iterdir()) == before
+    assert path.stat().st_size < 3_000_000
