@@ -109,7 +109,7 @@ VARIED = (
     Varied("actuator.supply_pressure", "Pa", None, "supply pressure of a hydraulic machine",
            Range(1e5, 1e8, "from the air's own pressure to twice what pumps of cranes give")),
     Varied("actuator.deadband", "", None, "dead band of a hydraulic machine's valves, of their full stroke",
-           Range(0.0, 1.0, "a share of the stroke")),
+           Range(0.0, 0.99, "as a valve without a stroke left moves nothing")),
     *(Varied(f"actuator.{name}", "", 1.0, about, limits) for name, (about, limits) in _SCALED.items()),
     *_CYLINDERS,
     Varied("actuator.delay", "s", 0.0, "delay between command and valve of a hydraulic machine, or servo of an arm",
