@@ -126,7 +126,7 @@ def test_an_arm_has_none_of_these_faults(name, robot):
     [
         ("sensor.pressure_frozen", 0.5, "is 0.5, and something is broken or not; give 1 or 0"),
         ("actuator.runaway", 2.0, "2 is beyond -1 to 1, the spool's travel"),
-        ("actuator.burst_a", 1.3, "1.3 m2 is beyond 0 m2 to 0.01 m2, a hole of 11 cm"),
+        ("actuator.burst_a", 1.3, "1.3 m2 is beyond 0m2 to 0.01m2, a hole of 11 cm"),
         ("actuator.supply_loss", -0.1, "-0.1 is beyond 0 to 1, a share"),
         ("sensor.encoder_step", 90.0, "90 rad is beyond .*; did you mean 90deg"),
         ("fault.cylinder", 4.0, "is 4, which is none of its cylinders; give one of 1 lift_piston, 2 tilt_piston, 3"),

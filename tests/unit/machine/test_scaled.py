@@ -34,7 +34,7 @@ def test_a_factor_leaves_every_other_figure_and_cylinder_alone():
 
 def test_a_valve_without_flow_and_a_cylinder_that_is_not_there_are_refused():
     for name in ("valve_scale", "bulk_scale_1"):
-        with pytest.raises(InputError, match=f"actuator.{name}: must be positive, is 0; give 1 for the nominal figure"):
+        with pytest.raises(InputError, match=f"actuator.{name}: 0 is beyond 0.01 to 100"):
             rows(**{name: [0.0, 1.0]})
     with pytest.raises(InputError, match="panda has no actuators of its own"):
         check_quantities({"actuator.valve_scale_1": np.ones(1)}, load_model(load_robot("panda")))
