@@ -88,7 +88,7 @@ def __getattr__(name: str) -> Any:
 
 
 def _robots_of_plugins(name: str | None = None) -> "Mapping[str, Path]":
-    """Folders of registered robots; the registry is loaded when a robot is asked for that is not shipped."""
+    """Folders of registered robots. The registry is loaded when a robot is asked for that is not shipped."""
     from skillframe.extend.robots import folders
 
     return folders(name)

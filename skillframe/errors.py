@@ -88,7 +88,7 @@ class MissingDependency(SkillframeError):
 
 
 def missing_extra(module: str) -> MissingDependency | None:
-    """What is said where a module cannot be imported because an extra is not installed; None for any other module."""
+    """What is said where a module cannot be imported because an extra is not installed. None for any other module."""
     if module.partition(".")[0] not in LIBRARIES:
         return None
     library, extra = LIBRARIES[module.partition(".")[0]]
@@ -127,7 +127,7 @@ class SkillframeWarning(UserWarning):
 
 
 def suggest(name: str, known: Iterable[str]) -> str | None:
-    """Nearest of the known names, or None if none is near; a name can be near as a whole or by its beginning."""
+    """Nearest of the known names, or None if none is near. A name can be near as a whole or by its beginning."""
 
     def likeness(other: str) -> tuple[float, float, str]:
         texts = (other, other[: len(name)])

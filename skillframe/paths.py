@@ -30,7 +30,7 @@ def shipped_dirs(kind: str) -> list[Path]:
 
 
 def checkout() -> Path | None:
-    """The folder of the source code that this package runs from; None where it was installed from a wheel."""
+    """The folder of the source code that this package runs from. None where it was installed from a wheel."""
     folder = _PACKAGE.parent
     return folder if (folder / "plugins" / "all.txt").is_file() else None
 

@@ -181,7 +181,7 @@ class RecordConformance:
         assert self._record().summary
 
     def test_conforms(self) -> None:
-        """It obeys the contract; what it does not obey is named."""
+        """It obeys the contract. What it does not obey is named."""
         _demand(self._problems())
 
 

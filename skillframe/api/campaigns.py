@@ -177,7 +177,7 @@ class Campaign:
         self.spec = CampaignSpec.from_table(table, name)
 
     def _entries(self, skills: Skills | Sequence[Skills] | Mapping[str, Skills]) -> list[str]:
-        """The entries of `skills`, with absolute paths; what is in memory is written into a folder of its own."""
+        """The entries of `skills`, with absolute paths. What is in memory is written into a folder of its own."""
         if isinstance(skills, Mapping) and "format" not in skills:
             return [self._written(skill_of(skill), name) for name, skill in skills.items()]
         alone = isinstance(skills, str | os.PathLike | LearnedSkill | Mapping)
@@ -263,7 +263,7 @@ def _script_unseen() -> Iterator[None]:
 
 
 def _table(plan: File | Mapping[str, Any] | None) -> dict[str, Any]:
-    """The keys of a plan; a file's, with absolute paths."""
+    """The keys of a plan. A file's, with absolute paths."""
     if plan is None or isinstance(plan, Mapping):
         return {**DEFAULTS, **(plan or {})}
     table, folder = read_toml(Path(plan)), Path(plan).absolute().parent
@@ -280,7 +280,7 @@ def _absolute(entry: str, folder: Path) -> str:
 
 
 def _robot_entry(robot: object) -> object:
-    """What a campaign file calls a robot; what is no robot is left to the plan's own check."""
+    """What a campaign file calls a robot. What is no robot is left to the plan's own check."""
     if isinstance(robot, RobotModel | RobotSpec):
         spec = robot.spec if isinstance(robot, RobotModel) else robot
         file = spec.folder / "robot.toml"

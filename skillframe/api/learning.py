@@ -59,7 +59,7 @@ class LearnedSkill:
 
     @property
     def phases(self) -> list[dict[str, Any]]:
-        """The phases; what one holds is its kind's business."""
+        """The phases. What one holds is its kind's business."""
         phases: list[dict[str, Any]] = self.document["phases"]
         return phases
 
@@ -76,7 +76,7 @@ class LearnedSkill:
         return kind.explain(self.document) if kind.explain is not None else []
 
     def save(self, path: File) -> LearnedSkill:
-        """Write the skill file, whole or not at all; gives the same skill under the file's name.
+        """Write the skill file, whole or not at all. Gives the same skill under the file's name.
 
         Raises:
             InputError: the file cannot be written.
@@ -87,7 +87,7 @@ class LearnedSkill:
         )
 
     def explain(self, out: File) -> int:
-        """Write words and pictures as one HTML page (.html); gives the number of pictures.
+        """Write words and pictures as one HTML page (.html). Gives the number of pictures.
 
         Raises:
             InputError: the file cannot be written.
@@ -141,7 +141,7 @@ def learn(
     demonstrations: Demonstrations, skill: str = "lmc", *, at: str | None = None, hand: str | None = None,
     axes: str = "base", **settings: Any,
 ) -> LearnedSkill:  # fmt: skip
-    """Learn a skill from demonstrations of one phase; for a whole task see `segment`.
+    """Learn a skill from demonstrations of one phase. For a whole task see `segment`.
 
     What looks wrong in the recordings (a biased wrench, gaps) is warned of, as a `SkillframeWarning`.
 
@@ -201,7 +201,7 @@ def segment(
 
 
 def segment_with(demonstrations: Demonstrations, options: LearnOptions) -> LearnedSkill:
-    """As `segment`, for settings of any name; `options.settings` names the `segmenter`."""
+    """As `segment`, for settings of any name. `options.settings` names the `segmenter`."""
     registry().segmenter(options.settings["segmenter"])
     kind = registry().skill("policy")
     document = source.learned(kind, demonstrations_of(demonstrations), options)

@@ -82,7 +82,7 @@ def _person(teacher: str | Person | None, robot: RobotModel, scene: Scene) -> Pe
 
 
 def seeing(teacher: str | None, scene: Scene) -> TeacherSettings | BlindSettings:
-    """The person of a name as by default; one who is blindfolded believes what the world's task says."""
+    """The person of a name as by default. One who is blindfolded believes what the world's task says."""
     if teacher == "blind":
         return BlindSettings(believed=scene.task.believed)
     if teacher == "teleoperation":

@@ -40,7 +40,7 @@ def report(results: Results | Iterable[Results], out: File = "report.html") -> P
 
 
 def _files(results: Iterable[Results], folder: Path) -> Iterator[Path]:
-    """The folder or file of each; a run in memory is written for as long as the report is made."""
+    """The folder or file of each. A run in memory is written for as long as the report is made."""
     for number, each in enumerate(results, start=1):
         if isinstance(each, CampaignResults):
             yield each.folder

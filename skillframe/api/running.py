@@ -66,7 +66,7 @@ class SingleRun:
 
     @property
     def failure(self) -> str:
-        """Why not, in words; "" for a success."""
+        """Why not, in words. "" for a success."""
         return str(self.trace.meta["failure"])
 
     @property
@@ -96,7 +96,7 @@ class SingleRun:
 
     @property
     def scores(self) -> dict[str, float | None]:
-        """The scores that were asked for, by name, in SI units; None where this run has no such figure."""
+        """The scores that were asked for, by name, in SI units. None where this run has no such figure."""
         return {name: about["value"] for name, about in (self.trace.meta.get("scores") or {}).items() if about}
 
     @property
@@ -244,7 +244,7 @@ def once(
 
 
 def _score(trace: Trace, names: Sequence[str]) -> SkillframeError | None:
-    """Put the scores into the trace's metadata; the error of one that fails."""
+    """Put the scores into the trace's metadata. The error of one that fails."""
     if names:
         try:
             trace.meta["scores"] = score_notes(scores_of(trace, names))
@@ -254,7 +254,7 @@ def _score(trace: Trace, names: Sequence[str]) -> SkillframeError | None:
 
 
 def _setup(robot: RobotModel, scene: Scene, coc: str | None) -> Setup:
-    """The set-up of a skill that steps itself; it says nothing of where it was learned."""
+    """The set-up of a skill that steps itself. It says nothing of where it was learned."""
     center = resolve_point(coc, scene.tool.frames)
     return Setup(robot=robot, scene=scene, center_of_compliance=center, make_drive=drive_maker(robot))
 
@@ -263,7 +263,7 @@ def _command(
     skill: LearnedSkill, world: World, robot: Robot, coc: str | None, settings: Settings | None, seed: int,
     duration_s: float, rate_hz: float, scores: Sequence[str],
 ) -> str:  # fmt: skip
-    """What to type to get the same run again, without where it goes; "" where objects of Python cannot be typed."""
+    """What to type to get the same run again, without where it goes. "" where objects of Python cannot be typed."""
     named = robot if isinstance(robot, str | os.PathLike) else None
     if skill.source is None or named is None or not isinstance(world, str):
         return ""

@@ -1,4 +1,4 @@
-"""What can be set of a trial and of a world, a row each; and which bare numbers look like millimetres or degrees."""
+"""What can be set of a trial and of a world, and which bare numbers look like millimetres or degrees."""
 
 from __future__ import annotations
 

@@ -244,7 +244,7 @@ class ClusterPool(Generic[WorkT]):
         return time.monotonic() - task.gone_since > GONE_S
 
     def _answer(self, future: Any, task: _Task[WorkT]) -> Answer | None:
-        """What became of a job; None if its worker left before it began, or with the rows before they were fetched."""
+        """What became of a job. None if its worker left before it began, or with the rows before they were fetched."""
         from distributed import KilledWorker
         from distributed.client import FutureCancelledError
 
@@ -275,7 +275,7 @@ class ClusterPool(Generic[WorkT]):
         return answer
 
     def _fetched(self, gathered: Any, task: _Task[WorkT]) -> bool:
-        """Wait for rows on their way; False if their worker died with them, for no other worker may make them again."""
+        """Wait for rows on their way. False if their worker died with them, for no other worker may make them again."""
         while not wait([gathered], timeout=LOOK_S).done:
             self._crew.look()
             if self._is_gone(task):
@@ -283,7 +283,7 @@ class ClusterPool(Generic[WorkT]):
         return True
 
     def _goes_elsewhere(self, task: _Task[WorkT], answer: Answer) -> bool:
-        """Whether trouble of the environment sends a job to another worker; the one that had it gets no more work."""
+        """Whether trouble of the environment sends a job to another worker. The one that had it gets no more work."""
         if not isinstance(answer, Raised) or not answer.trouble or (answer.memory and task.job.size > 1):
             return False
         task.tried.add(task.worker)

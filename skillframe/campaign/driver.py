@@ -51,7 +51,7 @@ class Pool(Protocol[WorkT]):
         """Start a job."""
 
     def next(self) -> tuple[WorkT, Answer]:
-        """The next job to end, and how; trouble of the environment only where no other worker is left to try."""
+        """The next job to end, and how. Trouble of the environment only where no other worker is left to try."""
 
     def close(self) -> None:
         """End everything, including what is in flight."""
@@ -163,7 +163,7 @@ def chunk_size(trials: int, workers: int, largest: int) -> int:
 
 
 class InProcess(Generic[WorkT]):
-    """A pool of one: this process; a trial that kills it ends the campaign, which can be resumed.
+    """A pool of one: this process. A trial that kills it ends the campaign, which can be resumed.
 
     Args:
         evaluate: the work.

@@ -91,7 +91,7 @@ def describe(spec: CampaignSpec) -> dict[str, Any]:
 
 
 def _robot_notes(robot: RobotModel) -> list[str]:
-    """Sentences on what the robot's description leaves out; what drives of machines and plug-ins say is theirs."""
+    """Sentences on what the robot's description leaves out. What drives of machines and plug-ins say is theirs."""
     return [] if robot.spec.hydraulic or robot.spec.other_drive else unstated(robot)
 
 

@@ -79,7 +79,7 @@ def prepare(spec: CampaignSpec, out: Path, describe: Describe, params: type) -> 
 
 
 def sweep(folder: Path) -> None:
-    """Remove what killed sessions left half written; only under the folder's lock."""
+    """Remove what killed sessions left half written. Only under the folder's lock."""
     for place in (folder, folder / "traces"):
         remove_temporary(place)
 

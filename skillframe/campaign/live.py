@@ -33,7 +33,7 @@ def has_ended(folder: Path) -> bool:
 
 
 def live_table(folder: Path, skills: Sequence[object]) -> str | None:
-    """The stored rows as the text of a results.csv; None where results.csv itself is to be read.
+    """The stored rows as the text of a results.csv. None where results.csv itself is to be read.
 
     Args:
         folder: of a campaign.
@@ -49,7 +49,7 @@ def live_table(folder: Path, skills: Sequence[object]) -> str | None:
 
 
 def _labels(folder: Path, skills: Sequence[object]) -> list[str]:
-    """What the skills are called in rows; none where one of them cannot be read."""
+    """What the skills are called in rows. None where one of them cannot be read."""
     try:
         return [parse_source(str(text), folder).label for text in skills]
     except SkillframeError:

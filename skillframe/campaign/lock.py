@@ -112,7 +112,7 @@ def _may_be_writing(path: Path, pid: int, host: str) -> InputError:
 
 
 def _owner(descriptor: int) -> tuple[int, str]:
-    """Pid and host in a lock file; 0 and "" where it is empty or damaged."""
+    """Pid and host in a lock file. 0 and "" where it is empty or damaged."""
     try:
         os.lseek(descriptor, 0, os.SEEK_SET)
         content = json.loads(os.read(descriptor, 4096))
@@ -122,7 +122,7 @@ def _owner(descriptor: int) -> tuple[int, str]:
 
 
 def holder(folder: Path) -> tuple[int, str] | None:
-    """Pid and host of the process that is writing a campaign, or None; on Windows it may have been killed."""
+    """Pid and host of the process that is writing a campaign, or None. On Windows it may have been killed."""
     try:
         descriptor = os.open(folder / NAME, os.O_RDONLY)
     except FileNotFoundError:

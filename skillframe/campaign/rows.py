@@ -108,7 +108,7 @@ def dead_row(spec: CampaignSpec, skill: int, trial: int, failure: str) -> Row:
 
 
 def plain_value(value: Any) -> Any:
-    """A numpy scalar as Python's own; a skill's words as text that can be stored."""
+    """A numpy scalar as Python's own. A skill's words as text that can be stored."""
     value = value.item() if isinstance(value, np.generic) else value
     return shown(value) if isinstance(value, str) else value
 
@@ -136,7 +136,7 @@ def cell(value: Any) -> str:
 
 
 def differences(stored: Row, again: Row) -> dict[str, tuple[Any, Any]]:
-    """Columns of a stored row that are not bit-identical when it runs again; two NaN are the same.
+    """Columns of a stored row that are not bit-identical when it runs again. Two NaN are the same.
 
     Columns that the stored row lacks came with a later version.
     """

@@ -130,7 +130,7 @@ class CampaignSpec:
         return plan_of(self.vary, trials=self.trials, skills=len(self.skills), may_stop=may_stop)
 
     def plain(self) -> dict[str, Any]:
-        """The campaign as plain JSON values, as `from_plain` reads them; without its folder.
+        """The campaign as plain JSON values, as `from_plain` reads them, without its folder.
 
         Scores are in it where there are some, so that the hashes of campaigns without them stay as they were.
         """

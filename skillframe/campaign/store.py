@@ -207,7 +207,7 @@ def _line(record: Mapping[str, Any]) -> bytes:
 
 
 def _is_intact(line: bytes) -> bool | None:
-    """Whether a line is as it was written; None if it carries no checksum."""
+    """Whether a line is as it was written. None if it carries no checksum."""
     found = re.search(rb', "crc32": "([0-9a-f]{8})"\}$', line)
     return None if found is None else zlib.crc32(line[: found.start()]) == int(found[1], 16)
 

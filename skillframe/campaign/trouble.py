@@ -81,7 +81,7 @@ def needed(what: str) -> Iterator[None]:
 
 
 def attempt(evaluate: Callable[[WorkT], list[Row]], job: WorkT) -> list[Row] | Raised:
-    """Run a job; what it raises is judged, `sys.exit` included, and only Ctrl-C goes through."""
+    """Run a job. What it raises is judged, `sys.exit` included, and only Ctrl-C goes through."""
     try:
         return evaluate(job)
     except KeyboardInterrupt:
@@ -93,7 +93,7 @@ def attempt(evaluate: Callable[[WorkT], list[Row]], job: WorkT) -> list[Row] | R
 
 
 def said(error: BaseException) -> str:
-    """An error in words: its own sentence if it is one of ours, else with its kind; never empty."""
+    """An error in words: its own sentence if it is one of ours, else with its kind. Never empty."""
     if isinstance(error, ModuleNotFoundError) and (missing := missing_extra(error.name or "")):
         error = missing
     text = str(error)

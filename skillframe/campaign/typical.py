@@ -1,4 +1,4 @@
-"""Which trial is typical: the one whose figure is nearest to the median; of a tie the earlier one."""
+"""Which trial is typical: the one whose figure is nearest to the median, the earlier of two."""
 
 from __future__ import annotations
 

@@ -6,11 +6,11 @@ from typing import Protocol, TypeVar
 
 
 class Work(Protocol):
-    """A job; it is pickled on its way to a worker."""
+    """A job. It is pickled on its way to a worker."""
 
     @property
     def size(self) -> int:
-        """How many rows it gives; progress is counted in them."""
+        """How many rows it gives. Progress is counted in them."""
 
 
 WorkT = TypeVar("WorkT", bound=Work)

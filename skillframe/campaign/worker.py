@@ -33,7 +33,7 @@ def dask_setup(worker: object) -> None:
 
 
 def guarded(evaluate: Callable[[WorkT], list[Row]], job: WorkT, seconds: float, watch: str) -> list[Row] | Raised:
-    """Run a job; once it makes no progress any more, the process is ended and what it was doing is written to a file.
+    """Run a job. Once it makes no progress any more, the process is ended and what it was doing is written to a file.
 
     Args:
         evaluate: the work.

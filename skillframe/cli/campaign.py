@@ -83,7 +83,7 @@ def run(file: Path, out: Path, as_json: bool, **settings: Any) -> int:
 @click.argument("folder", type=_FOLDER)
 @_running
 def resume(folder: Path, as_json: bool, **settings: Any) -> int:
-    """Run what is missing of the campaign in FOLDER; ends in the table an uninterrupted run gives.
+    """Run what is missing of the campaign in FOLDER. Ends in the table an uninterrupted run gives.
 
     Exit codes as for `run`.
 
@@ -98,7 +98,7 @@ def resume(folder: Path, as_json: bool, **settings: Any) -> int:
 @click.argument("folder", type=_FOLDER)
 @click.option("--json", "as_json", is_flag=True, help="JSON alone on stdout.")
 def status(folder: Path, as_json: bool) -> int:
-    """How far the campaign in FOLDER is, and its rates so far; may be asked while it runs.
+    """How far the campaign in FOLDER is, and its rates so far. May be asked while it runs.
 
     \b
     Example:

@@ -92,7 +92,7 @@ def show_rates(skills: dict[str, dict[str, Any]]) -> None:
 
 @contextmanager
 def progress() -> Iterator[Callable[[Progress], None]]:
-    """A bar on a terminal, a line per tenth of the work in a pipe, both on stderr; with -q only what is unusual."""
+    """A bar on a terminal, a line per tenth of the work in a pipe, both on stderr. With -q only what is unusual."""
     import sys
 
     if is_quiet():

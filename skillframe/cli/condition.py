@@ -43,7 +43,7 @@ def command(
     file: Path, out: Path, method: str, bias: bool, weight: bool | None, free_air: str | None, noise: str | None,
     corner: float | None, as_json: bool,
 ) -> int:  # fmt: skip
-    """Filter a demonstration's wrench; remove bias and tool weight.
+    """Filter a demonstration's wrench. Remove bias and tool weight.
 
     Noise figures come from the recording unless they are given. Weight can be told from bias only if the tool turns in
     free air; if it does not turn enough, the bias alone is removed and a sentence says about which axis to turn it.

@@ -102,7 +102,7 @@ class _Requirement(NamedTuple):
 
 
 def _requirements(distribution: str) -> Iterator[_Requirement]:
-    """The declared dependencies of a distribution, held against what is installed; nothing is imported."""
+    """The declared dependencies of a distribution, held against what is installed. Nothing is imported."""
     for requirement in metadata.requires(distribution) or []:
         match = re.match(r"([\w.-]+)(?:\[[\w,-]+\])?\s*(?:[<>=!,.\d]*>=\s*([\d.]+))?", requirement)
         if match is None:
@@ -124,7 +124,7 @@ def _libraries() -> Iterator[Check]:
 
 
 def _extras(distribution: str) -> Iterator[Check]:
-    """What the extras of a distribution install, a row each; `all` is no more than the others together."""
+    """What the extras of a distribution install, a row each. `all` is no more than the others together."""
     requirements = list(_requirements(distribution))
     for extra in dict.fromkeys(each.extra for each in requirements if each.extra not in ("", "all")):
         needed = [each for each in requirements if each.extra == extra]

@@ -31,7 +31,7 @@ def command() -> None:
 @command.command("list")
 @click.option("--json", "as_json", is_flag=True, help="As JSON on stdout.")
 def list_(as_json: bool) -> None:
-    """List the FMUs that are built; name those that are not.
+    """List the FMUs that are built. Name those that are not.
 
     \b
     Example:
@@ -97,7 +97,7 @@ def _line(row: BuiltFmu) -> str:
 @click.option("--json", "as_json", is_flag=True, help="As JSON on stdout.")
 @click.option("--allow", is_flag=True, help="Let this very file run inside skillframe's process from now on.")
 def check(file: str, as_json: bool, allow: bool) -> int:
-    """Check an FMU: what it is, what is inside, whether it runs here; exit 1 if there are problems.
+    """Check an FMU: what it is, what is inside, whether it runs here. Exit 1 if there are problems.
 
     \b
     Example:

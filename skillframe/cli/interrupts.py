@@ -13,7 +13,7 @@ INTERRUPTED, TERMINATED = 130, 143
 
 @contextmanager
 def terminable() -> Iterator[Callable[[], int]]:
-    """Within this, SIGTERM (of Slurm, systemd, a shutdown) interrupts as Ctrl-C does; gives the exit code due."""
+    """Within this, SIGTERM (of Slurm, systemd, a shutdown) interrupts as Ctrl-C does. Gives the exit code due."""
     codes = [INTERRUPTED]
 
     def answer(number: int, frame: object) -> None:

@@ -52,7 +52,7 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 class LazyGroup(click.Group):
-    """Commands in `skillframe.cli.<name>` and in plug-ins, imported on use; absent modules are not listed.
+    """Commands in `skillframe.cli.<name>` and in plug-ins, imported on use. Absent modules are not listed.
 
     A plug-in cannot take the place of a command of the core.
     """
@@ -79,12 +79,12 @@ class LazyGroup(click.Group):
                 formatter.write_dl(added)
 
     def make_context(self, *arguments: Any, **settings: Any) -> click.Context:
-        """As click does, which prints `--help` and `--version` here; see `invoke`."""
+        """As click does, which prints `--help` and `--version` here. See `invoke`."""
         with _readers_may_leave():
             return super().make_context(*arguments, **settings)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """As click does; that the reader of our output has left, as `head` does, is no error."""
+        """As click does. That the reader of our output has left, as `head` does, is no error."""
         with _readers_may_leave():
             result = super().invoke(ctx)
             sys.stdout.flush()
@@ -151,7 +151,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def run(arguments: Sequence[str], debug: bool = False) -> int:
-    """Run a command line and return its exit code; messages go to stderr."""
+    """Run a command line and return its exit code. Messages go to stderr."""
     _print_anything()
     try:
         with extras_named():
@@ -209,7 +209,7 @@ def _of_the_system(error: OSError | MemoryError) -> str:
 
 @contextmanager
 def _readers_may_leave() -> Iterator[None]:
-    """End with 0 where nobody reads the output any more; click would end with 1."""
+    """End with 0 where nobody reads the output any more. Click would end with 1."""
     try:
         yield
     except BrokenPipeError:

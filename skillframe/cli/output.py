@@ -18,7 +18,7 @@ import click
 
 
 def emit_json(value: Any) -> None:
-    """Print a value as JSON, keys sorted; numbers that are not finite are a mistake of the caller."""
+    """Print a value as JSON, keys sorted. Numbers that are not finite are a mistake of the caller."""
     click.echo(json.dumps(value, indent=2, sort_keys=True, allow_nan=False, ensure_ascii=False))
 
 
@@ -27,7 +27,7 @@ QUIET = "skillframe.quiet"
 
 
 def quiet_option(function: _F) -> _F:
-    """`-q`: no progress and no notes; see `is_quiet`."""
+    """`-q`: no progress and no notes. See `is_quiet`."""
     option = click.option(
         "-q", "--quiet", is_flag=True, expose_value=False, callback=_silence,
         help="No progress and no notes on stderr; warnings and errors stay.",
@@ -46,7 +46,7 @@ def is_quiet() -> bool:
 
 
 def note(text: str) -> None:
-    """A line on stderr that is not needed; `-q` leaves it out."""
+    """A line on stderr that is not needed. `-q` leaves it out."""
     if not is_quiet():
         click.echo(text, err=True)
 
@@ -93,13 +93,13 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[object]], width: int |
 
 
 def bold(text: str) -> str:
-    """A text in bold on a terminal, unless NO_COLOR is set; as it is anywhere else."""
+    """A text in bold on a terminal, unless NO_COLOR is set, else as it is."""
     plain = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb" or not sys.stdout.isatty()
     return text if plain else click.style(text, bold=True)
 
 
 def laid_out(columns: Sequence[str], texts: Sequence[Sequence[str]], width: int | None) -> Iterator[str]:
-    """The lines of a table within a width; no word is ever broken.
+    """The lines of a table within a width. No word is ever broken.
 
     What does not fit goes on below in its own column, with an empty line between rows; where the columns' longest words
     do not fit side by side, each cell has a line, behind its heading.
@@ -144,7 +144,7 @@ def _paragraphs(columns: Sequence[str], texts: Sequence[Sequence[str]], width: i
 
 @contextmanager
 def progress(what: str, after_s: float = 0.0) -> Iterator[Callable[[float, float], None]]:
-    """A function of how many of how many are done: a bar on a terminal, a line per tenth in a pipe; both on stderr.
+    """A function of how many of how many are done: a bar on a terminal, a line per tenth in a pipe, on stderr.
 
     Work that is over within `after_s` shows nothing in a pipe.
     """

@@ -96,12 +96,12 @@ def show(name: str, as_json: bool) -> None:
 
 
 def _default(value: Any) -> str:
-    """As it would be typed; nothing where the recordings decide."""
+    """As it would be typed. Nothing where the recordings decide."""
     return "" if value is None else f"={typed(value)}"
 
 
 def distribution_rows(registry: Registry) -> list[dict[str, Any]]:
-    """A row per distribution; a distribution with several plug-ins lists them together, and its commands last."""
+    """A row per distribution. A distribution with several plug-ins lists them together, and its commands last."""
     from skillframe.cli.main import COMMANDS
     from skillframe.extend.commands import plugin_commands
 
@@ -161,7 +161,7 @@ def new(name: str, out: Path | None, kinds: tuple[str, ...]) -> None:
 @click.argument("names", nargs=-1, metavar="[NAME]...")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def check(names: tuple[str, ...], as_json: bool) -> int:
-    """Run the conformance checks of installed plug-ins; all of them unless named. Exits 1 if one fails.
+    """Run the conformance checks of the plug-ins named, or of all. Exits 1 if one fails.
 
     \b
     Example:

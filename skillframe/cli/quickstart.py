@@ -110,7 +110,7 @@ def _outcome(out: Path, robot: str, steps: list[list[str]], wall_s: float) -> di
 
 
 def _make_room(out: Path) -> None:
-    """An empty folder; an earlier quickstart's is cleared, anything else is left alone.
+    """An empty folder. An earlier quickstart's is cleared, anything else is left alone.
 
     Raises:
         InputError: the folder holds something that no quickstart made.
@@ -152,7 +152,7 @@ def _copy(files: list[str], folder: Path) -> None:
 
 
 def _type(step: list[str], number: int, quiet: bool) -> int:
-    """Echo a command and run it; `learn` has warnings only, and so nothing to leave out."""
+    """Echo a command and run it. `learn` has warnings only, and so nothing to leave out."""
     from skillframe.cli.main import run
 
     click.echo(bold(f"\n[{number} of {STEPS}] $ skillframe {shlex.join(step)}"))

@@ -197,7 +197,7 @@ def _person(
     scene: Scene, teacher: str, person: tuple[float | None, float | None, float | None],
     places: tuple[str | None, str | None],
 ) -> Person:  # fmt: skip
-    """Somebody who sees, or is blindfolded; what is not given is as by default."""
+    """Somebody who sees, or is blindfolded. What is not given is as by default."""
     from dataclasses import replace
     from math import radians
 

@@ -131,7 +131,7 @@ def show(robot: str, as_json: bool) -> None:
 
 
 def _with_gains(model: RobotModel) -> tuple[RobotModel, list[str]]:
-    """A machine with the gains that follow from its figures, and their names; as it is where it cannot run."""
+    """A machine with the gains that follow from its figures, and their names, or unchanged where it cannot run."""
     from skillframe.errors import SkillframeError
     from skillframe.machine.law.gains import missing_gains, with_derived_gains
 
@@ -142,7 +142,7 @@ def _with_gains(model: RobotModel) -> tuple[RobotModel, list[str]]:
 
 
 def _looks(what: str) -> bool:
-    """Whether shapes can be compared here; a note where they cannot."""
+    """Whether shapes can be compared here. A note where they cannot."""
     from skillframe.cli.output import note
     from skillframe.errors import MissingDependency, need
 

@@ -106,7 +106,7 @@ def command(
 
 
 def _known(value: Any) -> Any:
-    """Of a run that diverged, what is not a number is not known; JSON has no word for it but null."""
+    """Of a run that diverged, what is not a number is not known. JSON has no word for it but null."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

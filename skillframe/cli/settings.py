@@ -56,7 +56,7 @@ def plain(about: str) -> str:
 
 
 def typed(value: Any) -> str:
-    """A default as it would be typed; nothing where something else decides."""
+    """A default as it would be typed. Nothing where something else decides."""
     if value is None:
         return ""
     if isinstance(value, bool):

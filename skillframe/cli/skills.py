@@ -9,7 +9,7 @@ from skillframe.cli.output import LIST_WIDTH, emit_json, table
 
 @click.group()
 def command() -> None:
-    """List kinds of skills; `skillframe skill` shows one that was learned.
+    """List kinds of skills. `skillframe skill` shows one that was learned.
 
     \b
     Example:

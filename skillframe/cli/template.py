@@ -56,7 +56,7 @@ def write_template(name: str, folder: Path, kinds: Sequence[str] = ("skill",)) -
 
 
 def _words(name: str, kinds: Sequence[str]) -> dict[str, str]:
-    """What stands for each placeholder; parts of kinds first, because they hold placeholders themselves."""
+    """What stands for each placeholder. Parts of kinds first, because they hold placeholders themselves."""
     records = sorted(f"{kind.capitalize()}Type" for kind in kinds)
     lazy = ["Lazy"] if set(kinds) - {"world", "robot"} else []
     return {

@@ -60,7 +60,7 @@ class Stretch:
 
 
 def several_phases(demonstration: Demonstration, contacts: list[Contact]) -> str:
-    """Why a demonstration looks like several phases, in words; "" if it looks like one.
+    """Why a demonstration looks like several phases, in words. "" if it looks like one.
 
     Args:
         demonstration: the recording.

@@ -81,7 +81,7 @@ def in_si(value: Any, hint: Any, unit: str, where: str) -> Any:
 
 
 def _inner(hint: Any, index: int) -> Any:
-    """The type of an element of a list or tuple; of a union, that of its list or tuple."""
+    """The type of an element of a list or tuple. Of a union, that of its list or tuple."""
     options = [h for h in (hint, *typing.get_args(hint)) if typing.get_origin(h) in (list, tuple)]
     args = typing.get_args(options[0]) if options else ()
     return args[min(index, len(args) - 1)] if args and args[-1] is not Ellipsis else args[0] if args else Any

@@ -24,7 +24,7 @@ _SHOWN = {"rad": "deg", "N m": "Nm", "Pa": "bar", "rad/s": "deg/s"}
 
 
 class Range(NamedTuple):
-    """From `least` to `most`, both allowed, in SI; `why` it ends there, in words that follow a comma."""
+    """From `least` to `most`, both allowed, in SI. `why` it ends there, in words that follow a comma."""
 
     least: float
     most: float
@@ -58,7 +58,7 @@ def _end(text: str) -> float:
 
 
 def require_within(typed: Any, value: Any, unit: str, limits: Range | None, where: str) -> None:
-    """Refuse a number beyond its range. Lists and tables are looked through; what is no number is left to others.
+    """Refuse a number beyond its range. Lists and tables are looked through. What is no number is left to others.
 
     Args:
         typed: as it was typed: a bare number, or a text with a unit.

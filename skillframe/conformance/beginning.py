@@ -52,7 +52,7 @@ def _values(commands: list[Command], i: int) -> list[Any]:
 
 
 def _alike(one: list[Any], two: list[Any]) -> bool:
-    """Whether a field is the same in every tick but the first; what is drawn differs, with other generators."""
+    """Whether a field is the same in every tick but the first. What is drawn differs, with other generators."""
     return all(np.array_equal(a, b) for a, b in zip(one[1:], two[1:], strict=True))
 
 
@@ -78,7 +78,7 @@ def starts_again(skill: SkillType, document: Document) -> Iterator[str]:
 
 
 def restarts_some_trials(skill: SkillType, document: Document) -> Iterator[str]:
-    """Trials that restart do as after a start, and the others go on undisturbed; a skill without restart passes."""
+    """Trials that restart do as after a start, and the others go on undisturbed. A skill without restart passes."""
     if type(skill.build(document)).restart is Skill.restart:
         return
     observations = observations_of(skill, document)

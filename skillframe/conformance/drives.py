@@ -16,7 +16,7 @@ HELD_M = 5e-3
 
 
 def check_drive(drive: DriveType) -> list[str]:
-    """Problems of a drive; empty if it conforms. It drives the panda in the world free for a tenth of a second."""
+    """Problems of a drive. Empty if it conforms. It drives the panda in the world free for a tenth of a second."""
     return attempt("make", lambda: _make(drive)) or attempt("drives", lambda: _drives(drive))
 
 

@@ -54,7 +54,7 @@ class _Phases:
 
 
 def check_exporter(exporter: ExporterType) -> list[str]:
-    """Problems of an exporter, tried on phases that are written down; empty if it conforms."""
+    """Problems of an exporter, tried on phases that are written down. Empty if it conforms."""
     if problems := attempt("record", lambda: _record(exporter)):
         return problems
     with watched() as seen:

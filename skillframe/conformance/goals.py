@@ -25,7 +25,7 @@ AGREEMENT = 1e-9
 
 
 def states_of(scene: Scene) -> State:
-    """States (N) around the start, and ever nearer to where `goal_error` is smallest; the same every time."""
+    """States (N) around the start, and ever nearer to where `goal_error` is smallest. The same every time."""
     from skillframe.world.scene import State
 
     rng = np.random.default_rng(11)
@@ -101,7 +101,7 @@ def idle_parameters(world: WorldType, scene: Scene) -> Iterator[str]:
 
 
 def _others(value: Any) -> list[Any]:
-    """Values near a parameter's own; none where the kind does not say what else it could be."""
+    """Values near a parameter's own. None where the kind does not say what else it could be."""
     if isinstance(value, bool):
         return [not value]
     if isinstance(value, int):
@@ -128,7 +128,7 @@ def _stages(task: Task) -> list[Task]:
 
 
 def _plain(value: Any) -> Any:
-    """Records, arrays and tuples as lists; functions are left out."""
+    """Records, arrays and tuples as lists. Functions are left out."""
     if dataclasses.is_dataclass(value):
         return [_plain(getattr(value, field.name)) for field in dataclasses.fields(value)]
     if isinstance(value, dict):

@@ -35,7 +35,7 @@ class Follower:
         self.pose, self.twist = Pose(start, down.copy()), np.zeros((*lead, 6))
 
     def observation(self) -> Observation:
-        """What the skill sees at this tick; it cannot write to it."""
+        """What the skill sees at this tick. It cannot write to it."""
         wrench = np.zeros((*self._lead, 6))
         wrench[..., 2] = FLOOR_STIFFNESS * np.maximum(HEIGHT - FLOOR_DEPTH - self.pose.position[..., 2], 0.0)
         time = np.full(self._lead, self.tick * self._dt)

@@ -26,7 +26,7 @@ LONGEST_S = 20.0
 
 
 def example_phase(**changes: Any) -> MovingImpedance:
-    """A push along -z that is free along x and turns freely about y; its gains lie along the axes, as read-only arrays.
+    """A push along -z that is free along x and turns freely about y. Its gains lie along the axes, as read-only arrays.
 
     Args:
         **changes: fields that are to be other than these; the axes are "base" unless given.
@@ -44,7 +44,7 @@ def example_phase(**changes: Any) -> MovingImpedance:
 
 
 def example_trace(*, success: bool = True, duration_s: float = 4.0, diverged: bool = False, trial: int = 0) -> Trace:
-    """A trial: down to a plane, along it, and to its end, or stuck half way; its arrays are read-only.
+    """A trial: down to a plane, along it, and to its end, or stuck half way. Its arrays are read-only.
 
     Args:
         success: it reached its goal.
@@ -113,7 +113,7 @@ skills = ["slide.skill.json", "replay:slide.npz"]
 
 
 def example_campaign(folder: Path) -> Mapping[str, Path]:
-    """Write a small campaign's folder: campaign.toml, results.csv, summary.json and two traces; its files by name."""
+    """Write a small campaign's folder: campaign.toml, results.csv, summary.json and two traces. Its files by name."""
     (folder / "traces").mkdir(parents=True)
     (folder / "campaign.toml").write_text(TOML, encoding="utf-8")
     skills = ("slide.skill.json", "replay:slide.npz")

@@ -87,7 +87,7 @@ NAMES = ("position", "rotation", "twist", "stiffness", "damping", "feedforward",
 
 
 def rows_of_command(command: Command, rows: Rows) -> Command:
-    """Some rows of a command; gains that all rows share are spread first."""
+    """Some rows of a command. Gains that all rows share are spread first."""
     lead = command.pose.position.shape[:-1]
     gains = [None if g is None else np.broadcast_to(g, (*lead, 6, 6))[rows] for g in command.impedance]
     assert gains[0] is not None

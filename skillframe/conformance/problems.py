@@ -10,7 +10,7 @@ from skillframe.extend.records import Document
 
 
 def attempt(what: str, check: Callable[[], Iterable[str]]) -> list[str]:
-    """The problems that a check finds; whatever it raises is one."""
+    """The problems that a check finds. Whatever it raises is one."""
     try:
         return [f"{what}: {problem}" for problem in check()]
     except (Exception, SystemExit) as error:  # foreign code: any failure is a finding

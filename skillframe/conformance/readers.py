@@ -20,7 +20,7 @@ BROKEN = {"missing": None, "empty": b"", "binary": bytes(range(256)) * 4}
 
 
 def check_reader(reader: ReaderType) -> list[str]:
-    """Problems of a format, tried on an example demonstration in a temporary folder; empty if it conforms."""
+    """Problems of a format, tried on an example demonstration in a temporary folder. Empty if it conforms."""
     with tempfile.TemporaryDirectory() as folder:
         problems = attempt("suffixes", lambda: _suffixes(reader))
         problems += attempt("round trip", lambda: _round_trip(reader, Path(folder)))

@@ -14,7 +14,7 @@ from skillframe.extend.records import RobotType
 
 
 def check_robot(robot: RobotType) -> list[str]:
-    """Problems of a robot; empty if it conforms."""
+    """Problems of a robot. Empty if it conforms."""
     for what, check in (("folder", _folder), ("loads", _loads), ("dynamics", _dynamics), ("stands", _stands)):
         if problems := attempt(what, lambda check=check: check(robot)):  # type: ignore[misc]
             return problems
@@ -62,7 +62,7 @@ def _dynamics(robot: RobotType) -> Iterator[str]:
 
 
 def _stands(robot: RobotType) -> Iterator[str]:
-    """In empty space it holds its start for a tenth of a second; a machine with actuators is not tried."""
+    """In empty space it holds its start for a tenth of a second. A machine with actuators is not tried."""
     from skillframe.execution.executor import Setup, simulate
     from skillframe.execution.prepare import load_robot_model, load_world
 

@@ -109,7 +109,7 @@ def runs_for_two_seconds(skill: SkillType, document: Document) -> Iterator[str]:
 
 
 class _Bounds:
-    """Looks whether commands stay within bounds; notes the first excess of each kind."""
+    """Looks whether commands stay within bounds. Notes the first excess of each kind."""
 
     def __init__(self, check: CommandCheck) -> None:
         self._check, self.problems = check, dict[str, str]()
@@ -165,7 +165,7 @@ def leaves_nothing_behind(skill: SkillType, document: Document) -> Iterator[str]
 
 
 def ended_at(skill: SkillType, document: Document) -> float | None:
-    """Seconds after which every trial has ended; None if one is still under way after 120 s."""
+    """Seconds after which every trial has ended. None if one is still under way after 120 s."""
     built, end = skill.build(document), [-1]
 
     def look(tick: int, observation: Observation, command: Command) -> bool:

@@ -20,7 +20,7 @@ SLOWEST_S = 0.5
 
 
 def check_score(score: ScoreType, traces: Sequence[Trace] | None = None) -> list[str]:
-    """Problems of a score, tried on traces that are written down and on given ones; empty if it conforms."""
+    """Problems of a score, tried on traces that are written down and on given ones. Empty if it conforms."""
     if problems := attempt("record", lambda: _record(score)):
         return problems
     tried = {

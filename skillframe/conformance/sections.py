@@ -31,7 +31,7 @@ ACTS = re.compile(
 
 
 def check_section(section: SectionType) -> list[str]:
-    """Problems of a section, tried on chapters that are written down, in a temporary folder; empty if it conforms."""
+    """Problems of a section, tried on chapters that are written down, in a temporary folder. Empty if it conforms."""
     if not isinstance(section.title, str) or not section.title.strip():
         return ["record: the title is empty; give the heading that it has on the page"]
     if MARKUP.search(section.title):

@@ -15,7 +15,7 @@ from skillframe.extend.records import Document, SegmenterType
 def check_segmenter(
     segmenter: SegmenterType, demonstrations: Sequence[Demonstration] | None = None, phases: int = 2
 ) -> list[str]:
-    """Problems of a segmenter, tried on demonstrations (default: the examples); empty if it conforms."""
+    """Problems of a segmenter, tried on demonstrations (default: the examples). Empty if it conforms."""
     demos = example_demonstrations() if demonstrations is None else list(demonstrations)
 
     def on(count: int | None) -> Callable[[], Iterator[str]]:

@@ -44,7 +44,7 @@ def example_document(skill: SkillType) -> Document:
 
 
 def check_skill(skill: SkillType, document: Document | None = None) -> list[str]:
-    """Problems of a skill type, tried with a document (default: `example_document`); empty if it conforms."""
+    """Problems of a skill type, tried with a document (default: `example_document`). Empty if it conforms."""
     with watched() as seen:
         problems = _problems(skill, document)
     return problems or list(printed(seen))
@@ -180,7 +180,7 @@ def repeats_with_its_seed(skill: SkillType, document: Document) -> Iterator[str]
 
 
 def ends_with_a_reason(skill: SkillType, document: Document) -> Iterator[str]:
-    """Status is RUNNING, SUCCESS or FAILURE; what has ended says why, what runs says nothing."""
+    """Status is RUNNING, SUCCESS or FAILURE. What has ended says why, what runs says nothing."""
     for command in play(skill.build(document), observations_of(skill, document, ticks=200, dt=0.1), range(TRIALS)):
         status = np.asarray(command.status)
         if not np.issubdtype(status.dtype, np.integer) or not set(status.tolist()) <= {int(s) for s in Status}:

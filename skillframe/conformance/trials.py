@@ -54,7 +54,7 @@ def _extent(geom: Geom) -> float:
 
 
 def points_into_the_fixture(scene: Scene) -> Iterator[str]:
-    """The tool's z axis goes against the fixture's, or as in the aligned attitude; a lever may lie as it will."""
+    """The tool's z axis goes against the fixture's, or as in the aligned attitude. A lever may lie as it will."""
     task = scene.task
     if not scene.fixture or task.turn is not None:
         return
@@ -105,7 +105,7 @@ def _start_problems(scene: Scene, name: str, robot: RobotModel, model: Any, conf
 
 
 def _gap(scene: Scene, robot: RobotModel, model: Any, configuration: Float) -> float | None:
-    """Smallest distance [m] between what collides of tool and fixture, below zero if inside; None without a pair."""
+    """Smallest distance [m] between what collides of tool and fixture, below zero if inside. None without a pair."""
     import mujoco
 
     from skillframe.world.convert import FIXTURE, SPRUNG, TOOL

@@ -92,7 +92,7 @@ def watched() -> Iterator[Seen]:
 
 @cache
 def _hook() -> None:
-    """Ask the interpreter to tell; it cannot be asked to stop, so this is done once a process."""
+    """Ask the interpreter to tell. It cannot be asked to stop, so this is done once a process."""
     sys.addaudithook(_told)
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def check_world(world: WorldType) -> list[str]:
-    """Problems of a world, built from its defaults; empty if it conforms."""
+    """Problems of a world, built from its defaults. Empty if it conforms."""
     with watched() as seen, np.errstate(all="ignore"):
         problems = _problems(world)
     return problems or list(printed(seen))
@@ -114,7 +114,7 @@ def _geoms(scene: Scene) -> list[Geom]:
 
 
 def _fingerprint(scene: Scene) -> str:
-    """Geometry and numbers of a scene as text; predicates are left out."""
+    """Geometry and numbers of a scene as text. Predicates are left out."""
     rows = [
         {k: np.asarray(v).tolist() for k, v in dataclasses.asdict(geom).items() if v is not None}
         for geom in _geoms(scene)

@@ -74,7 +74,7 @@ def critical_damping(
 
 
 def raised_damping(damping: Float, floor: tuple[float, float]) -> Float:
-    """Given damping (..., 6, 6), its symmetric translational and rotational parts raised to a floor; couplings stay.
+    """Given damping (..., 6, 6), its symmetric translational and rotational parts raised to a floor. Couplings stay.
 
     Args:
         damping: (6, 6) or (N, 6, 6).

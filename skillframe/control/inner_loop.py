@@ -78,7 +78,7 @@ class InnerLoop:
 
 
 def _exact_step(arm: Admittance, dt: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Rows (place, speed, command) of the filter's exact step for place and speed; a position's command is 0."""
+    """Rows (place, speed, command) of the filter's exact step for place and speed. A position's command is 0."""
     w = arm.bandwidth
     if arm.kind == "velocity":
         fade = float(np.exp(-w * dt))

@@ -88,7 +88,7 @@ class JointSteps:
         return speed, (jacobian @ speed[..., None])[..., 0]
 
     def _inverted(self, scaled: Float) -> Float:
-        """(N, n, 6) damped inverses of Jacobians whose turning rows are scaled; columns of zeros give rows of zeros."""
+        """(N, n, 6) damped inverses of Jacobians whose turning rows are scaled. Columns of zeros give rows of zeros."""
         gram = scaled @ scaled.mT
         gram[:, range(6), range(6)] += self._squared[:, None]
         result: Float = scaled.mT @ np.linalg.inv(gram) * self._scale[:, 0]
@@ -110,7 +110,7 @@ class JointSteps:
     def _around(
         self, jacobian: Float, twist: Float, spare: Float, command: Float, speed: Float, stuck: NDArray[np.bool_]
     ) -> Float:
-        """Velocities of the rows that are stuck, without the joints that are; a joint that gets stuck then as well."""
+        """Velocities of the rows that are stuck, without the joints that are. A joint that gets stuck then as well."""
         rows: NDArray[np.bool_] = np.asarray(stuck.any(-1))
         held = stuck.copy()
         for _ in range(held.shape[-1]):

@@ -72,7 +72,7 @@ def _stops(d: Demonstration, first: int, last: int, force: Float) -> bool:
 
 
 def _speed(time: Float, place: Float) -> tuple[float, float]:
-    """Slope of a line through (T,) places [m/s] and its standard deviation; of too few, nothing is sure."""
+    """Slope of a line through (T,) places [m/s] and its standard deviation. Of too few, nothing is sure."""
     if len(time) < FEWEST:
         return 0.0, np.inf
     t = time - time.mean()

@@ -111,7 +111,7 @@ class Demonstration:
 
 
 def resolve_point(text: str | None, frames: Mapping[str, Any], where: str = "") -> Float:
-    """A point in tool coordinates [m] from "x,y,z" or a frame's name; None and "tool" are the tool point.
+    """A point in tool coordinates [m] from "x,y,z" or a frame's name. None and "tool" are the tool point.
 
     Raises:
         UnknownName: the text is neither three numbers nor a known name.

@@ -176,7 +176,7 @@ def _parse(path: Path) -> Document:
 
 
 def _check(document: Document, where: str) -> None:
-    """The layout that every kind of skill shares; the kind's own part is its own business (`SkillType.check`)."""
+    """The layout that every kind of skill shares. The kind's own part is its own business (`SkillType.check`)."""
     if document.get("format") != FORMAT:
         raise InputError(where, f"has format {document.get('format')!r}, not {FORMAT!r}", "give a skill file")
     version = document.get("version")

@@ -87,7 +87,7 @@ def frame_at(
     learned_at: Sequence[float], *, axes: str, hand: Sequence[float] | None = None,
     frames: Mapping[str, Sequence[float]] | None = None,
 ) -> Document:  # fmt: skip
-    """The block for a known point; its centre of compliance is where it was learned.
+    """The block for a known point. Its centre of compliance is where it was learned.
 
     Args:
         learned_at: (3,) point of the tool frame [m].
@@ -138,5 +138,5 @@ def _array(point: Any, where: str) -> Float:
 
 
 def with_center(document: Document, center: Sequence[float]) -> Document:
-    """The document with another centre of compliance (3,), tool frame [m]; the one given stays as it is."""
+    """The document with another centre of compliance (3,), tool frame [m]. The one given stays as it is."""
     return {**document, "frame": {**document["frame"], "center_of_compliance": [float(x) for x in center]}}

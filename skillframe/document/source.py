@@ -81,7 +81,7 @@ class SkillSource(NamedTuple):
 
 
 def parse_source(text: str, folder: Path | None = None) -> SkillSource:
-    """Take a skill's text apart; the files are looked for and not opened.
+    """Take a skill's text apart. The files are looked for and not opened.
 
     Args:
         text: "FILE.skill.json" or "TYPE:DEMO[,DEMO...][,KEY=VALUE...]".
@@ -116,7 +116,7 @@ def _parts(rest: str, base: Path) -> tuple[list[str], list[str]]:
 
 
 def _is_file(base: Path, name: str) -> bool:
-    """Whether there is such a file; also for texts that are too long for a name, or hold what no name may hold."""
+    """Whether there is such a file. Also for texts that are too long for a name, or hold what no name may hold."""
     return os.path.isfile(base / name)
 
 

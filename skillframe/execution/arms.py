@@ -27,7 +27,7 @@ def simulate_arms(
     trace_hz: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> ArmsResult:
-    """Run a coordinator on len(rngs) trials until each has ended; arguments as of `executor.simulate`.
+    """Run a coordinator on len(rngs) trials until each has ended. Arguments as of `executor.simulate`.
 
     With one centre of compliance (3,) instead of one per arm, `coordinator` is a skill for one arm, and the others hold
     still. `start.*` displaces the first arm's tool, `fixture.*` the fixture in the second arm's hand.

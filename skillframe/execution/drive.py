@@ -44,7 +44,7 @@ class Shares(NamedTuple):
 
 
 class TrialRecorder(Protocol):
-    """What a drive's trials leave behind; `skillframe.execution.recorder.Recorder` is the plain one."""
+    """What a drive's trials leave behind. `skillframe.execution.recorder.Recorder` is the plain one."""
 
     def record(self, tick: int, time: float, observation: Observation, command: Command, law: Float) -> None:
         """Take a sample if one is due at this tick."""
@@ -57,7 +57,7 @@ class TrialRecorder(Protocol):
 
 
 class Drive(Protocol):
-    """Sensors and actuators of N trials; trials are independent of each other, to the last bit.
+    """Sensors and actuators of N trials. Trials are independent of each other, to the last bit.
 
     Where a drive steers several arms, observations, commands and the law's wrench are (N, arms, ...), else (N, ...).
 
@@ -75,10 +75,10 @@ class Drive(Protocol):
         """Before the skill starts: tare, or identify. Trials that cannot run, each with the cause in words."""
 
     def sense(self, tick: int, active: Trials) -> Observation:
-        """Read the sensors of the trials that still run; the other rows may hold anything finite or not."""
+        """Read the sensors of the trials that still run. The other rows may hold anything finite or not."""
 
     def act(self, command: Command, ramp: float) -> Float:
-        """Take in a command; the wrench (N, 6) that the law puts on the tool at the centre of compliance.
+        """Take in a command. The wrench (N, 6) that the law puts on the tool at the centre of compliance.
 
         Args:
             command: what the skill wants.
@@ -89,7 +89,7 @@ class Drive(Protocol):
         """Trials among `active` that broke a limit in this tick."""
 
     def advance(self, active: Trials) -> list[Broken]:
-        """Move the plant by a tick; trials whose actuators failed, each with a sentence that needs no time added."""
+        """Move the plant by a tick. Trials whose actuators failed, each with a sentence that needs no time added."""
 
     def end(self, rows: Trials) -> None:
         """Trials end now, as they stand."""

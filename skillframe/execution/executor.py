@@ -74,7 +74,7 @@ def begin(
     skill: Skill, setup: Setup, draws: Mapping[str, Float], rngs: Sequence[np.random.Generator],
     trace_hz: float | None = None,
 ) -> Loop:  # fmt: skip
-    """The loop of len(rngs) trials at their starts, before its drive is prepared; arguments as `simulate`."""
+    """The loop of len(rngs) trials at their starts, before its drive is prepared. Arguments as `simulate`."""
     children = [rng.spawn(2) for rng in rngs]
     skill, drive = chosen_drive(skill, setup, draws, [pair[0] for pair in children])
     return Loop(skill, setup, drive, [pair[1] for pair in children], trace_hz)
@@ -107,7 +107,7 @@ class Loop:
         self.interrupted = False
 
     def prepare(self) -> None:
-        """Tare, or identify; trials that cannot run end before their start."""
+        """Tare, or identify. Trials that cannot run end before their start."""
         self._end_failed(self.drive.prepare(), 0.0)
 
     def run(self, duration_s: float, progress: Callable[[float], None] | None) -> None:

@@ -141,5 +141,5 @@ class Outcomes:
 
 
 def _known(figure: float) -> float | None:
-    """A figure for a file; None where there is none."""
+    """A figure for a file. None where there is none."""
     return None if np.isnan(figure) else float(figure)

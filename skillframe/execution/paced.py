@@ -31,7 +31,7 @@ class PacedSkill(Skill):
         self._command: Command | None = None
 
     def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
-        """As the skill starts; the ticks are counted from here."""
+        """As the skill starts. The ticks are counted from here."""
         self._tick, self._command = 0, None
         self._skill.start(self._seen(observation), rngs)
 

@@ -1,4 +1,4 @@
-"""From names and values to a skill and a set-up that the executor can run; shared by `run`, campaigns and quickstart.
+"""From names and values to a skill and a set-up that the executor can run. Shared by `run`, campaigns and quickstart.
 
 Settings are the keys of `--set` and of `[vary]`: parameters of the world's dataclass (`world.clearance`) shape the
 scene; the quantities of the executor (`start.tilt_y`, `fixture.offset_x`, `world.friction` ...) are per trial.
@@ -100,7 +100,7 @@ def load_robot_model(robot: str | Path | RobotSpec) -> RobotModel:
 
 
 def drive_maker(robot: RobotModel) -> Callable[..., Any] | None:
-    """What makes the drive that robot.toml names and a plug-in brings; None where it names none.
+    """What makes the drive that robot.toml names and a plug-in brings. None where it names none.
 
     Raises:
         UnknownName: there is no such drive.

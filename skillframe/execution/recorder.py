@@ -22,7 +22,7 @@ CAPACITY, FIRST = 20_000, 1000  # samples per trial: at most, and before the arr
 
 
 class Recorder:
-    """Columns over time, a sample every `every` control ticks; true wrenches are taken at `point` of the tool frame.
+    """Columns over time, a sample every `every` control ticks. True wrenches are taken at `point` of the tool frame.
 
     `machine` names what a hydraulic machine has besides, with the shape of one trial's sample.
     """
@@ -88,11 +88,11 @@ class Recorder:
         self._length, self._every = kept, 2 * self._every
 
     def close(self, rows: NDArray[np.int64]) -> None:
-        """Mark trials as ended now; their later rows are not part of their trace."""
+        """Mark trials as ended now. Their later rows are not part of their trace."""
         self._stop[rows] = self._time
 
     def trace(self, i: int, meta: dict[str, Any]) -> Trace:
-        """The trace of trial i; its arrays are views, so that N traces take no more memory than the recording."""
+        """The trace of trial i. Its arrays are views, so that N traces take no more memory than the recording."""
         length = self._length
         if self._stop[i] >= 0.0:
             length = int(np.searchsorted(self._data["time"][: self._length, i], self._stop[i], side="right"))

@@ -22,7 +22,7 @@ def _never() -> NDArray[np.bool_]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """What became of N trials; every array has N rows.
+    """What became of N trials. Every array has N rows.
 
     Attributes:
         success: the scene's goal was reached, no limit was broken, and the skill did not say that it failed.
@@ -73,7 +73,7 @@ class Result:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArmsResult(Result):
-    """What became of N trials of several arms; `traces` of the base class are the first arm's.
+    """What became of N trials of several arms. `traces` of the base class are the first arm's.
 
     Attributes:
         arms: their names.

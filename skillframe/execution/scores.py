@@ -16,11 +16,11 @@ from skillframe.extend.registry import registry
 
 
 class ScoreFailed(SkillframeError):
-    """A score that raised, or gave something else than a number; says which and what."""
+    """A score that raised, or gave something else than a number. Says which and what."""
 
 
 def scores_of(trace: Trace, names: Iterable[str]) -> dict[str, float]:
-    """The scores of one trial, in SI units; NaN where a trial has no such figure.
+    """The scores of one trial, in SI units. NaN where a trial has no such figure.
 
     Args:
         trace: of the trial; its arrays are handed on read-only.

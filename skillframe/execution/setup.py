@@ -40,7 +40,7 @@ class Setup:
 
     @property
     def limits(self) -> Limits:
-        """The robot's limits; no torque rate without joints, or where the arm's own loop makes the torques."""
+        """The robot's limits. No torque rate without joints, or where the arm's own loop makes the torques."""
         spec = self.robot.spec
         told = spec.base != "free" and spec.control.interface == "torque"
         return spec.limits if told else replace(spec.limits, torque_rate_nm_s=None)

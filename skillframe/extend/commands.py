@@ -30,7 +30,7 @@ GROUP = "skillframe.commands"
 
 
 class BadCommand(SkillframeError):
-    """A command of a plug-in that cannot be used; says whose and why."""
+    """A command of a plug-in that cannot be used. Says whose and why."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +52,7 @@ class PluginCommand:
     point: EntryPoint | None
 
     def load(self) -> click.Command:
-        """The command, its module imported now; what the module prints goes to stderr.
+        """The command, its module imported now. What the module prints goes to stderr.
 
         Raises:
             BadCommand: several distributions bring it, it cannot be imported, or is no click command.
@@ -80,7 +80,7 @@ class PluginCommand:
 
 
 def plugin_commands() -> dict[str, PluginCommand]:
-    """Every command of an installed distribution by name, in alphabetical order; nothing is imported."""
+    """Every command of an installed distribution by name, in alphabetical order. Nothing is imported."""
     found: dict[str, PluginCommand] = {}
     for command in _declared():
         other = found.get(command.name)
@@ -93,7 +93,7 @@ def plugin_commands() -> dict[str, PluginCommand]:
 
 
 def _declared() -> Iterator[PluginCommand]:
-    """Commands, a distribution after the other; the first of one name on the path is the one that imports."""
+    """Commands, a distribution after the other. The first of one name on the path is the one that imports."""
     seen: set[str] = set()
     for distribution in distributions():
         if not re.search(rf"^\[{re.escape(GROUP)}\]", distribution.read_text("entry_points.txt") or "", re.MULTILINE):

@@ -11,7 +11,7 @@ from skillframe.extend.plugin import BadPlugin, Plugin
 
 
 def installed() -> list[tuple[Plugin, Callable[[], object]]]:
-    """Installed plug-ins with what loads them, by name; a damaged distribution is kept with what it raises.
+    """Installed plug-ins with what loads them, by name. A damaged distribution is kept with what it raises.
 
     Only distributions whose entry points mention the group are parsed, so that an unrelated damaged one does no harm.
     """
@@ -33,7 +33,7 @@ def installed() -> list[tuple[Plugin, Callable[[], object]]]:
 
 
 def _identity(distribution: Distribution) -> tuple[str, str]:
-    """Name and version; from the folder's name where the metadata is damaged."""
+    """Name and version. From the folder's name where the metadata is damaged."""
     try:
         name, version = distribution.metadata["Name"], distribution.metadata["Version"]
     except Exception:  # metadata is foreign text; whatever it raises, the folder's name remains

@@ -1,4 +1,4 @@
-"""The exporters that ship with the core; what writes a format is imported when it is written."""
+"""The exporters that ship with the core. What writes a format is imported when it is written."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ HOMES = {
 
 
 def where_to_get(kind: str, name: str, known: Collection[str], here: Collection[str]) -> str:
-    """What to type where a name is missing because its plug-in is not installed; "" if that is not why.
+    """What to type where a name is missing because its plug-in is not installed. "" if that is not why.
 
     Args:
         kind: what was asked for: "skill", "world", ...

@@ -1,4 +1,4 @@
-"""The hooks a plug-in can implement; each yields records and runs once per process, never in the loop.
+"""The hooks a plug-in can implement. Each yields records and runs once per process, never in the loop.
 
 A plug-in is a distribution with an entry point in the group `skillframe` that names a module::
 

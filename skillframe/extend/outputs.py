@@ -1,4 +1,4 @@
-"""Records of what is made of skills and runs: exporters, scores, sections of a report; and what they are given."""
+"""Records of what is made of skills and runs: exporters, scores, sections of a report, and what they are given."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class Grid(NamedTuple):
 
 
 def part_problem(part: object) -> str:
-    """What is wrong with a part of a section, in words; "" if it is text, a `Grid` or an `Illustration`."""
+    """What is wrong with a part of a section, in words. "" if it is text, a `Grid` or an `Illustration`."""
     from skillframe.extend.records import Illustration
 
     if isinstance(part, Grid):
@@ -127,7 +127,7 @@ class ReportFiles:
         return sorted(self.files)
 
     def path(self, name: str) -> Path:
-        """Where a file lies; it is noted as used.
+        """Where a file lies. It is noted as used.
 
         Raises:
             UnknownName: the chapter has no such file.

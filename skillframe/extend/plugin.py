@@ -72,7 +72,7 @@ class Plugin:
     error: str | None = None
 
     def fail(self, error: BaseException) -> None:
-        """Keep an error beside those it already has; with `SKILLFRAME_STRICT_PLUGINS=1` raise it instead."""
+        """Keep an error beside those it already has. With `SKILLFRAME_STRICT_PLUGINS=1` raise it instead."""
         if os.environ.get("SKILLFRAME_STRICT_PLUGINS") == "1":
             raise error
         text = str(error) if isinstance(error, SkillframeError) else f"{type(error).__name__}: {error}"
@@ -80,15 +80,15 @@ class Plugin:
 
 
 class BadPlugin(SkillframeError):
-    """A plug-in's entry module breaks the rules of the hooks; says which and how."""
+    """A plug-in's entry module breaks the rules of the hooks. Says which and how."""
 
 
 class OtherContract(SkillframeError):
-    """A plug-in, or one of its records, was written for another skillframe; says which and what to do."""
+    """A plug-in, or one of its records, was written for another skillframe. Says which and what to do."""
 
 
 class PluginConflict(SkillframeError):
-    """Two plug-ins provide one name; both are named."""
+    """Two plug-ins provide one name. Both are named."""
 
     def __init__(self, kind: str, name: str, first: Plugin, second: Plugin) -> None:
         super().__init__(

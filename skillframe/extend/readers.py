@@ -1,4 +1,4 @@
-"""The demonstration formats that ship with the core; a reader's module is imported when a file of its kind is read."""
+"""The demonstration formats that ship with the core. A reader's module is imported when a file of its kind is read."""
 
 from __future__ import annotations
 

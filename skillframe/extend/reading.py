@@ -31,7 +31,7 @@ def read_demonstration(path: Path | str, **options: Any) -> Demonstration:
 
 
 def write_demonstration(demonstration: Demonstration, path: Path | str) -> None:
-    """Write a demonstration; the file appears complete or not at all.
+    """Write a demonstration. The file appears complete or not at all.
 
     Raises:
         InputError: an ending that no format writes, or a place that cannot be written to.
@@ -52,7 +52,7 @@ def check_writable(path: Path | str) -> None:
 
 
 def _format_of(path: Path, *, reading: bool, named_columns: bool = False) -> ReaderType:
-    """The format of the longest matching ending; any ending is delimited text once its columns are named."""
+    """The format of the longest matching ending. Any ending is delimited text once its columns are named."""
     from skillframe.extend.registry import registry
 
     records: list[ReaderType] = [r for r in registry().records("reader") if reading or r.write is not None]

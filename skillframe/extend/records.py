@@ -39,7 +39,7 @@ class Lazy:
     place: str
 
     def load(self) -> Any:
-        """What stands at the place; raises `ImportError` or `AttributeError` if nothing does."""
+        """What stands at the place. Raises `ImportError` or `AttributeError` if nothing does."""
         module, _, name = self.place.partition(":")
         return getattr(import_module(module), name)
 
@@ -58,7 +58,7 @@ class Illustration(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LearnOptions:
-    """The points and axes of learning that the command line sets; see the contract's "four points".
+    """The points and axes of learning that the command line sets. See the contract's "four points".
 
     Attributes:
         at: where it is learned: "x,y,z" in the tool frame, a frame's name, or None for the recorded tool point.

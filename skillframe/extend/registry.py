@@ -63,7 +63,7 @@ class Registry:
         self.not_installed: list[str] = []
 
     def add(self, plugin: Plugin, load: Callable[[], object]) -> Plugin:
-        """Load one plug-in and collect its records; what fails is kept in `Plugin.error`.
+        """Load one plug-in and collect its records. What fails is kept in `Plugin.error`.
 
         A hook that fails loses its own records. A name that another plug-in already has is an error of this one, and
         asking for it raises `PluginConflict`. A plug-in that was written for another contract, or asks for another
@@ -122,7 +122,7 @@ class Registry:
         return (self._records[kind][name][0] for name in self.names(kind))
 
     def provider(self, kind: str, name: str) -> Plugin:
-        """The plug-in that provides a name; raises as `skill` does."""
+        """The plug-in that provides a name. Raises as `skill` does."""
         self._get(kind, name)
         return self._records[kind][name][1]
 
@@ -146,61 +146,61 @@ class Registry:
         return "; ".join([missing, *notes] if missing else notes)
 
     def skill(self, name: str) -> SkillType:
-        """The skill type of that name; raises `UnknownName`, or `PluginConflict` if two plug-ins have it."""
+        """The skill type of that name. Raises `UnknownName`, or `PluginConflict` if two plug-ins have it."""
         record: SkillType = self._get("skill", name)
         return record
 
     def segmenter(self, name: str) -> SegmenterType:
-        """The segmenter of that name; raises as `skill` does."""
+        """The segmenter of that name. Raises as `skill` does."""
         record: SegmenterType = self._get("segmenter", name)
         return record
 
     def coordinator(self, name: str) -> CoordinatorType:
-        """The coordinator of that name; raises as `skill` does."""
+        """The coordinator of that name. Raises as `skill` does."""
         record: CoordinatorType = self._get("coordinator", name)
         return record
 
     def behaviour(self, name: str) -> SkillType:
-        """The coordinator or else the skill type of that name: whatever a skill file can hold; raises as `skill`."""
+        """The coordinator or else the skill type of that name: whatever a skill file can hold. Raises as `skill`."""
         return self.coordinator(name) if name in self._records["coordinator"] else self.skill(name)
 
     def world(self, name: str) -> WorldType:
-        """The world of that name; raises as `skill` does."""
+        """The world of that name. Raises as `skill` does."""
         record: WorldType = self._get("world", name)
         return record
 
     def reader(self, name: str) -> ReaderType:
-        """The file format of that name; raises as `skill` does."""
+        """The file format of that name. Raises as `skill` does."""
         record: ReaderType = self._get("reader", name)
         return record
 
     def row(self, name: str) -> RowType:
-        """The published result of that number; raises as `skill` does."""
+        """The published result of that number. Raises as `skill` does."""
         record: RowType = self._get("row", name)
         return record
 
     def exporter(self, name: str) -> ExporterType:
-        """The exporter of that name; raises as `skill` does."""
+        """The exporter of that name. Raises as `skill` does."""
         record: ExporterType = self._get("exporter", name)
         return record
 
     def score(self, name: str) -> ScoreType:
-        """The score of that name; raises as `skill` does."""
+        """The score of that name. Raises as `skill` does."""
         record: ScoreType = self._get("score", name)
         return record
 
     def robot(self, name: str) -> RobotType:
-        """The robot of that name that ships with skillframe or a plug-in; raises as `skill` does."""
+        """The robot of that name that ships with skillframe or a plug-in. Raises as `skill` does."""
         record: RobotType = self._get("robot", name)
         return record
 
     def drive(self, name: str) -> DriveType:
-        """The drive of that name; raises as `skill` does."""
+        """The drive of that name. Raises as `skill` does."""
         record: DriveType = self._get("drive", name)
         return record
 
     def section(self, name: str) -> SectionType:
-        """The section of reports of that name; raises as `skill` does."""
+        """The section of reports of that name. Raises as `skill` does."""
         record: SectionType = self._get("section", name)
         return record
 
@@ -231,5 +231,5 @@ def load_registry() -> Registry:
 
 @lru_cache(maxsize=1)
 def registry() -> Registry:
-    """The process's registry, loaded on first use; worker processes load their own."""
+    """The process's registry, loaded on first use. Worker processes load their own."""
     return load_registry()

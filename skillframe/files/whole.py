@@ -61,13 +61,13 @@ def writing_whole(path: Path) -> Iterator[Path]:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make the names in a folder last over a power cut; a file system that cannot is left as it is."""
+    """Make the names in a folder last over a power cut. A file system that cannot is left as it is."""
     with suppress(OSError):
         _sync(folder, os.O_RDONLY)
 
 
 def remove_temporary(folder: Path) -> None:
-    """Remove the temporary files that killed processes left in a folder; only where nobody writes."""
+    """Remove the temporary files that killed processes left in a folder. Only where nobody writes."""
     for path in folder.glob(".*"):
         if _TEMPORARY.fullmatch(path.name) and path.is_file():
             path.unlink(missing_ok=True)

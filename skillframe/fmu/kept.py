@@ -12,7 +12,7 @@ KEPT_AT_MOST = 2
 
 
 def kept(key: tuple[Any, ...], make: Callable[[], Actuators]) -> Actuators:
-    """The bank of a key; the same one again if it was among the last asked for."""
+    """The bank of a key. The same one again if it was among the last asked for."""
     if key not in _KEPT:
         while len(_KEPT) >= KEPT_AT_MOST:
             _KEPT.pop(next(iter(_KEPT))).close()

@@ -36,7 +36,7 @@ class Unmapped(NamedTuple):
 def unmapped(
     specs: Sequence[ActuatorSpec], unused: Sequence[Sequence[str]], base: Path | None = None
 ) -> list[Unmapped]:
-    """What nobody maps, a row for every FMU and mapping; joints that have them alike stand in one row.
+    """What nobody maps, a row for every FMU and mapping. Joints that have them alike stand in one row.
 
     Args:
         specs: the actuators; names are those of their joints.
@@ -65,7 +65,7 @@ def unmapped(
 
 
 def _variables(fmu: str, base: Path | None) -> tuple[dict[str, str], list[str]]:
-    """Inputs with their start values, and outputs; of a named FMU from its table, so that nothing need be built."""
+    """Inputs with their start values, and outputs. Of a named FMU from its table, so that nothing need be built."""
     if (folder := fmu_folders().get(fmu)) is not None:
         table = read_table(folder)
         return {name: f"{entry.start:g}" for name, entry in table.input.items()}, list(table.output)

@@ -1,4 +1,4 @@
-"""Plots over time of what drives a robot: pressures, valves, forces and energy of a hydraulic machine; servos."""
+"""Plots over time of what drives a robot: pressures, valves, forces and energy of a hydraulic machine. Servos."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def machine_plots(trace: Trace) -> list[Markup]:
 def _servo_plots(
     data: Mapping[str, Float], names: Sequence[str], time: Float, events: Sequence[tuple[float, str]]
 ) -> list[Markup]:
-    """Torques of the springs, and the motors' speeds where they are known; nothing of what another drive recorded."""
+    """Torques of the springs, and the motors' speeds where they are known. Nothing of what another drive recorded."""
     if "servo_force" not in data:
         return []
     plots = [time_plot("Joint torques", "Nm", time, _each(names, data["servo_force"], "line"), events=events,

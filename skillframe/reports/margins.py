@@ -79,7 +79,7 @@ def _worst(rows: Sequence[ResultRow], margin: Margin) -> ResultRow:
 
 
 def _nearness(row: ResultRow, margin: Margin) -> float:
-    """Share of the limit; a distance counts as far as long as it is positive."""
+    """Share of the limit. A distance counts as far as long as it is positive."""
     value = row.values[margin.column]
     return value / margin.limit if margin.limit else (1.0 if value <= 0.0 else 0.0)
 

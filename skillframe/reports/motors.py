@@ -27,7 +27,7 @@ RUN_WORDS = (
 
 
 def motors_table(chapter: Chapter, results: Results) -> Markup:
-    """Worst and typical trial of each share and skill, and what the URDF does not limit; "" if nothing is known."""
+    """Worst and typical trial of each share and skill, and what the URDF does not limit. "" if nothing is known."""
     rows = [row for kind in range(len(KINDS)) for skill in results.skills if (row := _row(results, skill, kind))]
     told = chapter.scene.get("notes")
     said = [note(f"{text[:1].upper()}{text[1:]}.") for text in (told if isinstance(told, list) else []) if text]

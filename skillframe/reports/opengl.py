@@ -1,4 +1,4 @@
-"""Pictures of a stage by MuJoCo's renderer, where OpenGL works; drawn by a child process from the trace's shapes.
+"""Pictures of a stage by MuJoCo's renderer, where OpenGL works. Drawn by a child process from the trace's shapes.
 
 Nobody knows whether OpenGL works before it has drawn: libraries may be missing, drivers crash or hang. So `backend`
 lets a child draw a square and looks at it, and `pictures` reads the frames from a child under a deadline. EGL uses a
@@ -40,7 +40,7 @@ class NoPicture(SkillframeError):
 
 @lru_cache(maxsize=1)
 def backend() -> str | None:
-    """The first backend of OpenGL that draws on this machine, or None; a few seconds, once a process."""
+    """The first backend of OpenGL that draws on this machine, or None. A few seconds, once a process."""
     return next((name for name in BACKENDS.get(sys.platform, ()) if _draws(name)), None)
 
 
@@ -96,7 +96,7 @@ def pictures(
 
 
 def _why(words: Path) -> str:
-    """What the child said of its error, in brackets; "" if nothing."""
+    """What the child said of its error, in brackets. "" if nothing."""
     lines = words.read_text("utf-8", "replace").splitlines()
     error = next((line.strip() for line in reversed(lines) if "Error: " in line), "")
     return f" ({error})" if error else ""
@@ -140,7 +140,7 @@ def _shown(stage: Stage, body: int) -> Mesh:
 
 
 def _of_one_color(mesh: Mesh) -> Iterator[Mesh]:
-    """A mesh in parts of one colour each; MuJoCo colours whole meshes."""
+    """A mesh in parts of one colour each. MuJoCo colours whole meshes."""
     if not len(mesh.faces):
         return
     colors, which = np.unique(mesh.colors, axis=0, return_inverse=True)

@@ -78,7 +78,7 @@ def draw(scene: Mapping[str, Any], out: int) -> None:
 
 
 def _view(camera: Any) -> Any:
-    """Ours looks from `azimuth`, `elevation` at the target; MuJoCo's looks along them."""
+    """Ours looks from `azimuth`, `elevation` at the target. MuJoCo's looks along them."""
     import mujoco
 
     view = mujoco.MjvCamera()

@@ -22,7 +22,7 @@ WORDS = {"peak_force_n": PEAK, "peak_force_10ms_n": "over 10 ms", "peak_force_fi
 
 
 def said(values: Mapping[str, object], figure: Callable[[float], str]) -> list[str]:
-    """The three of a trial that are known, each a phrase with its unit; they belong together in this order.
+    """The three of a trial that are known, each a phrase with its unit. They belong together in this order.
 
     Args:
         values: by column.

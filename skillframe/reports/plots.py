@@ -107,7 +107,7 @@ def _shades(axes: Axes, time: Float, shaded: NDArray[np.bool_] | None) -> Markup
 
 
 def doubted(columns: Mapping[str, Float]) -> NDArray[np.bool_] | None:
-    """(T,) where an estimated force is not valid, by a machine's or a recording's columns; None where none says so."""
+    """(T,) where an estimated force is not valid, by a machine's or a recording's columns. None where none says so."""
     return columns["force_valid"] < VALID if "force_valid" in columns else None
 
 

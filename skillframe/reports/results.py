@@ -183,7 +183,7 @@ def read_results(path: Path, declared: Sequence[str] = (), plan: Plan | None = N
 
 
 def results_of(text: str, path: Path, declared: Sequence[str] = (), plan: Plan | None = None) -> Results:
-    """As `read_results`, from the text of a table; `path` is where it comes from."""
+    """As `read_results`, from the text of a table. `path` is where it comes from."""
     try:
         table = list(csv.reader(io.StringIO(text), strict=True))
     except csv.Error as error:

@@ -1,4 +1,4 @@
-"""What a campaign varied, what stood still, and what its simulation cannot show; all from the folder's files."""
+"""What a campaign varied, what stood still, and what its simulation cannot show, from the folder's files."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _table(chapter: Chapter, key: str) -> dict[str, Any]:
 
 
 def varied(chapter: Chapter, results: Results) -> list[str]:
-    """Each varied quantity with its declared range; without a campaign file the range that the table holds."""
+    """Each varied quantity with its declared range. Without a campaign file the range that the table holds."""
     declared = _table(chapter, "vary")
     lines = [f"{quantity(name).label}: {_range(name, value)}" for name, value in declared.items()]
     lines = lines or ranges(results)

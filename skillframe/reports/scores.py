@@ -16,7 +16,7 @@ HEAD = ("score", "skill", "trials", "median", "smallest", "largest", "unit")
 
 
 def scores_table(chapter: Chapter, results: Results) -> Markup:
-    """Each score of each skill; nothing where the campaign asked for none."""
+    """Each score of each skill. Nothing where the campaign asked for none."""
     names = sorted({name for row in results.rows for name in row.values if name.startswith(SCORE)})
     if not names:
         return Markup("")

@@ -47,7 +47,7 @@ def made_sections(files: ReportFiles) -> list[MadeSection]:
 
 
 def made_section(record: SectionType, files: ReportFiles) -> MadeSection:
-    """One section; what its plug-in raises becomes a sentence in its place."""
+    """One section. What its plug-in raises becomes a sentence in its place."""
     title = _text(record.title)
     try:
         with redirect_stdout(sys.stderr):
@@ -100,7 +100,7 @@ def _cell(value: Any) -> Markup:
 
 
 def _text(value: object) -> str:
-    """Any value as plain text, also one that passes for markup; half a surrogate pair is no text."""
+    """Any value as plain text, also one that passes for markup. Half a surrogate pair is no text."""
     return str(value).encode("utf-8", "replace").decode()
 
 
@@ -109,7 +109,7 @@ def _escaped(value: object) -> Markup:
 
 
 def files_of(folder: Path) -> Mapping[str, Path]:
-    """What lies in a chapter's folder, by its name there; hidden files and links to elsewhere are left out."""
+    """What lies in a chapter's folder, by its name there. Hidden files and links to elsewhere are left out."""
     root = folder.resolve()
     found = {path.relative_to(folder): path for path in folder.rglob("*") if path.is_file()}
     return {

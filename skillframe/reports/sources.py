@@ -87,7 +87,7 @@ class Chapter:
 
     @property
     def planned(self) -> int:
-        """Runs that the campaign file plans; 0 if it does not say."""
+        """Runs that the campaign file plans. 0 if it does not say."""
         trials, skills = self.spec.get("trials"), self.spec.get("skills")
         return trials * len(skills) if isinstance(trials, int) and isinstance(skills, list) else 0
 
@@ -153,7 +153,7 @@ def read_traces(paths: Sequence[Path]) -> Chapter:
 
 
 def _add_sections(chapter: Chapter, named: Callable[[], Mapping[str, Path]]) -> None:
-    """What plug-ins make of the files; what they used counts as what the page was made from."""
+    """What plug-ins make of the files. What they used counts as what the page was made from."""
     if not has_sections():
         return
     files = named()
@@ -204,7 +204,7 @@ def _read_table(chapter: Chapter, folder: Path) -> bool:
 
 
 def _force_limit(chapter: Chapter) -> float | None:
-    """As the campaign noted it, or as robot.toml says; None where neither does."""
+    """As the campaign noted it, or as robot.toml says. None where neither does."""
     for place in (chapter.scene.get("setup"), chapter.robot):
         limits = place.get("limits") if isinstance(place, dict) else None
         limit = limits.get("force_n") if isinstance(limits, dict) else None

@@ -21,7 +21,7 @@ Found = tuple[Path, Trace]
 
 
 def typical(rows: Sequence[ResultRow], column: str) -> ResultRow | None:
-    """The row whose value is nearest to the column's median; None without a known value."""
+    """The row whose value is nearest to the column's median. None without a known value."""
     trial = nearest_to_median({row.trial: row.values.get(column, math.nan) for row in rows})
     return next((row for row in rows if row.trial == trial), None)
 
@@ -53,14 +53,14 @@ def _chosen(group: Sequence[Found], success: bool, results: Results | None) -> F
 
 
 def _off(trace: Trace, middle: float) -> tuple[bool, float]:
-    """How far a run is from the typical duration; runs beside the campaign come last."""
+    """How far a run is from the typical duration. Runs beside the campaign come last."""
     duration = trace.meta.get("duration_s")
     known = isinstance(duration, int | float) and math.isfinite(duration)
     return trace.meta.get("trial") is None, abs(float(duration) - middle) if known and duration else math.inf
 
 
 def why_typical(trace: Trace, results: Results | None) -> str:
-    """Why a success of the campaign is shown, in a sentence; "" for other runs."""
+    """Why a success of the campaign is shown, in a sentence. "" for other runs."""
     middle = typical_duration(results, str(trace.meta.get("skill", "")))
     if not trace.meta.get("success") or trace.meta.get("trial") is None or math.isnan(middle):
         return ""

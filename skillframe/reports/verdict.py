@@ -1,4 +1,4 @@
-"""The first thing on the page: what was required, what came out, and the verdict; then what it rests on."""
+"""The first thing on the page: what was required, what came out, and the verdict. Then what it rests on."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Requirement(NamedTuple):
 
 
 def required(chapter: Chapter, results: Results) -> Requirement:
-    """`[expect]` of the campaign file; without it, the first skill and nothing required."""
+    """`[expect]` of the campaign file. Without it, the first skill and nothing required."""
     expect = table_of(chapter.spec, "expect")
     rate = expect.get("rate")
     skill = str(expect.get("skill") or results.skills[0])
@@ -61,7 +61,7 @@ def verdict(chapter: Chapter, results: Results) -> Verdict:
 
 
 def banner(chapter: Chapter) -> Markup:
-    """Requirement, result and verdict in three lines; nothing where there are no trials."""
+    """Requirement, result and verdict in three lines. Nothing where there are no trials."""
     results = chapter.results
     if results is None or not results.rows:
         return Markup("")
@@ -110,7 +110,7 @@ def verdict_section(chapter: Chapter) -> Markup:
 
 
 def ends(results: Results, skill: str) -> str:
-    """How often the goal was reached and the skill had ended by itself; "" where the table does not say."""
+    """How often the goal was reached and the skill had ended by itself. "" where the table does not say."""
     pairs = [
         (r.values.get("goal_reached", math.nan), r.values.get("ended_itself", math.nan)) for r in results.of(skill)
     ]

@@ -137,7 +137,7 @@ def _by_opengl(stage: Stage, samples: NDArray[np.int64], backend: str) -> Iterat
 
 
 def _views(stage: Stage) -> list[tuple[Camera, int]]:
-    """Both cameras with their pictures' widths; a narrow picture sees less, so its camera stands back."""
+    """Both cameras with their pictures' widths. A narrow picture sees less, so its camera stands back."""
     both = ((stage.far, FAR_WIDTH), (stage.close, CLOSE_WIDTH))
     return [(c._replace(distance=c.distance * max(1.0, HEIGHT / width)), width) for c, width in both]
 

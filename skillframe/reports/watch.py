@@ -19,7 +19,7 @@ Stamp = tuple[tuple[str, int, int], ...]
 def watch_report(
     inputs: Sequence[Path], out: Path, tell: Callable[[str], None], sleep: Callable[[float], None] = time.sleep
 ) -> None:
-    """Make the page whenever rows have come, until every campaign has ended; the last page is the caller's to make.
+    """Make the page whenever rows have come, until every campaign has ended. The last page is the caller's to make.
 
     Args:
         inputs: as for `write_report`.
@@ -46,7 +46,7 @@ def watch_report(
 
 
 def _made(inputs: Sequence[Path], out: Path) -> str:
-    """Write a page that loads itself again; says so with the number of runs that are in it."""
+    """Write a page that loads itself again. Says so with the number of runs that are in it."""
     chapters = read_chapters(inputs)
     write_chapters(chapters, out, live=True)
     there = sum(len(chapter.results.rows) for chapter in chapters if chapter.results)

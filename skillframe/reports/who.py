@@ -1,4 +1,4 @@
-"""Who did it: who taught, and which robot, interface, controller and sensors ran; what the files do not say is said."""
+"""Who did it: who taught, and which robot, interface, controller and sensors ran. What the files do not say is said."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def taught_by(chapter: Chapter, skill: str) -> tuple[str, bool]:
 
 
 def _teachers(chapter: Chapter, skill: str) -> list[Mapping[str, Any] | None] | None:
-    """Metadata of a skill's demonstrations, None for one that the folder does not hold; None without the skill."""
+    """Metadata of a skill's demonstrations, None for one that the folder does not hold. None without the skill."""
     document = chapter.skills.get(skill)
     if document is not None:
         given = document.get("learned_from")

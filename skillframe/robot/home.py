@@ -11,7 +11,7 @@ from skillframe.robot.urdf import read_urdf
 
 
 def home_in_si(values: Mapping[str, Any], path: Path) -> Mapping[str, Any]:
-    """The keys of robot.toml, with texts of `[home]` as SI numbers; the URDF is read where there is one.
+    """The keys of robot.toml, with texts of `[home]` as SI numbers. The URDF is read where there is one.
 
     Args:
         values: as read.

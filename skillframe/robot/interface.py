@@ -78,7 +78,7 @@ class Control:
 
     @property
     def pace(self) -> float:
-        """How many times longer than taught a skill takes; 1 for torques."""
+        """How many times longer than taught a skill takes. 1 for torques."""
         return 1.0 if self.interface == "torque" else self.admittance.slow_down
 
     def figures(self) -> dict[str, float | str]:
@@ -120,7 +120,7 @@ class Admittance:
         self.damping = MARGIN * self.stiffness * self.total_delay
 
     def turning_damping(self, lever: float = 0.0) -> float:
-        """D_r = 1.5 k_r T_tot [Nms/rad]; k_r is k_e lever^2 where robot.toml gives none.
+        """D_r = 1.5 k_r T_tot [Nms/rad]. K_r is k_e lever^2 where robot.toml gives none.
 
         A contact that far from the centre of compliance is moved by force and torque together; its mobility is
         1/D + lever^2/D_r, and the tool would bounce if it turned more easily than it shifts.
@@ -152,7 +152,7 @@ class Admittance:
         return max(1.0, TAUGHT_SPEED / self.speed)
 
     def told(self, lever: float = 0.0) -> str:
-        """The figures in a line, for people; `lever` as of `turning_damping`."""
+        """The figures in a line, for people. `lever` as of `turning_damping`."""
         return (
             f"takes a {self.kind} {self.rate:g} times a second and answers {1e3 * self.total_delay:.0f} ms late; "
             f"damping {self.damping:.0f} Ns/m and {self.turning_damping(lever):.2g} Nms/rad for contacts of "

@@ -12,7 +12,7 @@ LEAST_BITS, MOST_BITS, LARGEST_STEP = 8, 32, 1e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointDynamics:
-    """What resists a joint's motion; None keeps what the URDF says.
+    """What resists a joint's motion. None keeps what the URDF says.
 
     Attributes:
         friction: [N m or N]; damping: [N m s/rad or N s/m].

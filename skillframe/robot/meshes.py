@@ -39,7 +39,7 @@ def resolve_mesh(uri: str, urdf: Path) -> Path | None:
 
 
 def mesh_names(urdf: Path) -> list[str]:
-    """What the meshes of a URDF are called, each once; none where it is no XML, which its reader says."""
+    """What the meshes of a URDF are called, each once. None where it is no XML, which its reader says."""
     try:
         root = ET.parse(urdf).getroot()
     except ET.ParseError:

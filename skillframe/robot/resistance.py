@@ -39,7 +39,7 @@ class Resistance(NamedTuple):
 
 
 def resistances(robot: RobotModel) -> list[Resistance]:
-    """Of every joint that resists and moves a tool frame; any frame where the robot names no arm."""
+    """Of every joint that resists and moves a tool frame. Any frame where the robot names no arm."""
     model = robot.model
     if not (np.any(model.friction) or np.any(model.damping)):
         return []

@@ -180,7 +180,7 @@ class RobotSpec:
 
     @property
     def other_drive(self) -> str:
-        """Name of the plug-in's drive that it has; "" for those of skillframe."""
+        """Name of the plug-in's drive that it has. "" for those of skillframe."""
         return "" if self.drive is None or self.drive.kind in OWN_DRIVES else self.drive.kind
 
     def require_simulated(self) -> None:

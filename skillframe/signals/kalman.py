@@ -119,7 +119,7 @@ def steady_gain(noise: Float, walk: Float, dt: float) -> Gain:
 
 
 def steady_step(value: Any, slope: Any, measured: Any, gain: Gain, dt: float) -> tuple[Any, Any]:
-    """Equation (1): value and slope after a measurement; arrays (..., n) or casadi expressions."""
+    """Equation (1): value and slope after a measurement. Arrays (..., n) or casadi expressions."""
     value = value + dt * slope
     error = measured - value
     return value + gain.value * error, slope + gain.slope * error

@@ -10,7 +10,7 @@ from skillframe.frames import Float
 
 
 def rate_after(value: Any, rate: Any, shown: Any, w: Any, dt: Any) -> tuple[Any, Any]:
-    """Value and rate of the filter w^2 / (s + w)^2 after a sample of dt [s]; arrays or casadi expressions."""
+    """Value and rate of the filter w^2 / (s + w)^2 after a sample of dt [s]. Arrays or casadi expressions."""
     rate = rate + dt * (w**2 * (shown - value) - 2.0 * w * rate)
     return value + dt * rate, rate
 

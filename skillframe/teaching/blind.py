@@ -144,7 +144,7 @@ class BlindTeacher(Skill):
         return Command(Pose(position, rotation), twist, self._impedance, feedforward, status, reason)
 
     def _judge(self, observation: Observation, over: bool) -> tuple[NDArray[np.int64], Reasons]:
-        """The lowest level of the first second of contact is the surface; from there a drop is felt."""
+        """The lowest level of the first second of contact is the surface. From there a drop is felt."""
         depth = (observation.pose.position - self._home.position) @ self._push
         if self._tick * observation.dt <= REST_S:
             self._level = np.fmax(self._level, depth)

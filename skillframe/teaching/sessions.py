@@ -40,7 +40,7 @@ ESTIMATED = SensorSettings(force_noise=1.0, torque_noise=0.07)
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Recording(Sequence[Demonstration]):
-    """Demonstrations in order, and how many attempts failed on the way, with their reasons; a sequence of the first."""
+    """Demonstrations in order, and how many attempts failed on the way, with their reasons. A sequence of the first."""
 
     demonstrations: list[Demonstration]
     rejected: list[str]
@@ -63,7 +63,7 @@ class Recording(Sequence[Demonstration]):
         return f"Recording({len(self)}{where}: {seconds}; {len(self.rejected)} redrawn)"
 
     def save(self, path: Path | str) -> list[Path]:
-        """Write each demonstration to a file; the ending chooses the format.
+        """Write each demonstration to a file. The ending chooses the format.
 
         Args:
             path: of one demonstration; several get NAME1, NAME2, ... in the same folder.

@@ -11,7 +11,7 @@ _SWITCHES = frozenset({"sensor.pressure_frozen", "sensor.pressure_zero", "sensor
 
 
 def fault_problem(key: str, values: Float, robot: RobotModel | None) -> tuple[str, str] | None:
-    """What is wrong with some value (N,) of a fault's quantity within its range, and the cure; None if nothing is."""
+    """What is wrong with some value (N,) of a fault's quantity within its range, and the cure. None if nothing is."""
     if key in _SWITCHES:
         odd = values[(values != 0.0) & (values != 1.0)]
         return (f"is {odd.flat[0]:g}, and something is broken or not", "give 1 or 0") if odd.size else None

@@ -60,7 +60,7 @@ class Layout:
         return share
 
     def jacobian(self, anchor: Float, axis: Float, xmat: Float, point: Float) -> Float:
-        """(N, 6, nv): for a hinge [a x (p - anchor); a], for a slide [a; 0], for a free base [1, -[r]x R; 0, R]."""
+        """(N, 6, nv): for a hinge [a x (p - anchor); a], for a slide [a; 0], for a free base [1, -[r]x R. 0, R]."""
         jacobian = np.zeros((len(point), 6, self.model.nv))
         if self.turns:
             a = axis[:, self.hinges]

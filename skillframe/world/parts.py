@@ -160,7 +160,7 @@ class _Tree:
         return first.index(shared) + second.index(shared)
 
     def branches(self, one: Solid, two: Solid) -> int:
-        """1 for a link that moves and one that stands and does not carry it, as the other arm's base; else 0."""
+        """1 for a link that moves and one that stands and does not carry it, as the other arm's base, else 0."""
         if bool(one.joint) == bool(two.joint):
             return 0
         moves, stands = (one, two) if one.joint else (two, one)

@@ -10,6 +10,8 @@ from pathlib import Path
 import click
 import pytest
 
+from tests.first_lines import with_semicolon
+
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "skillframe"
 PLUGINS = sorted(p for p in (ROOT / "plugins").iterdir() if (p / "src").is_dir())
@@ -192,6 +194,11 @@ def test_seven_files_explain_the_method():
     assert sum(text.count("\n") for text in texts) < 1300
     equation = r"^ .*[=~].*\({}\)"  # indented, with its number behind it
     assert all(any(re.search(equation.format(n), text, re.M) for text in texts) for n in range(1, 6))
+
+
+def test_the_first_line_of_a_docstring_has_no_semicolon():
+    found = [line for folder in ("skillframe", "plugins") for line in with_semicolon(ROOT / folder)]
+    assert not found
 
 
 def test_there_are_few_rooms():

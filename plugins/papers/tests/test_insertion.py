@@ -24,7 +24,7 @@ def robot():
 
 
 def outcomes(name, tilts, frictions, **options):
-    """Insertions of a configuration; "E*" is the relative task of E."""
+    """Insertions of a configuration. "E*" is the relative task of E."""
     return insert(robot(), SCENE, phase_of(name, SCENE.tool.frames, INSERTION), tilts, frictions, **options)
 
 

@@ -49,7 +49,7 @@ class Actuated:
             require_stable(coupling_numbers(self.bank, self.plant.effective_mass(), self.dt), self.dt, self.joints)
 
     def step(self, command: Float, active: Trials) -> list[Broken]:
-        """A tick under commands (N, k); trials among `active` whose FMU failed, each with its sentence."""
+        """A tick under commands (N, k). Trials among `active` whose FMU failed, each with its sentence."""
         self.plant.active = active
         return [] if self.master.step(command.ravel()) else self.failed(active)
 
@@ -67,7 +67,7 @@ class Actuated:
         self.bank.active[(rows[:, None] * k + np.arange(k)).ravel()] = 0
 
     def violations(self, tick: int, active: Trials) -> list[Broken]:
-        """Trials of which a bond has made or lost too much energy; every 100 ticks."""
+        """Trials of which a bond has made or lost too much energy. Every 100 ticks."""
         if tick % RESIDUAL_TICKS:
             return []
         residual = self.master.residual.reshape(self.plant.trials, -1)

@@ -66,7 +66,7 @@ class AdmittanceDrive(TorqueDrive):
         return broken
 
     def act(self, command: Command, ramp: float) -> Float:
-        """The arm's next command where one is due, and the torques of its own loop; the law's wrench (N, 6)."""
+        """The arm's next command where one is due, and the torques of its own loop. The law's wrench (N, 6)."""
         if self._tick % self.arm.ticks == 0:
             self._tell(command, ramp)
         self._tick += 1

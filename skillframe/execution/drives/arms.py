@@ -61,7 +61,7 @@ class SeveralArms:
         self.sensors: Gauge = _ArmSensors(self, setup, rngs, draws)
 
     def by_arm(self, parts: Sequence[Float]) -> Float:
-        """(N, arms, ...) out of one (N, ...) per arm; in C order, or rounding would depend on N."""
+        """(N, arms, ...) out of one (N, ...) per arm, in C order, or rounding would depend on N."""
         result = np.empty((self.count, self.arms, *parts[0].shape[1:]))
         for arm, part in enumerate(parts):
             result[:, arm] = part
@@ -73,7 +73,7 @@ class SeveralArms:
         return stacked.reshape(self.rows, *stacked.shape[2:])
 
     def kinematics(self, active: Trials) -> Kinematics:
-        """Rows of the nominal robots where the plant's are now; each with its own arm's joints."""
+        """Rows of the nominal robots where the plant's are now. Each with its own arm's joints."""
         views = self.views
         if self.nominal is not self.plant:
             qpos, qvel = self.plant.state if self._encoders is None else self._encoders.state
@@ -98,7 +98,7 @@ class SeveralArms:
         return self.as_rows([positions[:, view.dofs] for view in self.views])
 
     def push(self, torque: Float, active: Trials) -> list[Broken]:
-        """Move the plant by a tick under joint torques (rows, joints); nothing fails."""
+        """Move the plant by a tick under joint torques (rows, joints). Nothing fails."""
         whole = np.zeros((self.count, self.plant.model.nv))
         _, velocity = self.plant.state
         for arm, view in enumerate(self.views):
@@ -115,7 +115,7 @@ class SeveralArms:
 
 
 class ArmsDrive:
-    """Arms under an impedance law each; observations, commands and wrenches are (N, arms, ...).
+    """Arms under an impedance law each. Observations, commands and wrenches are (N, arms, ...).
 
     Args:
         setup, draws, rngs: as of `SeveralArms`.
@@ -147,7 +147,7 @@ class ArmsDrive:
         )  # fmt: skip
 
     def act(self, command: Command, ramp: float) -> Float:
-        """Each arm's command to its law; the laws' wrenches (N, arms, 6)."""
+        """Each arm's command to its law. The laws' wrenches (N, arms, 6)."""
         law = self.rows.act(
             command._replace(
                 pose=Pose(command.pose.position.reshape(-1, 3), command.pose.rotation.reshape(-1, 3, 3)),
@@ -218,7 +218,7 @@ class ArmsDrive:
 
 
 class _ArmSensors:
-    """One set of sensors per arm, read as rows; each arm draws from a generator of its own."""
+    """One set of sensors per arm, read as rows. Each arm draws from a generator of its own."""
 
     def __init__(self, limb: SeveralArms, setup: Setup, rngs: Sequence[np.random.Generator], draws: Draws) -> None:
         self._limb, self._arms = limb, limb.arms
@@ -272,7 +272,7 @@ class _ArmRecording:
             recorder.close(rows)
 
     def trace(self, i: int, meta: dict[str, Any]) -> Trace:
-        """The first arm's trace of trial i; those of all arms are kept in `by_arm`, trial by trial."""
+        """The first arm's trace of trial i. Those of all arms are kept in `by_arm`, trial by trial."""
         parts = zip(self._names, self._recorders, self._points, strict=True)
         self.by_arm.append({
             name: recorder.trace(i, {**meta, "arm": name, "center_of_compliance": point.tolist()})

@@ -245,7 +245,7 @@ class MachineDrive:
             self.terms = self.law.terms(self._seen)
 
     def _estimate(self, force_counts: bool = True) -> None:
-        """The force from what was sampled; in the air it is known to be zero."""
+        """The force from what was sampled. In the air it is known to be zero."""
         self._estimated = estimate = self.estimator.step(self._seen, self.terms)
         nothing = np.zeros_like(estimate.force)
         self.estimate = (
@@ -258,7 +258,7 @@ class MachineDrive:
         self.demand = self.law.step(measured, reference, self.active)
 
     def _watched(self, *, swing: bool = False, alarms: Collection[int] = ()) -> list[Broken]:
-        """Trials whose readings, oil and motion do not fit each other; where the coupling is to blame, for that."""
+        """Trials whose readings, oil and motion do not fit each other, with the coupling as the cause where it is to blame."""
         if self.watch is None:
             return []
         seen, valve = self._seen._replace(force=self.estimate.answered), self.demand.valve
@@ -296,13 +296,13 @@ class MachineDrive:
         return Observation(np.full(self.count, time), self.dt, Pose(position, tool.rotation.copy()), twist, wrench)
 
     def _read(self, observation: Observation) -> Observation:
-        """The same with the force as it is now, for the record; a skill that answers the force sees it late."""
+        """The same with the force as it is now, for the record. A skill that answers the force sees it late."""
         wrench = observation.wrench.copy()
         wrench[:, self.task.axes] = self.estimate.force
         return observation._replace(wrench=wrench)
 
     def advance(self, active: Trials) -> list[Broken]:
-        """One coupled step under the valve commands; trials whose FMU failed, each with its sentence."""
+        """One coupled step under the valve commands. Trials whose FMU failed, each with its sentence."""
         self.bill.step(self.actuated.plant.velocity)
         arrived = self._delay.step(self.demand.valve)
         if self.faults is not None:

@@ -47,7 +47,7 @@ class BrokenParts:
         self._faults.tick()
 
     def obey(self, command: Float, height: Float) -> Float:
-        """What the spools go by (N, k) when they are told this; the supply's height over the return line is [Pa]."""
+        """What the spools go by (N, k) when they are told this. The supply's height over the return line is [Pa]."""
         for side, column in self._holes.items():
             self._bank.u[:, column] = self._faults.leak(side).ravel()
         if self._drop is not None:

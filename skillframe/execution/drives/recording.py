@@ -13,7 +13,7 @@ from skillframe.skill import Command, Observation
 
 
 class WithColumns:
-    """A recorder whose samples hold a drive's columns too; both are asked for only where a sample is due.
+    """A recorder whose samples hold a drive's columns too. Both are asked for only where a sample is due.
 
     Args:
         recorder: made with the columns' names and shapes.

@@ -123,7 +123,7 @@ class ServoDrive:
         self._unmapped = [text for row in rows for text in row._replace(outputs=()).sentences]
 
     def prepare(self) -> list[Broken]:
-        """Hold still and tare; trials whose FMU refuses to start do not run."""
+        """Hold still and tare. Trials whose FMU refuses to start do not run."""
         failed = self.limb.actuated.failed(np.arange(self.plant.count))
         return [*failed, *self.law.prepare()]
 
@@ -140,7 +140,7 @@ class ServoDrive:
         return [*self.law.violations(tick, active), *self.limb.actuated.violations(tick, active)]
 
     def advance(self, active: Trials) -> list[Broken]:
-        """One coupled step; trials whose FMU failed, each with its sentence."""
+        """One coupled step. Trials whose FMU failed, each with its sentence."""
         return self.law.advance(active)
 
     def end(self, rows: Trials) -> None:

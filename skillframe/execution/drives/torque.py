@@ -71,11 +71,11 @@ class Limb(Protocol):
         """(rows, nv)."""
 
     def push(self, torque: Float, active: Trials) -> list[Broken]:
-        """Move the plant by a tick under joint torques (rows, nv); trials whose actuators failed."""
+        """Move the plant by a tick under joint torques (rows, nv). Trials whose actuators failed."""
 
 
 class TorqueDrive:
-    """A limb under an impedance law; its observations, commands and wrenches have the limb's rows.
+    """A limb under an impedance law. Its observations, commands and wrenches have the limb's rows.
 
     Args:
         setup: robot, scene and settings.
@@ -152,7 +152,7 @@ class TorqueDrive:
         return self.guard.violations(self._position, self._reading.twist, self._wrench, self._law, active)
 
     def advance(self, active: Trials) -> list[Broken]:
-        """The plant moves under the torques; ideal motors do not fail."""
+        """The plant moves under the torques. Ideal motors do not fail."""
         return self.limb.push(self._torque, active)
 
     def end(self, rows: Trials) -> None:
@@ -234,7 +234,7 @@ class OneArm:
         return self.plant.joint_positions
 
     def push(self, torque: Float, active: Trials) -> list[Broken]:
-        """Move the plant by a tick under generalised forces (N, nv); nothing fails."""
+        """Move the plant by a tick under generalised forces (N, nv). Nothing fails."""
         self.plant.step(torque, active)
         self.read_encoders()
         return []

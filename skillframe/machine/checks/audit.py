@@ -39,7 +39,7 @@ def audit(robot: RobotSpec | RobotModel, total_kg: float | None = None) -> Audit
 
 
 def machine_warnings(robot: RobotModel) -> Iterator[Problem]:
-    """Figures that no cylinder has, or that are not given; loops that do not close, home, and limits made for arms."""
+    """Figures that no cylinder has, or that are not given. Loops that do not close, home, and limits made for arms."""
     spec = robot.spec
     yield from _interface(spec)
     yield from _unmapped(spec)
@@ -77,7 +77,7 @@ def _interface(spec: RobotSpec) -> Iterator[Problem]:
 
 
 def _unmapped(spec: RobotSpec) -> Iterator[Problem]:
-    """Inputs and outputs of other makers' FMUs that no mapping names; an FMU that cannot be read is told as that."""
+    """Inputs and outputs of other makers' FMUs that no mapping names. An FMU that cannot be read is told as that."""
     rows = actuator_specs(spec) if spec.servo else foreign_specs(spec)
     unused = [a.unused for a in spec.actuation if spec.servo or a.fmu != CYLINDER]
     try:

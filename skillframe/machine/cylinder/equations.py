@@ -127,7 +127,7 @@ def burst_flow(p: SimpleNamespace, area: Float | float, pressure: Float) -> Floa
 
 
 def boiling(pressure: Float, net: Float) -> Float:
-    """Eq. 4: share of a falling pressure's rate that is left as the oil boils; 1 while it does not."""
+    """Eq. 4: share of a falling pressure's rate that is left as the oil boils. 1 while it does not."""
     result: Float = where(net < 0.0, clip(1.0 + (pressure - VAPOUR) / BOILING, 0.0, 1.0), 1.0)
     return result
 

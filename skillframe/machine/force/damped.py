@@ -23,7 +23,7 @@ def share_of(corner: float, dt: float) -> float:
 
 
 def damped(middle: Any, value: Any, shown: Any, share: float) -> tuple[Any, Any]:
-    """Both poles of L after a sample, the second one's value last; arrays or casadi expressions."""
+    """Both poles of L after a sample, the second one's value last. Arrays or casadi expressions."""
     middle = middle + share * (shown - middle)
     return middle, value + share * (middle - value)
 

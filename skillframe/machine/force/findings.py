@@ -28,7 +28,7 @@ _FRICTION = (("coulomb_friction", "N"), ("viscous_friction", "N s/m"))
 def findings(
     law: CompiledLaw, load: BelievedLoad, found: Identification, valves: ValveIdentification
 ) -> list[list[str]]:
-    """Sentences of every trial, in order; none where all is as told, or was found within its bounds."""
+    """Sentences of every trial, in order. None where all is as told, or was found within its bounds."""
     count = len(load.mass)
     return [
         [*_weighed(load, i), *_load(law, load, found, i), *_rubbing(law, found, i), *_valves(law, valves, i)]

@@ -1,4 +1,4 @@
-r"""Friction and payload found in air, by recursive least squares with priors; afterwards they are held.
+r"""Friction and payload found in air, by recursive least squares with priors. Afterwards they are held.
 
 In air f = 0, so the residual of the momentum is \(r = \phi\,\theta + e\) with \(\theta = (dF_C, dF_v, dm)\): errors of
 each cylinder's Coulomb and viscous friction and of the payload's mass. With the prior \(\theta_i \sim N(0, s_i^2)\),

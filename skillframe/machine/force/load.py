@@ -106,7 +106,7 @@ class BelievedLoad:
             self._tell()
 
     def weigh(self, seen: Measured, terms: Terms) -> bool:
-        """Judge what was told at rest, before the swing; whether the law goes by something else now."""
+        """Judge what was told at rest, before the swing. Whether the law goes by something else now."""
         law = self._law
         if not _starts_in_balance(law.chain.robot.spec):
             return False

@@ -52,7 +52,7 @@ _SPEEDS = ("stiction_speed", "least_speed", "sliding_speed")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceSettings:
-    """How to estimate; what is not named otherwise is our choice, from trials with the crane.
+    """How to estimate. What is not named otherwise is our choice, from trials with the crane.
 
     Attributes:
         corner: of L, two equal poles as published for this crane's derivatives [Hz].

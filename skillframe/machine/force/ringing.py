@@ -67,11 +67,11 @@ class Ringing:
 
     @property
     def after(self) -> Float:
-        """(N,) rms of the speed when the tool should be at rest [m/s]; 0 before."""
+        """(N,) rms of the speed when the tool should be at rest [m/s]. 0 before."""
         return np.sqrt(self._after / max(self._ticks - self._from, 1))
 
     def sentences(self, law: CompiledLaw) -> list[str]:
-        """Of every machine: that it rings, with figures and what to set; empty for one that does not."""
+        """Of every machine: that it rings, with figures and what to set. Empty for one that does not."""
         rings = (self.after > AFTER * self.told) | (self.beside > BESIDE * self.told)
         cure = what_to_set(law) if rings.any() else ""
         return [f"{self._text(i)}; {cure}" if rings[i] else "" for i in range(len(rings))]
@@ -87,7 +87,7 @@ class Ringing:
 
 
 def what_to_set(law: CompiledLaw) -> str:
-    """Gains above those that follow from the machine's figures, and what these are; else where else to look."""
+    """Gains above those that follow from the machine's figures, and what these are, or where else to look."""
     derived, now, spec = derived_gains(law.chain), law.gains, law.chain.robot.spec
     rows = [("gains.body", now.body, derived.body)]
     for name, given, found in (("velocity", now.velocity, derived.velocity), ("force", now.force, derived.force)):

@@ -1,4 +1,4 @@
-r"""The force estimate of one trial, as two casadi functions; equations and names in `momentum`.
+r"""The force estimate of one trial, as two casadi functions. Equations and names in `momentum`.
 
     look:  sensors and terms -> what passed L: residual, J, phi; which pistons slide; the residuals' variances
     weigh: these and theta   -> force, sigma, and the filters behind
@@ -30,7 +30,7 @@ from skillframe.signals.kalman import Gain, steady_step
 
 
 class Memory:
-    """A row of numbers as named parts: symbols to read, and expressions to write; rows by rows, as numpy has them.
+    """A row of numbers as named parts: symbols to read, and expressions to write. Rows by rows, as numpy has them.
 
     Args:
         name: of the symbol; parts: name and shape of each part.

@@ -1,4 +1,4 @@
-r"""Overlap and supply pressure of a machine's valves, found in air from what flows; afterwards they are held.
+r"""Overlap and supply pressure of a machine's valves, found in air from what flows. Afterwards they are held.
 
 A spool with overlap b opens by u_e = sign(u) (|u| - b) / (1 - b), so where it is open
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValveSettings:
-    """How to find them; our choice, from swings of the crane.
+    """How to find them. Our choice, from swings of the crane.
 
     Attributes:
         period: of rows [s]; slice: lags are multiples of it [s]; lags: how many.

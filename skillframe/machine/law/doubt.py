@@ -20,7 +20,7 @@ LEAST = 1e-3  # N, for a force that is known
 
 
 def left_undone(imbalance: Any, force: Any, sigma: Any) -> Any:
-    """Share s / (1 + p) of an imbalance T that is not pursued; arrays or casadi expressions (`either`).
+    """Share s / (1 + p) of an imbalance T that is not pursued. Arrays or casadi expressions (`either`).
 
     Args:
         imbalance: T (..., 2) [N].

@@ -54,7 +54,7 @@ class DerivedGains(NamedTuple):
 
 
 def law_gains(chain: ClosedChain) -> HydraulicGains:
-    """Those of a machine's robot.toml; what it does not give is derived.
+    """Those of a machine's robot.toml. What it does not give is derived.
 
     Raises:
         InputError: a figure of a cylinder is missing, or the machine cannot stand at home.
@@ -86,7 +86,7 @@ def with_derived_gains(robot: RobotModel) -> RobotModel:
 
 
 def missing_gains(spec: RobotSpec) -> list[str]:
-    """Gains that a hydraulic machine's robot.toml does not give, by name; none for other robots."""
+    """Gains that a hydraulic machine's robot.toml does not give, by name. None for other robots."""
     if not spec.hydraulic:
         return []
     names = ("velocity_gain", "force_gain")

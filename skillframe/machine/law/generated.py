@@ -40,7 +40,7 @@ __attribute__((visibility("default"))) void %(name)s_batch(
 
 
 def source(function: ca.Function) -> str:
-    """C text of a function and its loop over trials; sizes are distances between trials, zero for shared inputs."""
+    """C text of a function and its loop over trials. Sizes are distances between trials, zero for shared inputs."""
     generator = ca.CodeGenerator(function.name(), {"with_header": False})
     generator.add(function)
     sizes = {

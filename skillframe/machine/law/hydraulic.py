@@ -89,7 +89,7 @@ class Terms(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HydraulicGains:
-    """Gains of the law. Defaults are those of the crane that ships; `gains` has those of any machine.
+    """Gains of the law. Defaults are those of the crane that ships. `gains` has those of any machine.
 
     Attributes:
         velocity, force: k_x and k_f of each cylinder (k,). Published for this crane: 5e-3, 5e-3, 1e-3 and 2e-8, 2e-8,

@@ -93,7 +93,7 @@ class CompiledLaw:
         self._turn = 0
 
     def start(self) -> None:
-        """Forget the past; the required force's filter begins at the first required force."""
+        """Forget the past. The required force's filter begins at the first required force."""
         self._scalars[-1] = 1.0
 
     def tell(self, theta: Float) -> None:
@@ -107,7 +107,7 @@ class CompiledLaw:
         self._scalars[1:4] = (self.gains.adaptation, *self.gains.friction) if on else 0.0
 
     def terms(self, measured: Measured) -> Terms:
-        """The model's terms where the machine is measured to be; the arrays are used again by the call after next."""
+        """The model's terms where the machine is measured to be. The arrays are used again by the call after next."""
         np.copyto(self._measured.z, measured.z)
         np.copyto(self._measured.rate, measured.rate)
         self._turn ^= 1
@@ -115,7 +115,7 @@ class CompiledLaw:
         return self._terms[self._turn]
 
     def step(self, measured: Measured, reference: Reference, ids: NDArray[np.int64]) -> Demand:
-        """A sample for the trials in `ids`, the other rows mean nothing; the call after next uses the arrays again."""
+        """A sample for the trials in `ids`, the other rows mean nothing. The call after next uses the arrays again."""
         for own, given in zip((*self._measured, *self._reference), (*measured, *reference), strict=True):
             assert own is not None
             own[...] = 0.0 if given is None else given

@@ -1,4 +1,4 @@
-r"""The law of `hydraulic` and its model's terms for one trial, as casadi functions; equations there and in `vdc`.
+r"""The law of `hydraulic` and its model's terms for one trial, as casadi functions. Equations there and in `vdc`.
 
 The terms come another way than in the readable law: with the kinetic energy T and the potential energy U as
 expressions, M_z = d^2T/dzd^2, C_z^T zd = dT/dz and g_z = dU/dz (Lagrange). What may change from run to run is an
@@ -136,7 +136,7 @@ def _potential(s: SymbolicChain, rows: Expression) -> Expression:
 
 
 def _unless_fresh(kept: Expression, new: Expression, gain: dict[str, Expression]) -> Expression:
-    """What was kept; at the first sample after a start, something new."""
+    """What was kept. At the first sample after a start, something new."""
     return ca.if_else(gain["fresh"] > 0, new, kept)
 
 

@@ -74,7 +74,7 @@ class Cylinders:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CylinderGains:
-    """Velocity gain k_x and force gain k_f per cylinder (n,); published: 5e-3 and 2e-8, extension 1e-3 and 8e-9."""
+    """Velocity gain k_x and force gain k_f per cylinder (n,). Published: 5e-3 and 2e-8, extension 1e-3 and 8e-9."""
 
     velocity: Float
     force: Float
@@ -157,7 +157,7 @@ def flow_demand(c: Any, gains: Any, motion: tuple[Any, ...], force: tuple[Any, .
 
 
 def inverse_valve(c: Any, demand: Any, x: Any, pressures: tuple[Any, ...], supply: Any = None) -> Any:
-    """Opening u_e (..., n) of the edges, not limited, that makes the flow demand; supply: p_S, nominal if not given."""
+    """Opening u_e (..., n) of the edges, not limited, that makes the flow demand. Supply: p_S, nominal if not given."""
     (p_a, p_b), high = pressures, c.supply_pressure if supply is None else supply
     a, b = 1.0 / (c.arm_a + x), 1.0 / (c.arm_b + c.stroke - x)
     extend = sqrt(_drop(c, high - p_a)) * a + sqrt(_drop(c, p_b - c.return_pressure)) * b

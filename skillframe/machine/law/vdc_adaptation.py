@@ -18,7 +18,7 @@ from skillframe.frames import Float
 
 
 def adapt(estimate: Any, rate: Any, bounds: tuple[Any, Any], dt: Any) -> Any:
-    """Parameters after a step of dt [s]; arrays or casadi expressions (`either`).
+    """Parameters after a step of dt [s]. Arrays or casadi expressions (`either`).
 
     From within the bounds, to clip says the same as to set the rate to zero at them first.
 

@@ -22,7 +22,7 @@ FAST, SLOW = 5, 10
 
 
 class ToolWatch:
-    """Of N machines; period: [s] between two looks."""
+    """Of N machines. Period: [s] between two looks."""
 
     def __init__(self, count: int, period: float) -> None:
         self._period, self._looks = period, 0

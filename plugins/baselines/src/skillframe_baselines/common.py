@@ -155,7 +155,7 @@ def common_goal(ends: Sequence[Pose]) -> Pose:
 
 
 def frame_in_base(name: str, demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
-    """The document's `frame`; none of these methods learns in other axes than those of base.
+    """The document's `frame`. None of these methods learns in other axes than those of base.
 
     Raises:
         InputError: no demonstration, demonstrations of different tools, or other axes.

@@ -1,4 +1,4 @@
-"""Is a share reached? By count in a full run; in a quick one unless the counts exclude it.
+"""Is a share reached? A full run goes by the count, a quick one by whether the counts exclude it.
 
 A quick run has few trials, so there the upper end of the exact two-sided 95 % interval (Clopper and Pearson 1934) must
 reach the threshold. This is our choice: at a true rate of 0.9, ten trials miss a threshold of 0.9 one time in four.
@@ -27,7 +27,7 @@ def judged(hits: int, count: int, bar: float, *, quick: bool) -> Verdict:
 
 
 def undecided(hits: int, count: int, bar: float, *, quick: bool) -> str:
-    """A sentence if a share is missed by count and not excluded by its exact 95 % interval; "" otherwise."""
+    """A sentence if a share is missed by count and not excluded by its exact 95 % interval. "" otherwise."""
     low, high = clopper_pearson(hits, count)
     if reached(hits, count, bar, quick=quick) or high < bar - ROUNDING:
         return ""

@@ -22,7 +22,7 @@ def verdicts(*, quick: bool) -> dict[str, str]:
 
 
 def changes(entries: Sequence[Mapping[str, Any]], committed: Mapping[str, str]) -> list[str]:
-    """A sentence for every row whose verdict is not the committed one; rows that are not committed are passed over."""
+    """A sentence for every row whose verdict is not the committed one. Rows that are not committed are passed over."""
     return [
         f"row {each['row']} is {each['verdict']!r}, the docs say {committed[each['row']]!r}"
         for each in entries

@@ -14,7 +14,7 @@ ORIGINS = {
 
 
 def render(entries: Sequence[Mapping[str, Any]]) -> str:
-    """The page; the same rows give the same text but for wall times."""
+    """The page. The same rows give the same text but for wall times."""
     wall, cpu = (sum(each[key] for each in entries) / 60.0 for key in ("wall_s", "cpu_s"))
     lines = [
         "# The papers' results, row by row", "",

@@ -64,7 +64,7 @@ def in_order(names: Sequence[str]) -> list[str]:
 def jobs_of(
     registry: Registry, rows: Sequence[str], changed: Mapping[str, Any], *, seed: int, quick: bool
 ) -> list[Job]:
-    """Jobs of some rows, of all if none is named; a setting reaches every one of them that has it.
+    """Jobs of some rows, of all if none is named. A setting reaches every one of them that has it.
 
     Raises:
         UnknownName: no such row, or a setting that none of them has.

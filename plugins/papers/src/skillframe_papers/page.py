@@ -39,7 +39,7 @@ figure img { max-height: 560px; object-fit: contain; }
 
 
 def render(entries: Sequence[Mapping[str, Any]]) -> str:
-    """The whole document; the same rows give the same text."""
+    """The whole document. The same rows give the same text."""
     head = tag(
         "head", tag("meta", charset="utf-8"), tag("meta", http_equiv="Content-Security-Policy", content=POLICY),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
@@ -51,7 +51,7 @@ def render(entries: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _links(entries: Sequence[Mapping[str, Any]]) -> list[Markup]:
-    """The rows by topic; pointed at, a number says what it claims. Rows that an older version kept have no topic."""
+    """The rows by topic. Pointed at, a number says what it claims. Rows that an older version kept have no topic."""
     topics: dict[str, list[Markup]] = {}
     for each in entries:
         hint = f"row {each['row']}, {each['verdict']}: {each['summary']}"

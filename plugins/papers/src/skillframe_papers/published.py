@@ -1,4 +1,4 @@
-"""The published results, rows 1 to 23, and what ours must reach; the modules of `rows` compute them."""
+"""The published results, rows 1 to 23, and what ours must reach. The modules of `rows` compute them."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ WATCH = "watch"
 
 
 class RowFailed(SkillframeError):
-    """Rows that could not be computed, because of what they were given; says which and why."""
+    """Rows that could not be computed, because of what they were given. Says which and why."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,7 +170,7 @@ def _end(answer: Died | Raised) -> str:
 
 
 def compute(group: Group) -> list[dict[str, Any]]:
-    """Compute rows one after another and keep each; runs in a worker.
+    """Compute rows one after another and keep each. Runs in a worker.
 
     Returns:
         of each row that could not be computed: `row`, `kind` ("refused" its settings, or "broken") and `text`.

@@ -86,5 +86,5 @@ def _text(value: Any) -> bytes:
 
 
 def _sum(found: Mapping[str, Any]) -> str:
-    """Of a row as plain values; damage may have put in what `keep` never writes."""
+    """Of a row as plain values. Damage may have put in what `keep` never writes."""
     return hashlib.sha256(json.dumps(found, sort_keys=True).encode()).hexdigest()[:16]

@@ -101,7 +101,7 @@ def press_and_slide(depth: float) -> Path:
 
 
 def scene(start: Float, *, plate: bool) -> Scene:
-    """A sphere at the tool, over a plate or in the air; `start` in base [m]."""
+    """A sphere at the tool, over a plate or in the air. `start` in base [m]."""
     tool = Tool(
         geoms=(Geom(kind="sphere", size=(RADIUS,)),), mass=1e-3, center_of_mass=(0.0, 0.0, 0.0),
         inertia=(1e-6, 1e-6, 1e-6), frames={"tip": (0.0, 0.0, 0.0)},

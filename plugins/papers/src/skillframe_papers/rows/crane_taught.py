@@ -55,7 +55,7 @@ class Taught(NamedTuple):
 
     @property
     def angle(self) -> float:
-        """Of the learned push in the crane's plane [degrees]; NaN where there is none."""
+        """Of the learned push in the crane's plane [degrees]. NaN where there is none."""
         direction = self.document["phases"][0]["translation"]["desired_direction"]
         return np.nan if direction is None else degrees(np.arctan2(direction[2], direction[0]))
 
@@ -146,7 +146,7 @@ def _words(reached: Reached) -> str:
 
 
 def _picture(job: RowRun, skill: Taught, results: list[Result]) -> Illustration:
-    """Ways of the tool, taught and run, in the crane's plane; where stack and stop would touch it."""
+    """Ways of the tool, taught and run, in the crane's plane, and where stack and stop would touch it."""
     from matplotlib.figure import Figure
 
     from skillframe.reports.drawing import BLUE, GREY, INK, RED, svg

@@ -62,7 +62,7 @@ def _parts(documents: Sequence[Document], name: str) -> list[dict[str, Any]]:
 
 
 def _angle(a: Any, b: Float) -> float:
-    """Between two directions [degrees]; 180 where there is none."""
+    """Between two directions [degrees]. 180 where there is none."""
     return 180.0 if a is None else degrees(np.arccos(np.clip(np.dot(a, b), -1.0, 1.0)))
 
 
@@ -107,7 +107,7 @@ def sector_width(job: RowRun) -> RowResult:
 
 
 def _tilted_push() -> Document:
-    """An LMC document: push along the tool's axis, free across it in the plane of the valley; stop where it stalls."""
+    """An LMC document: push along the tool's axis, free across it in the valley's plane, stop where it stalls."""
 
     def part(direction: Any, axes: list[list[float]], stiffness: Float, speed: float) -> dict[str, Any]:
         return {

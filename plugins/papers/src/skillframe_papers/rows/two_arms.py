@@ -111,7 +111,7 @@ def table(job: RowRun) -> RowResult:
 
 
 def _unlike(reach: dict[str, float]) -> str:
-    """Which configurations are far from the paper's; "" if none is."""
+    """Which configurations are far from the paper's. "" if none is."""
     published = {n: PUBLISHED[n]["largest_deg"] for n in PUBLISHED if n in reach}
     names = [n for n, value in published.items() if abs(reach[n] - value) > FAR_DEG]
     return f"; {' and '.join(names)} not as published" if names else ""
