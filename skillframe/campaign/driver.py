@@ -14,8 +14,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Generic, NamedTuple, Protocol
 
+from skillframe.campaign.chunk_progress import listening
 from skillframe.campaign.provenance import environment
-from skillframe.campaign.pulse import heard
 from skillframe.campaign.rows import ChunkJob, Row
 from skillframe.campaign.trouble import CampaignError, Evaluate, Raised, attempt
 from skillframe.campaign.work import WorkT
@@ -184,7 +184,7 @@ class InProcess(Generic[WorkT]):
     def next(self) -> tuple[WorkT, Answer]:
         """Run the next job now."""
         job = self._jobs.popleft()
-        with heard(lambda share: self._tell(share * job.size)):
+        with listening(lambda share: self._tell(share * job.size)):
             return job, attempt(self._evaluate, job)
 
     def close(self) -> None:

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from skillframe.campaign.axes import Value
+from skillframe.campaign.chunk_progress import report_progress
 from skillframe.campaign.noted import setup_notes
-from skillframe.campaign.pulse import beat
 from skillframe.campaign.rows import EXTRA, JUDGED, OUTCOME, SCORE, TRACE, ChunkJob, Row, plain_value, rows_of
 from skillframe.campaign.sampling import draws, trial_rngs
 from skillframe.campaign.spec import CampaignSpec
@@ -54,8 +54,8 @@ def evaluate(job: ChunkJob) -> list[Row]:
         groups.setdefault(tuple(plain_value(drawn[name][i]) for name in scenes), []).append(trial)
     rows: dict[int, Row] = {}
     for values, trials in groups.items():
-        pulse = partial(_beat, len(rows), len(trials), len(job.trials), spec.duration_s)
-        found = _simulate(spec, job, tuple(trials), dict(zip(scenes, values, strict=True)), pulse)
+        tell = partial(_report, len(rows), len(trials), len(job.trials), spec.duration_s)
+        found = _simulate(spec, job, tuple(trials), dict(zip(scenes, values, strict=True)), tell)
         rows |= {row["trial"]: row for row in found}
     return [rows[trial] for trial in job.trials]
 
@@ -129,9 +129,9 @@ def _scene(spec: CampaignSpec, varied: Mapping[str, Value]) -> Scene:
     return load_world(spec.world, {n.removeprefix("world."): v for n, v in settings.items() if n.startswith("world.")})
 
 
-def _beat(before: int, group: int, trials: int, duration_s: float, now: float) -> None:
+def _report(before: int, group: int, trials: int, duration_s: float, now: float) -> None:
     """Say how far the chunk is: whole groups of trials, and the simulated time of one."""
-    beat((before + group * min(now / duration_s, 1.0)) / trials)
+    report_progress((before + group * min(now / duration_s, 1.0)) / trials)
 
 
 def _simulate(

@@ -19,7 +19,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TextIO
 
-from skillframe.campaign.pulse import Listener, heard
+from skillframe.campaign.chunk_progress import Listener, listening
 from skillframe.campaign.rows import Row
 from skillframe.campaign.trouble import Raised, attempt
 from skillframe.campaign.work import WorkT
@@ -49,7 +49,7 @@ def guarded(evaluate: Callable[[WorkT], list[Row]], job: WorkT, seconds: float, 
     with file:
         _wind(seconds, file)
         try:
-            with heard(_pulse(share, seconds, file)):
+            with listening(_writing_to(share, seconds, file)):
                 return attempt(evaluate, job)
         finally:
             faulthandler.cancel_dump_traceback_later()
@@ -69,12 +69,12 @@ def share_file(watch: Path) -> Path:
     return watch.with_suffix(".share")
 
 
-def _pulse(path: Path, seconds: float, file: TextIO) -> Listener:
+def _writing_to(path: Path, seconds: float, file: TextIO) -> Listener:
     """Winds the watchdog and writes how far the job is, now and then. A failed write does not stop it."""
     every = min(PULSE_S, seconds / 4.0)
     due, furthest = time.monotonic() + every, 0.0
 
-    def beat(share: float) -> None:
+    def report_progress(share: float) -> None:
         nonlocal due, furthest
         now = time.monotonic()
         if now >= due and share > furthest:
@@ -83,4 +83,4 @@ def _pulse(path: Path, seconds: float, file: TextIO) -> Listener:
             with suppress(OSError):
                 path.write_text(f"{share:.4f}", encoding="utf-8")
 
-    return beat
+    return report_progress

@@ -129,13 +129,13 @@ class ForceEstimator:
         shape = np.tanh(self._rate / self.settings.sliding_speed)
         push = c.area_a * measured.pressure_a - c.area_b * measured.pressure_b
         push -= c.coulomb_friction * shape + c.viscous_friction * terms.piston_rate
-        known = pull(terms.arms, push) + terms.drift - terms.gravity
+        known = joint_force(terms.arms, push) + terms.drift - terms.gravity
         momentum = (terms.mass @ measured.rate[..., None])[..., 0]
         columns = self._filter.step(self._fill(self._left.step(momentum, known), terms, shape))
         residual, jacobian, phi = columns[..., 0], np.swapaxes(columns[..., 1:3], -1, -2), columns[..., 3:]
         sliding = self._sliding(before)
         if self.calibrating and self._tick % self._every == 0:
-            rows = pull(np.abs(terms.arms), np.where(sliding, 0.0, 1.0)) == 0.0
+            rows = joint_force(np.abs(terms.arms), np.where(sliding, 0.0, 1.0)) == 0.0
             self.identification.update(phi, residual, self._noise, rows)
         self.regressors = phi
         self.residual = residual - (phi @ self.identification.theta[..., None])[..., 0]
@@ -158,7 +158,7 @@ class ForceEstimator:
     def _fill(self, left: Float, terms: Terms, shape: Float) -> Float:
         """(N, n, 3 + 2k + 1) all that passes L: what is left of p', J^T, and the columns of phi."""
         columns, k = self._columns, shape.shape[-1]
-        spread = spread_of(terms.arms)
+        spread = transposed(terms.arms)
         columns[..., 0], columns[..., 1:3] = left, np.swapaxes(terms.jacobian, -1, -2)
         np.multiply(spread, -shape[:, None, :], out=columns[..., 3 : 3 + k])
         np.multiply(spread, -terms.piston_rate[:, None, :], out=columns[..., 3 + k : 3 + 2 * k])
@@ -177,7 +177,7 @@ class ForceEstimator:
             return np.broadcast_to(self._noise.mean(), sliding.shape)
         speed = self._rate / self.settings.stiction_speed
         share = np.where(sliding, np.exp(-np.square(speed)), 1.0)
-        return self._noise + pull(np.square(arms), np.square(self._cylinders.coulomb_friction * share))
+        return self._noise + joint_force(np.square(arms), np.square(self._cylinders.coulomb_friction * share))
 
     def _begin(self) -> None:
         self._feedback.start(self.raw)
@@ -198,12 +198,12 @@ def force_filter(corner: float, dt: float) -> SteadyWrenchFilter:
     return SteadyWrenchFilter(force_gain(corner, dt), dt)
 
 
-def spread_of(arms: Float) -> Float:
+def transposed(arms: Float) -> Float:
     """R^T (N, n, k) of moment arms (N, k, n)."""
     return np.swapaxes(arms, -1, -2)
 
 
-def pull(arms: Float, force: Float) -> Float:
+def joint_force(arms: Float, force: Float) -> Float:
     """R^T F (N, n) of piston forces (N, k)."""
     result: Float = (np.swapaxes(arms, -1, -2) @ force[..., None])[..., 0]
     return result

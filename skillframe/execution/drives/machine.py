@@ -35,7 +35,7 @@ from skillframe.machine.checks.holding import require_held
 from skillframe.machine.columns import EnergyBill, columns, supply_pressures
 from skillframe.machine.cylinder.bank import banks, foreign_specs, instance_parameters
 from skillframe.machine.faults import faults_in, ports
-from skillframe.machine.force.calibration import CALIBRATION_S, SETTLE_S, hold_what_was_found, swing
+from skillframe.machine.force.calibration import CALIBRATION_S, SETTLE_S, hold_identified, swing
 from skillframe.machine.force.compiled import CompiledEstimator
 from skillframe.machine.force.findings import findings
 from skillframe.machine.force.load import BelievedLoad
@@ -200,7 +200,7 @@ class MachineDrive:
         broken += self._ringing(ringing)
         self.sigma.hold()
         self.estimator.calibrate(False)
-        hold_what_was_found(self.law, self.estimator.identification)
+        hold_identified(self.law, self.estimator.identification)
         self.findings = findings(self.law, self.load, self.estimator.identification, self.valves)
         self.bill.start()
         return broken
@@ -258,7 +258,7 @@ class MachineDrive:
         self.demand = self.law.step(measured, reference, self.active)
 
     def _watched(self, *, swing: bool = False, alarms: Collection[int] = ()) -> list[Broken]:
-        """Trials whose readings, oil and motion do not fit each other, with the coupling as the cause where it is to blame."""
+        """Trials whose readings, oil and motion do not fit each other, or whose coupling is to blame for that."""
         if self.watch is None:
             return []
         seen, valve = self._seen._replace(force=self.estimate.answered), self.demand.valve

@@ -38,7 +38,7 @@ def _displacement(time: float) -> Float:
     )
 
 
-def hold_what_was_found(law: CompiledLaw, found: Identification) -> None:
+def hold_identified(law: CompiledLaw, found: Identification) -> None:
     """Let a law compensate the friction and the payload that were found, and learn no more.
 
     The load may be any within the rating, and what carries it heavier or lighter by `share`. What the law's adaptation

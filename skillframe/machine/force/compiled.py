@@ -11,7 +11,7 @@ import numpy as np
 
 from skillframe.frames import Float
 from skillframe.machine.force.identification import Identification
-from skillframe.machine.force.momentum import Estimate, ForceSettings, force_gain, pull
+from skillframe.machine.force.momentum import Estimate, ForceSettings, force_gain, joint_force
 from skillframe.machine.force.symbolic import look_function, weigh_function
 from skillframe.machine.law.generated import Batch
 
@@ -108,7 +108,7 @@ class CompiledEstimator:
         self._look(self._everyone)
         residual, _, phi, sliding, _ = self._seen
         if self.calibrating and due:
-            rows = pull(np.abs(terms.arms), np.where(sliding > 0.0, 0.0, 1.0)) == 0.0
+            rows = joint_force(np.abs(terms.arms), np.where(sliding > 0.0, 0.0, 1.0)) == 0.0
             self.identification.update(phi, residual, self._noise, rows)
         self._theta[...] = self.identification.theta
         self._weigh(self._everyone)

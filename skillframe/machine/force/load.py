@@ -19,7 +19,7 @@ import pinocchio as pin
 
 from skillframe.frames import Float
 from skillframe.machine.checks.figures import CYLINDER
-from skillframe.machine.force.momentum import pull
+from skillframe.machine.force.momentum import joint_force
 from skillframe.machine.law.vdc_body import parameters
 from skillframe.robot.carried import loaded_inertias
 
@@ -67,8 +67,10 @@ def inertias(chain: ClosedChain, payload: Float) -> Float:
 def weigh(chain: ClosedChain, cylinders: Cylinders, measured: Measured, terms: Terms) -> Weighing:
     """Equation (1), the machine at rest."""
     c, load = cylinders, chain.load_gravity(measured.z)
-    left = pull(terms.arms, c.area_a * measured.pressure_a - c.area_b * measured.pressure_b) - terms.gravity
-    weight = load / pull(np.square(terms.arms), np.square(c.coulomb_friction) + 1.0)  # 1 N^2: not all have friction
+    left = joint_force(terms.arms, c.area_a * measured.pressure_a - c.area_b * measured.pressure_b) - terms.gravity
+    weight = load / joint_force(
+        np.square(terms.arms), np.square(c.coulomb_friction) + 1.0
+    )  # 1 N^2: not all have friction
     weight = weight / np.sum(weight * load, axis=-1, keepdims=True)
     felt = np.abs((terms.arms @ weight[..., None])[..., 0])
     hidden = HIDDEN * np.sum(felt * c.coulomb_friction, axis=-1)

@@ -160,7 +160,7 @@ def force_gain(corner: float, dt: float) -> Gain:
     return steady_gain(one, one * np.sqrt(dt) * (2.0 * np.pi * corner) ** 2, dt)
 
 
-def pull(arms: Float, force: Float) -> Float:
+def joint_force(arms: Float, force: Float) -> Float:
     """R^T F (N, n) of piston forces (N, k) with moment arms R (N, k, n)."""
     result: Float = (np.swapaxes(arms, -1, -2) @ force[..., None])[..., 0]
     return result

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from skillframe.campaign.chunk_progress import report_progress
 from skillframe.campaign.folder import prepare
-from skillframe.campaign.pulse import beat
 from skillframe.campaign.rows import EXTRA, OUTCOME, TRACE, rows_of
 from skillframe.campaign.runner import Options, run_campaign
 from skillframe.campaign.sampling import draws, trial_rngs
@@ -102,14 +102,14 @@ def crawls(job):
 
 def tells_quickly(job):
     """Says that it is half done."""
-    beat(0.5)
+    report_progress(0.5)
     return good(job)
 
 
 def tells(job):
     """Says that it is half done, and takes its time."""
     for _ in range(20):
-        beat(0.5)
+        report_progress(0.5)
         time.sleep(0.1)
     return good(job)
 
@@ -173,7 +173,7 @@ def raises(job):
 def stalls(job):
     """Says again and again that it is as far as before."""
     while _guilty(job):
-        beat(0.3)
+        report_progress(0.3)
         time.sleep(0.05)
     return slow(job)
 
@@ -181,7 +181,7 @@ def stalls(job):
 def creeps(job):
     """Three seconds of slow progress."""
     for step in range(30 if _guilty(job) else 0):
-        beat(step / 30)
+        report_progress(step / 30)
         time.sleep(0.1)
     return good(job)
 
@@ -190,7 +190,7 @@ def tells_and_kills(job):
     """Half done for long enough to tell it, and then its worker is killed."""
     if _guilty(job):
         for step in range(8):
-            beat(0.5 + 0.001 * step)
+            report_progress(0.5 + 0.001 * step)
             time.sleep(0.1)
         os.kill(os.getpid(), signal.SIGKILL)
     return good(job)

@@ -15,7 +15,7 @@ _listener: ContextVar[Listener | None] = ContextVar("listener", default=None)
 
 
 @contextmanager
-def heard(listener: Listener) -> Iterator[None]:
+def listening(listener: Listener) -> Iterator[None]:
     """Within this, a listener is called with the share of the chunk, 0 to 1, that is done."""
     token = _listener.set(listener)
     try:
@@ -24,7 +24,7 @@ def heard(listener: Listener) -> Iterator[None]:
         _listener.reset(token)
 
 
-def beat(share: float) -> None:
+def report_progress(share: float) -> None:
     """Say how far the chunk is."""
     listener = _listener.get()
     if listener is not None:
