@@ -44,8 +44,11 @@ def box_inertia(mass, moments):
 
 
 @hypothesis_settings
-@given(seed=st.integers(0, 10**6), size=st.integers(1, 12), power=st.integers(-3, 3), free=st.booleans())
+@given(seed=st.integers(0, 10**6), size=st.integers(1, 12), power=st.integers(-1, 3), free=st.booleans())
 def test_an_honest_tree_is_usable_at_every_scale_and_base(save, urdf, seed, size, power, free):
+    """From centimetres to a kilometre. Travels are metres at every scale, and at their ends a tree of millimetres is
+    singular to rounding: each sliding or floating joint makes the lever (3 m / 0.3 mm)^2 = 1e8 of what turns before
+    it."""
     text = urdf.tree(seed, size, 10.0**power, ALL_KINDS)
     if free:
         text = text.replace('<link name="base"></link>', urdf.link("base", urdf.inertial(1000.0**power, 10.0**power)))
