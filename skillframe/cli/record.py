@@ -12,7 +12,6 @@ import click
 from skillframe.cli.names import robot_option, world_option
 from skillframe.cli.numbers import COUNT, NOT_NEGATIVE, POSITIVE, SEED, WithUnit
 from skillframe.cli.output import note, progress, quiet_option, warned
-from skillframe.config import LARGEST
 from skillframe.config.ranges import Range
 
 if TYPE_CHECKING:
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 
 _AIM = Range(0.0, pi / 2.0, "as a person who is further off aims at nothing")
 _TURN = Range(-pi, pi, "half a turn to either side")
-_DELAY = Range(0.0, LARGEST)  # its own range is `signals.delay.LONGEST_DELAY`
+_DELAY = Range(0.0, 1.0, "as buses and valves take milliseconds")
 _STIFF = Range(0.0, 1e8, "stiffer than steel structures of this size")
 _RATE = Range(0.01, 1e5, "as no controller here is faster")
 QUIET_S = 5.0  # a recording that is over by then needs no progress

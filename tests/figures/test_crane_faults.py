@@ -36,7 +36,7 @@ def test_a_fault_ends_its_trial_within_a_fifth_of_a_second_by_its_own_reason_or_
 
 
 def test_the_watch_leaves_cranes_without_a_fault_alone():
-    """Loads from none to the rating, delays to 20 ms, frictions by 30 %, supplies from 150 to 210 bar."""
+    """Loads from none to the rating, delays to 10 ms, frictions by 30 %, supplies from 150 to 210 bar."""
     where = crane_runs.scene(np.array([crane_runs.FIXTURE[0], 0.0, crane_runs.ABOVE]), plate=True)
     path = crane_runs.press_and_slide(DEPTH)
     drawn = conditions(SOUND, 7)

@@ -48,7 +48,7 @@ SLIPS = {
     "friction below zero": (("[limits]", "[friction_share]\nj1 = -1\n[limits]"), "friction_share.j1: is -1"),
     "no attitude": (("[limits]", "[workspace]\nattitude = [0, 0, 0, 0]\n[limits]"), "has the length 0, not 1"),
     "w, x, y, z too long": (("[limits]", "[workspace]\nattitude = [1, 0, 0, 1]\n[limits]"), "a unit quaternion"),
-    "infinitely far": (("[limits]", "[workspace]\nfixture = [inf, 0, 0]\n[limits]"), "beyond any physical size"),
+    "infinitely far": (("[limits]", "[workspace]\nfixture = [inf, 0, 0]\n[limits]"), "inf m is beyond -100m to 100m"),
 }
 UNUSABLE = {
     "no inertia": lambda text: text.replace("<inertial>", "<!--").replace("</inertial>", "-->"),

@@ -87,7 +87,11 @@ def test_the_plugin_provides_a_coordinator_whose_arms_have_their_own_centres():
 
 @pytest.mark.parametrize(
     ("words", "value"),
-    {"clearance > 0": {"clearance": 0.0}, "length < 0.15": {"length": 0.2}, "done_depth": {"done_depth": 0.1}}.items(),
+    {
+        "clearance: 0 m is": {"clearance": 0.0},
+        "length: 0.2 m is": {"length": 0.2},
+        "done_depth": {"done_depth": 0.1},
+    }.items(),
 )
 def test_a_peg_that_cannot_be_is_refused(words, value):
     with pytest.raises(InputError, match=words):

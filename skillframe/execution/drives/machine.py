@@ -218,11 +218,13 @@ class MachineDrive:
         return [Broken(int(i), Ended.MACHINE, said[i]) for i in self.active if said[i]]
 
     def _suspect(self, tick: int, swung: Ringing) -> list[Broken]:
-        """Trials that the watch ends in the swing. Of one that rings, once that can be told, ringing is the cause."""
+        """Trials that the watch ends in the swing. Ringing, once that can be told, is a cause before oil and motion."""
         broken = self._watched(swing=True)
-        rings = {one.row: one for one in self._ringing(swung)} if broken and tick * self.dt > 0.5 * SWING_S else {}
+        moved = any(one.code == Ended.WATCHDOG for one in broken) and tick * self.dt > 0.5 * SWING_S
+        rings = {one.row: one for one in self._ringing(swung)} if moved else {}
         when = f"(in the swing, {SWING_S - tick * self.dt:.3f} s before the start)"
-        return [rings.get(one.row, one._replace(cause=f"{one.cause} {when}")) for one in broken]
+        said = [one._replace(cause=f"{one.cause} {when}") for one in broken]
+        return [rings.get(one.row, one) if one.code == Ended.WATCHDOG else one for one in said]
 
     def _look_at_valves(self, tick: int) -> None:
         """Identify them, and let the law go by what is known so far: what it learns of inertias depends on it."""

@@ -19,7 +19,7 @@ class FunnelParams:
     Ranges end where parts are too small for a gripper, or too large for an arm (our choice).
 
     Attributes:
-        slope: angle of the faces from the horizontal [rad, 0.01 to 1.4].
+        slope: angle of the faces from the horizontal [rad, 0.5deg to 80deg].
         faces: number of plane faces around the vertical [3 to 16].
         friction: Coulomb coefficient [0 to 5].
         radius: of the ball at the tip [m, 0.1mm to 200mm].

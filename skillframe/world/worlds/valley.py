@@ -24,7 +24,7 @@ class ValleyParams:
     Ranges end where parts are too small for a gripper, or too large for an arm (our choice).
 
     Attributes:
-        slope: angle of both sides from the horizontal [rad, 0.01 to 1.4].
+        slope: angle of both sides from the horizontal [rad, 0.5deg to 80deg].
         friction: Coulomb coefficient [0 to 5].
         radius: of the ball at the tip [m, 0.1mm to 200mm].
         length: of each side along the slope [m, 1mm to 2m].
