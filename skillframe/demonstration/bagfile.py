@@ -119,6 +119,22 @@ def _foreign(path: Path) -> Iterator[None]:
         ) from None
 
 
+@contextmanager
+def fields_of(path: Path, topic: str, kind: str) -> Iterator[None]:
+    """Where fields of messages are read. A bag brings its definitions of them, which damage may have changed.
+
+    Raises:
+        InputError: a field is not there, or holds something else.
+    """
+    try:
+        yield
+    except (AttributeError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{path}: {topic}", f"its messages are no {kind} as ROS defines it ({error})",
+            "it may be damaged: record it again, or choose another topic",
+        ) from None  # fmt: skip
+
+
 def topics_of(path: Path, bag: Any) -> dict[str, str]:
     """Message type by topic.
 
@@ -146,8 +162,9 @@ def read_topic(path: Path, bag: Any, topic: str, kind: str, notes: list[str]) ->
         raise InputError(f"{path}: {topic}", "holds no messages", "choose another topic, or record it again")
     if not all(hasattr(getattr(m, "header", None), "stamp") for m in messages):
         raise InputError(f"{path}: {topic}", "holds messages without a header", "choose another topic")
-    stamps = np.array([m.header.stamp.sec * 1_000_000_000 + m.header.stamp.nanosec for m in messages], dtype=np.int64)
-    frame = str(messages[0].header.frame_id)
+    with fields_of(path, topic, kind):
+        times = [m.header.stamp.sec * 1_000_000_000 + m.header.stamp.nanosec for m in messages]
+        stamps, frame = np.array(times, dtype=np.int64), str(messages[0].header.frame_id)
     if np.all(np.diff(stamps) >= 0):
         return Recorded(topic, kind, stamps, messages, frame)
     order = np.argsort(stamps, kind="stable")
@@ -160,4 +177,5 @@ def read_transforms(path: Path, bag: Any, topics: Sequence[str]) -> list[tuple[b
     with _foreign(path):
         wanted = [c for c in bag.connections if c.topic in topics]
         read = [(c.topic, bag.deserialize(raw, c.msgtype)) for c, _, raw in bag.messages(wanted)]
-    return [(topic.endswith("_static"), each) for topic, message in read for each in message.transforms]
+    with fields_of(path, " and ".join(topics), "transforms"):
+        return [(topic.endswith("_static"), each) for topic, message in read for each in message.transforms]

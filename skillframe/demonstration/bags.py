@@ -21,6 +21,7 @@ from skillframe.demonstration.bagfile import (
     TREES,
     Recorded,
     checksum_notes,
+    fields_of,
     opened,
     parts_note,
     read_topic,
@@ -154,7 +155,8 @@ def _recorded_pose(path: Path, bag: Any, topics: Mapping[str, str], options: Rea
     published = [name for name, kind in topics.items() if kind in TREES]
     if not published:
         raise InputError(path, "holds no transforms (TFMessage)", "choose a topic with --pose-topic, or record /tf")
-    stamps, rows = tool_in_base(tree(read_transforms(path, bag, published), str(path)), base, tool, str(path))
+    with fields_of(path, " and ".join(published), "transforms"):
+        stamps, rows = tool_in_base(tree(read_transforms(path, bag, published), str(path)), base, tool, str(path))
     return Recorded(f"{base} to {tool}", "tf", stamps, rows, base)
 
 
@@ -192,14 +194,20 @@ def _pose(path: Path, recorded: Recorded, zero: int, options: ReadOptions, tool_
         values = np.concatenate([pose.position, quaternion_from_matrix(pose.rotation)], axis=1)
     else:
         pick = POSES[recorded.kind]
-        parts = [pick(message) for message in recorded.messages]
-        values = np.array([(p.x, p.y, p.z, q.x, q.y, q.z, q.w) for p, q in parts], dtype=float)
+        with fields_of(path, recorded.topic, recorded.kind):
+            parts = [pick(message) for message in recorded.messages]
+            values = np.array([(p.x, p.y, p.z, q.x, q.y, q.z, q.w) for p, q in parts], dtype=float)
     columns.update(zip((*POSITION, *QUATERNION), values.T.copy(), strict=True))
     return Columns(columns, f"{path}: {recorded.topic}")
 
 
 def _joint_positions(path: Path, recorded: Recorded) -> tuple[list[str], Float]:
     """Joint names of the first message, and positions (T, joints) in that order."""
+    with fields_of(path, recorded.topic, recorded.kind):
+        return _joint_rows(path, recorded)
+
+
+def _joint_rows(path: Path, recorded: Recorded) -> tuple[list[str], Float]:
     names = [str(name) for name in recorded.messages[0].name]
     rows = []
     for i, message in enumerate(recorded.messages):
@@ -218,8 +226,10 @@ def _joint_positions(path: Path, recorded: Recorded) -> tuple[list[str], Float]:
 
 def _wrench(path: Path, recorded: Recorded, zero: int, options: ReadOptions) -> Columns:
     columns = _clock(path, recorded, zero, options.wrench_rate or options.rate, "--wrench-rate")
-    parts = [message.wrench for message in recorded.messages]
-    values = np.array([(w.force.x, w.force.y, w.force.z, w.torque.x, w.torque.y, w.torque.z) for w in parts])
+    with fields_of(path, recorded.topic, recorded.kind):
+        parts = [message.wrench for message in recorded.messages]
+        rows = [(w.force.x, w.force.y, w.force.z, w.torque.x, w.torque.y, w.torque.z) for w in parts]
+        values = np.array(rows, dtype=float)
     columns.update(zip(WRENCH, values.T.copy(), strict=True))
     return Columns(columns, f"{path}: {recorded.topic}")
 

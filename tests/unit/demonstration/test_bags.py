@@ -175,6 +175,26 @@ def test_a_bag_cut_off_anywhere_is_refused_in_one_sentence_with_exit_2(
     assert not (tmp_path / "x.npz").exists()
 
 
+@pytest.mark.parametrize(
+    ("field", "damaged"),
+    [
+        (b"Point position", b"Point posjtion"),
+        (b"Vector3 force", b"Vector3 fo_ce"),
+        (b"uint32 nanosec", b"uint32 nan_sec"),
+    ],
+)
+def test_messages_whose_definition_in_the_bag_is_damaged_are_refused(
+    tmp_path: Path, demo: Demonstration, field: bytes, damaged: bytes
+) -> None:
+    """An mcap brings its definitions as text; with another name of a field the rest still reads."""
+    path = write_bag(tmp_path / "demo.mcap", {"/tool": poses(demo), "/ft": wrenches(demo)})
+    content = path.read_bytes()
+    assert field in content
+    path.write_bytes(content.replace(field, damaged))
+    with pytest.raises(InputError, match=r"its messages are no .* as ROS defines it|cannot be read as a ROS bag"):
+        read_demonstration(path)
+
+
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_a_bag_without_messages_is_refused(tmp_path: Path, demo: Demonstration, ending: str) -> None:
     kinds = {"/tool": (poses(demo)[0], []), "/ft": (wrenches(demo)[0], [])}
