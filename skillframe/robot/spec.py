@@ -330,7 +330,9 @@ def _check_joints(declared: RobotFile, where: str) -> None:
     else:
         told = dict.fromkeys(("dynamics.compensate", "encoders", "control.delay_s"), f"its drive is {kind!r}")
     given = (declared.dynamics.compensate, declared.encoders is not None, declared.control.late_s > 0.0)
-    if kind not in ("", "servo"):
+    if admits := (interface := declared.control.interface) != "torque":
+        told = dict.fromkeys(told, f"is for arms that take torques, and the interface is {interface!r}")
+    if admits or kind not in ("", "servo"):
         problems += [(key, told[key], "leave it out") for key, is_given in zip(told, given, strict=True) if is_given]
     for key, problem, fix in problems:
         raise InputError(f"{where}: {key}", problem, fix)

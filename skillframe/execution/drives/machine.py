@@ -220,6 +220,8 @@ class MachineDrive:
     def _suspect(self, tick: int, swung: Ringing) -> list[Broken]:
         """Trials that the watch ends in the swing. Ringing, once that can be told, is a cause before oil and motion."""
         broken = self._watched(swing=True)
+        if not broken:
+            return []
         moved = any(one.code == Ended.WATCHDOG for one in broken) and tick * self.dt > 0.5 * SWING_S
         rings = {one.row: one for one in self._ringing(swung)} if moved else {}
         when = f"(in the swing, {SWING_S - tick * self.dt:.3f} s before the start)"

@@ -62,6 +62,8 @@ def test_what_is_given_is_taken(robot):
 @pytest.mark.parametrize(
     ("control", "words"),
     [
+        ('interface = "position"\n[encoders]\nbits = 17\n', "encoders is for arms that take torques"),
+        ('interface = "velocity"\n[dynamics]\ncompensate = true\n', "dynamics.compensate is for arms that"),
         ("rate_hz = 1000\npush_n = 10\n", "control.push_n is for arms that take velocities or positions"),
         ('interface = "force"\n', 'control.interface'),
         ('interface = "position"\nrate_hz = 300\n', "rate_hz is 300, and the simulated arm's 1000 Hz is no whole"),
