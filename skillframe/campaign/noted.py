@@ -5,6 +5,7 @@ control   rate and interface
 drive     "hydraulic", "servo", a plug-in's name, or "" for ideal torques
 base      "fixed" or "free"
 sensors   standard deviations of their noise
+encoders  of the joints in words, or "" where the controller knows positions and velocities exactly
 nominal   the quantities that this kind of robot has, where they stand unless a campaign moves them
 """
 
@@ -16,6 +17,7 @@ from typing import Any
 from skillframe.control.contact import TRANSIENT
 from skillframe.execution.setup import Setup
 from skillframe.robot.spec import RobotSpec
+from skillframe.world.placement import lacks
 from skillframe.world.quantities import VARIED
 
 
@@ -26,18 +28,11 @@ def setup_notes(setup: Setup) -> dict[str, Any]:
     return {
         "limits": {**asdict(setup.limits), "transient": TRANSIENT}, "control": asdict(robot.control),
         "drive": drive_name(robot), "base": robot.base, "sensors": asdict(sensors),
-        "nominal": {v.name: v.nominal for v in VARIED if v.nominal is not None and _applies(v.name, robot)},
+        "encoders": "" if robot.encoders is None else str(robot.encoders),
+        "nominal": {v.name: v.nominal for v in VARIED if v.nominal is not None and not lacks(v.name, robot)},
     }  # fmt: skip
 
 
 def drive_name(robot: RobotSpec) -> str:
     """What stands between the law and the joints: "" for ideal torques."""
     return robot.other_drive or ("hydraulic" if robot.hydraulic else "servo" if robot.servo else "")
-
-
-def _applies(name: str, robot: RobotSpec) -> bool:
-    """Does this kind of robot have the quantity?"""
-    group = name.partition(".")[0]
-    if group == "actuator":
-        return robot.hydraulic
-    return group != "sensor" or not robot.hydraulic

@@ -78,8 +78,9 @@ def banner(chapter: Chapter) -> Markup:
     if not complete(chapter, results) and chapter.planned:
         lines.append(("Progress", f"{len(results.rows)} of {chapter.planned} runs are counted"))
     listed = tag("dl", *(join([tag("dt", label), tag("dd", text)]) for label, text in lines))
+    headline = "no requirement" if rate is None else found.word
     return tag(
-        "section", tag("p", found.word, class_="verdict-word", aria_hidden="true"), listed,
+        "section", tag("p", headline, class_="verdict-word", aria_hidden="true"), listed,
         class_=f"verdict {found.word}", aria_label="Verdict",
     )  # fmt: skip
 

@@ -136,9 +136,11 @@ def sensor_words(chapter: Chapter) -> str:
     told = table_of(setup_of(chapter), "sensors")
     if not told:
         return "noise not written down in this folder"
-    where = (
-        "encoders and chamber pressures" if hydraulic(chapter) else "encoders and a force-torque sensor at the wrist"
-    )
+    where = "encoders and chamber pressures"
+    if not hydraulic(chapter):
+        known = setup_of(chapter).get("encoders")
+        joints = {None: "encoders", "": "exact joint positions"}.get(known, f"encoders ({known})")
+        where = f"{joints} and a force-torque sensor at the wrist"
     return f"{where}; standard deviations: {', '.join(_deviation(key, value) for key, value in told.items())}"
 
 

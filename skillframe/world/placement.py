@@ -15,6 +15,7 @@ from skillframe.errors import InputError, UnknownName
 from skillframe.frames import Float, Pose, matrix_from_quaternion
 from skillframe.robot.kinematics import inverse_kinematics
 from skillframe.robot.model import RobotModel
+from skillframe.robot.spec import RobotSpec
 from skillframe.world.convert import held
 from skillframe.world.faults import fault_problem
 from skillframe.world.plant import displacement
@@ -40,7 +41,7 @@ def check_quantities(draws: Mapping[str, Float], robot: RobotModel | None = None
     for key, values in draws.items():
         if key not in QUANTITIES:
             raise UnknownName("quantity", key, QUANTITIES)
-        if robot is not None and (lacking := _lacking(key, robot)):
+        if robot is not None and (lacking := lacks(key, robot.spec)):
             raise InputError(key, f"{robot.spec.name} {lacking}", "leave it out")
         for value in (float(np.min(values)), float(np.max(values))):
             require_within(value, value, UNITS[key], RANGES[key], key)
@@ -48,18 +49,18 @@ def check_quantities(draws: Mapping[str, Float], robot: RobotModel | None = None
             raise InputError(key, *problem)
 
 
-def _lacking(key: str, robot: RobotModel) -> str:
+def lacks(key: str, spec: RobotSpec) -> str:
     """Why a quantity would do nothing on this robot, or "" if it does something."""
-    if key in _FAULTS and not robot.spec.hydraulic:
+    if key in _FAULTS and not spec.hydraulic:
         return "is no hydraulic machine, whose faults alone are simulated"
-    if not robot.spec.actuation:
+    if not spec.actuation:
         return "has no actuators of its own" if key in (*_ACTUATOR, "robot.nominal_payload") else ""
-    if robot.spec.servo:
+    if spec.servo:
         lacking = key == "robot.nominal_payload" or (key in _ACTUATOR and key not in _OF_SERVOS)
         return "is driven by servos, which have no such quantity" if lacking else ""
     number = key.rpartition("_")[2]
-    if key in _ACTUATOR and number.isdigit() and int(number) > len(robot.spec.actuation):
-        return f"has {len(robot.spec.actuation)} cylinders"
+    if key in _ACTUATOR and number.isdigit() and int(number) > len(spec.actuation):
+        return f"has {len(spec.actuation)} cylinders"
     if key.startswith("sensor.") and key not in _FAULTS:
         return "has no wrench sensor: its contact force is estimated from pressures"
     return "moves in a plane, and does not turn its tool to a start" if key.startswith("start.tilt_") else ""

@@ -24,7 +24,9 @@ def test_an_arm_s_limits_sensors_and_quantities_are_written_down():
     assert (found["drive"], found["base"], found["limits"]["force_n"]) == ("", "fixed", 80.0)
     assert found["sensors"]["force_noise"] == 0.7
     assert found["nominal"]["robot.mass_scale"] == 1.0
-    assert not any(name.startswith("actuator.") for name in found["nominal"])
+    assert not any(name.startswith(("actuator.", "fault.")) for name in found["nominal"])
+    assert found["encoders"] == ""
+    assert notes("panda_encoders")["encoders"].startswith("17 bits a turn")
 
 
 def test_a_machine_has_cylinders_their_quantities_and_no_wrist_sensor():
@@ -32,8 +34,11 @@ def test_a_machine_has_cylinders_their_quantities_and_no_wrist_sensor():
     assert found["drive"] == "hydraulic"
     assert "pressure" in found["sensors"]
     assert found["nominal"]["actuator.delay"] == 0.0
-    assert not any(name.startswith("sensor.") for name in found["nominal"])
+    assert not any(name.startswith(("sensor.force", "sensor.torque")) for name in found["nominal"])
+    assert found["nominal"]["fault.time"] == found["nominal"]["sensor.pressure_frozen"] == 0.0
 
 
 def test_servos_are_no_ideal_torques():
-    assert notes("panda_servo")["drive"] == "servo"
+    found = notes("panda_servo")
+    assert found["drive"] == "servo"
+    assert {n for n in found["nominal"] if n.startswith("actuator.")} == {"actuator.friction_scale", "actuator.delay"}

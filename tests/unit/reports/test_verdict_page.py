@@ -83,7 +83,7 @@ def test_the_verdict_is_on_the_skill_that_the_requirement_names(folder):
 def test_without_a_requirement_nothing_is_decided(folder):
     text = page(folder)
     assert word(text) == "undecided"
-    assert "requires nothing" in text
+    assert "requires nothing" in text and ">no requirement</p>" in text
 
 
 def test_an_unfinished_campaign_is_undecided_however_well_it_does(folder):
