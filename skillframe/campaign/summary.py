@@ -33,7 +33,8 @@ def rates(spec: CampaignSpec, rows: Sequence[Row], complete: bool) -> dict[str, 
 
     Besides, how often which code of `ended_by`, and the largest forces and shares of the motors. Which interval it is,
     and why there may be none, `validity` says. An unfinished campaign counts each skill's trials up to the first one
-    that is missing; `uncounted` is the number of its rows beyond.
+    that is missing; `uncounted` is the number of its rows beyond. `unended` counts successes whose skill had not
+    ended by itself when the time was up.
     """
     validity = validity_of(spec.plan, complete=complete)
     return {label: _rate(_of(rows, label, complete), rows, label, validity) for label in spec.labels}
@@ -55,6 +56,7 @@ def _rate(counted: Sequence[Row], rows: Sequence[Row], label: str, validity: Val
         "skill": label,
         "trials": n,
         "successes": s,
+        "unended": sum(row["success"] and row.get("ended_itself") is False for row in counted),
         "rate": s / n if n else None,
         "interval_95": None if interval is None else list(interval),
         "method": validity.interval_method,

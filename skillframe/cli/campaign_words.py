@@ -80,6 +80,8 @@ def show_rates(skills: dict[str, dict[str, Any]]) -> None:
     for method in dict.fromkeys(s["method"] for s in skills.values()):
         click.echo(f"  {method}" if method.startswith("no interval") else f"  intervals: {method}")
     for label, s in skills.items():
+        if s["unended"]:
+            click.echo(f"  {label}: {s['unended']} of its successes had reached the goal, but not ended by themselves")
         if s["uncounted"]:
             more = f"{s['uncounted']} finished runs after trial {s['trials']} are not counted until that trial has run"
             click.echo(f"  {label}: {more}")

@@ -12,6 +12,7 @@ from skillframe.campaign.runner import Options, run_campaign
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.status import status_of
 from skillframe.campaign.summary import comparisons, read_summary
+from skillframe.cli.campaign_words import show_rates
 from skillframe.cli.main import run as command
 from skillframe.world.worlds.peg_in_hole import PegParams
 
@@ -154,3 +155,20 @@ def test_the_command_says_for_how_many_pairs_a_p_value_is_corrected(tmp_path, mo
     assert resumed(tmp_path, monkeypatch, three, 60) == 0
     said = capsys.readouterr().out
     assert said.count(" (Holm over 3 pairs), McNemar (exact") == 3
+
+
+def half_of_them_go_on(job):
+    """Succeeds as `good` does; the skill of an odd trial has not ended by itself."""
+    return [row | {"goal_reached": row["success"], "ended_itself": row["trial"] % 2 == 0} for row in good(job)]
+
+
+def test_successes_whose_skill_had_not_ended_by_itself_are_counted_and_said(campaign, tmp_path, capsys):
+    folder = start(campaign(trials=32), tmp_path / "out")
+    skills = run(folder, half_of_them_go_on)["skills"]
+    for label, figures in skills.items():
+        odd = [row for row in load_rows(campaign_table(folder)) if row[1] == label and int(row[0]) % 2]
+        assert figures["unended"] == sum(row[6] == "1" for row in odd) > 0
+    show_rates(skills)
+    said = f"{skills['a.skill.json']['unended']} of its successes had reached the goal, but not ended by themselves"
+    assert said in capsys.readouterr().out
+    assert run(start(campaign(trials=8), tmp_path / "old"))["skills"]["a.skill.json"]["unended"] == 0  # rows of 0.1
