@@ -30,6 +30,8 @@ ENDS = ("goal_reached", "ended_itself")
 JUDGED = (*JUDGED_MEASURES[:3], "ended_by", *JUDGED_MEASURES[3:], *SHARE_JOINTS, *ENDS)
 """What came after version 0.1: what the estimate read, what motors were asked for, and what ended the trial."""
 EXTRA = ("status", "reason")
+TRUTH = {"1": True, "true": True, "1.0": True, "0": False, "false": False, "0.0": False}
+"""How a table may say whether a trial succeeded."""
 SCORE = "score."
 """Begins the columns of scores."""
 TRACE = "trace"

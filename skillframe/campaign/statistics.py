@@ -19,6 +19,11 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from skillframe.frames import Float
+
 CLOPPER_PEARSON = "Clopper-Pearson (exact, two-sided, fixed number of trials)"
 SEQUENCE = "beta(1/2,1/2)-mixture confidence sequence (two-sided, valid at every look)"
 MCNEMAR = "McNemar (exact, two-sided, fixed number of trials)"
@@ -51,10 +56,17 @@ def clopper_pearson(successes: int, trials: int, alpha: float = 0.05) -> Interva
 
 def log_mixture(successes: int, failures: int, probability: float) -> float:
     """Logarithm of M_n(p), the evidence against p being the success probability."""
+    return float(log_mixtures(successes, failures, probability))
+
+
+def log_mixtures(successes: ArrayLike, failures: ArrayLike, probability: float) -> Float:
+    """`log_mixture` of several counts, (n,) each. Counts that are expected need not be whole."""
     from scipy.special import betaln, xlog1py, xlogy
 
-    gain = betaln(successes + PRIOR, failures + PRIOR) - betaln(PRIOR, PRIOR)
-    return float(gain - xlogy(successes, probability) - xlog1py(failures, -probability))
+    won, lost = np.asarray(successes, dtype=float), np.asarray(failures, dtype=float)
+    gain = betaln(won + PRIOR, lost + PRIOR) - betaln(PRIOR, PRIOR)
+    result: Float = gain - xlogy(won, probability) - xlog1py(lost, -probability)
+    return result
 
 
 def confidence_sequence(successes: int, trials: int, alpha: float = 0.05) -> Interval:

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from skillframe.campaign.rows import JUDGED, OUTCOME, SCORE
+from skillframe.campaign.rows import JUDGED, OUTCOME, SCORE, TRUTH
 from skillframe.campaign.statistics import Interval, correction, holm
 from skillframe.campaign.validity import Basis, Plan, Validity, unbroken, validity_of
 from skillframe.errors import InputError
@@ -26,7 +26,6 @@ from skillframe.reports.markup import percent
 
 REQUIRED = ("trial", "skill", "success")
 FIXED = (*REQUIRED, "seed", "reason", "stream", *OUTCOME, *JUDGED)
-TRUTH = {"1": True, "true": True, "1.0": True, "0": False, "false": False, "0.0": False}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -27,7 +27,7 @@ FLOORS = [
     {"document"},
     {"execution"},
     {"teaching", "campaign"},
-    {"reports", "conformance"},
+    {"reports", "conformance", "comparison"},
     {"api"},
     {"testing"},
     {"cli"},

@@ -1,0 +1,83 @@
+"""`skillframe compare`: which of several policies is better, from anybody's table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from skillframe.cli.output import emit_json, note, table
+
+if TYPE_CHECKING:
+    from skillframe.comparison.compare import Judgement, Pair
+
+
+@click.command(name="compare")
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option(
+    "--alpha", default=0.05, show_default=True, type=click.FloatRange(0.0, 0.5, min_open=True),
+    help="Chance of any false decision, over all pairs and however often you look.",
+)  # fmt: skip
+@click.option(
+    "--draws", metavar="COLUMN,...", help="Columns of what was drawn, to check that a trial is the same for all."
+)
+@click.option("--json", "as_json", is_flag=True, help="JSON alone on stdout.")
+def command(file: Path, alpha: float, draws: str | None, as_json: bool) -> None:
+    """Say which policies in FILE are better than others, and which are not told apart.
+
+    FILE is a table with the columns trial, policy (or skill) and success, in the order in which the trials were run:
+    yours from real trials, or a campaign's results.csv. The same trial number means the same draw. You may look after
+    every trial and stop when the answer is there.
+
+    \b
+    Examples:
+      skillframe compare results/results.csv
+      skillframe compare trials.csv --draws friction,tilt --json
+    """
+    from skillframe.comparison.compare import compare
+    from skillframe.comparison.trials import read_trials
+
+    found = compare(read_trials(file, [name.strip() for name in draws.split(",")] if draws else []), alpha)
+    if as_json:
+        emit_json(_plain(found))
+        return
+    _tell(found)
+
+
+def _plain(found: Judgement) -> dict[str, Any]:
+    return {
+        "alpha": found.alpha, "doubts": list(found.doubts),
+        "policies": [each._asdict() for each in found.standings],
+        "comparisons": [{name: getattr(pair, name) for name in pair.__slots__} for pair in found.pairs],
+    }  # fmt: skip
+
+
+def _tell(found: Judgement) -> None:
+    for text in found.doubts:
+        note(f"note: {text}")
+    lines = [
+        (r.policy, r.trials, r.successes, f"{r.successes / r.trials:.3f}", f"{r.low:.3f} .. {r.high:.3f}", r.letters)
+        for r in found.standings
+    ]
+    table(("policy", "trials", "successes", "rate", "95 % interval", "alike"), lines)
+    click.echo(f"policies that share a letter are not told apart (any false decision: at most {100 * found.alpha:g} %)")
+    for pair in found.pairs:
+        click.echo(f"{pair.first} against {pair.second}: {_counts(pair)}")
+        click.echo(f"  p = {pair.p_value:.2g}: {_decision(pair)}")
+    several = f", Holm over {len(found.pairs)} pairs" if len(found.pairs) > 1 else ""
+    click.echo(f"p: McNemar's test in the form that holds at every look, its smallest value so far{several}")
+
+
+def _counts(pair: Pair) -> str:
+    other = pair.pairs - pair.by_number
+    paired = f"{pair.pairs} pairs of trials" + (f", {other} of them in order of arrival" if other else "")
+    return f"{paired}; only the first succeeds in {pair.only_first}, only the second in {pair.only_second}"
+
+
+def _decision(pair: Pair) -> str:
+    if pair.better:
+        return f"{pair.better} is better; known after row {pair.known_after}"
+    if pair.more is None:
+        return "not told apart"
+    return f"not told apart; about {pair.more} pairs more would do, if the rates stay as they are"

@@ -1,0 +1,179 @@
+"""A table of trials of several policies: one row a trial and policy, in the order in which they were run.
+
+    trial,policy,success
+    0,peg.skill.json,1
+    0,replay,0
+
+A campaign's results.csv is such a table. The same trial number means the same draw, so its rows form pairs.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from skillframe.campaign.rows import TRUTH
+from skillframe.demonstration.table import read_text
+from skillframe.errors import InputError
+
+POLICY = ("policy", "skill", "method")
+"""What the column of the policies may be called."""
+STREAM = "stream"
+"""Column that says how a row's draws were chosen."""
+SAMPLED = ("", "fresh", "explore")
+"""Streams that are a sample. Rows that a search picked are none."""
+LISTED = 5  # numbers of trials that a sentence names
+
+
+class Trial(NamedTuple):
+    """One row.
+
+    Attributes:
+        trial: its number, or another name.
+        policy: who ran.
+        success: how it ended.
+    """
+
+    trial: str
+    policy: str
+    success: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trials:
+    """A table.
+
+    Attributes:
+        rows: in the table's order.
+        policies: in the order in which they first come.
+        doubts: sentences about what the table lacks.
+    """
+
+    rows: tuple[Trial, ...]
+    policies: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
+
+
+def read_trials(path: Path, draws: Sequence[str] = ()) -> Trials:
+    """The trials in a file.
+
+    Args:
+        path: text with a header, its cells parted by commas, semicolons or tabs. Columns `trial`, `policy` (or `skill`,
+            `method`) and `success` (1 or 0, true or false); others are left alone.
+        draws: columns of what was drawn, which have to agree between the policies of a trial.
+
+    Raises:
+        InputError: no such table, a policy that ran the same trial twice, draws that differ, rows that a search picked.
+    """
+    head, body = _cells(path)
+    columns = {name: _place(path, head, name) for name in ("trial", "success", *draws)}
+    policy = next((head.index(name) for name in POLICY if name in head), None)
+    if policy is None:
+        raise InputError(path, "has no column policy", f"call one of its columns {', '.join(POLICY)}")
+    _check_sampled(path, head, body)
+    rows = tuple(
+        Trial(cells[columns["trial"]], cells[policy], _success(path, n, cells[columns["success"]])) for n, cells in body
+    )
+    numbers = [n for n, _ in body]
+    _check_once(path, rows, numbers)
+    _check_draws(path, rows, [[cells[columns[name]] for name in draws] for _, cells in body], draws, numbers)
+    policies = tuple(dict.fromkeys(row.policy for row in rows))
+    if len(policies) < 2:
+        raise InputError(path, f"holds {len(policies)} policy", "compare needs two or more")
+    return Trials(rows=rows, policies=policies, doubts=tuple(_doubts(rows, policies)))
+
+
+def _cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """The header, and the rows with their numbers in the file."""
+    text = read_text(path)
+    first = text.splitlines()[0]
+    parted = max(",;\t", key=first.count)
+    try:
+        table = [[cell.strip() for cell in cells] for cells in csv.reader(io.StringIO(text), delimiter=parted)]
+    except csv.Error as error:
+        raise InputError(path, f"cannot be read as a table ({error})", "give CSV with a header") from None
+    head, body = table[0], [(n, cells) for n, cells in enumerate(table[1:], start=2) if any(cells)]
+    twice = next((name for name in head if name and head.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(path, f"has two columns {twice}", "rename one of them")
+    for n, cells in body:
+        if len(cells) != len(head):
+            raise InputError(f"{path}: row {n}", f"has {len(cells)} cells, the header {len(head)}", "fix that row")
+    return head, body
+
+
+def _place(path: Path, head: list[str], name: str) -> int:
+    if name not in head:
+        raise InputError(path, f"has no column {name}", f"its columns are {', '.join(head)}")
+    return head.index(name)
+
+
+def _success(path: Path, number: int, cell: str) -> bool:
+    found = TRUTH.get(cell.lower())
+    if found is None:
+        raise InputError(f"{path}: row {number}", f"success is {cell!r}", "write 1 or 0, true or false")
+    return found
+
+
+def _check_sampled(path: Path, head: list[str], body: list[tuple[int, list[str]]]) -> None:
+    if STREAM not in head:
+        return
+    at = head.index(STREAM)
+    for n, cells in body:
+        if cells[at] not in SAMPLED:
+            raise InputError(
+                f"{path}: row {n}", f"is of the stream {cells[at]!r}, whose trials were picked by how others ended",
+                "such rows are no sample: leave them out",
+            )  # fmt: skip
+
+
+def _check_once(path: Path, rows: Sequence[Trial], numbers: Sequence[int]) -> None:
+    seen: dict[tuple[str, str], int] = {}
+    for row, number in zip(rows, numbers, strict=True):
+        before = seen.setdefault((row.trial, row.policy), number)
+        if before != number:
+            raise InputError(
+                f"{path}: row {number}", f"is trial {row.trial} of {row.policy} again, after row {before}",
+                "a trial that is repeated because of how it ended counts once: keep the first",
+            )  # fmt: skip
+
+
+def _check_draws(
+    path: Path, rows: Sequence[Trial], drawn: Sequence[list[str]], names: Sequence[str], numbers: Sequence[int]
+) -> None:
+    first: dict[str, tuple[int, list[str]]] = {}
+    for row, number, values in zip(rows, numbers, drawn, strict=True):
+        before, expected = first.setdefault(row.trial, (number, values))
+        for name, value, other in zip(names, values, expected, strict=True):
+            if value != other:
+                raise InputError(
+                    f"{path}: row {number}", f"{name} is {value} in trial {row.trial}, and {other} in row {before}",
+                    "the same trial number has to be the same draw; number other draws otherwise",
+                )  # fmt: skip
+
+
+def _doubts(rows: Sequence[Trial], policies: Sequence[str]) -> list[str]:
+    every = dict.fromkeys(row.trial for row in rows)
+    ran = {policy: {row.trial for row in rows if row.policy == policy} for policy in policies}
+    said = []
+    for policy in policies:
+        missing = [trial for trial in every if trial not in ran[policy]]
+        if missing:
+            said.append(f"{policy} did not run {_named(missing)}")
+    numbers = sorted(int(trial) for trial in every if trial.isdecimal())
+    gaps = sorted(set(range(numbers[0], numbers[-1])) - set(numbers)) if numbers else []
+    if gaps:
+        said.append(f"nobody ran {_named([str(n) for n in gaps])}")
+    if said:
+        said.append("if a trial was left out because of how it ended, no figure here holds")
+    return said
+
+
+def _named(trials: Sequence[str]) -> str:
+    shown = ", ".join(trials[:LISTED])
+    more = f" and {len(trials) - LISTED} more" if len(trials) > LISTED else ""
+    return f"trial {shown}" if len(trials) == 1 else f"trials {shown}{more}"

@@ -1,0 +1,159 @@
+"""Comparing policies from a table: the evidence against independent computation, errors over many null campaigns."""
+
+import json
+import re
+from itertools import combinations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from skillframe.campaign.statistics import holm, mcnemar_sequential
+from skillframe.cli.main import run
+from skillframe.comparison.compare import Evidence, compare, evidence_of, holm_of_minima, more_trials
+from skillframe.comparison.letters import letters
+from skillframe.comparison.trials import Trial, Trials, read_trials
+from skillframe.errors import InputError
+
+
+def table_of(outcomes, policies="abcdefgh"):
+    """A table in which all policies run trial 0, then all run trial 1 ... from booleans (trials, policies)."""
+    rows = [Trial(str(t), policies[k], bool(won)) for t, line in enumerate(outcomes) for k, won in enumerate(line)]
+    return Trials(rows=tuple(rows), policies=tuple(policies[: outcomes.shape[1]]))
+
+
+def correlated(rng, trials, rates):
+    """Outcomes of policies that meet the same draws: a common part of the luck and one's own."""
+    luck = 0.6 * rng.standard_normal((trials, 1)) + 0.8 * rng.standard_normal((trials, len(rates)))
+    from scipy.stats import norm
+
+    return luck < norm.ppf(rates)
+
+
+def test_p_values_are_holms_of_the_smallest_sequential_mcnemar_so_far():
+    """Against the scalar functions of the campaign, look by look."""
+    outcomes = correlated(np.random.default_rng(3), 60, [0.9, 0.7, 0.55])
+    table = table_of(outcomes)
+    names = list(combinations("abc", 2))
+    rows, corrected = holm_of_minima([evidence_of(table, a, b) for a, b in names], len(table.rows))
+    smallest = dict.fromkeys(names, 1.0)
+    expected = {}
+    for trial in range(len(outcomes)):
+        seen = outcomes[: trial + 1]
+        for a, b in names:
+            i, j = "abc".index(a), "abc".index(b)
+            only = int(np.sum(seen[:, i] & ~seen[:, j])), int(np.sum(~seen[:, i] & seen[:, j]))
+            smallest[a, b] = min(smallest[a, b], mcnemar_sequential(*only))
+        expected[3 * trial + 3] = holm([smallest[name] for name in names])  # the trial's last row
+    for row, values in zip(rows, corrected, strict=True):
+        if int(row) in expected:
+            assert values == pytest.approx(expected[int(row)], rel=1e-12)
+
+
+def test_a_decision_once_taken_stands_however_the_trials_go_on():
+    won = np.array([[True, False]] * 20 + [[False, True]] * 40)
+    early = compare(table_of(won[:20])).pairs[0]
+    late = compare(table_of(won)).pairs[0]
+    assert early.better == late.better == "a"
+    assert mcnemar_sequential(7, 0) <= 0.05 < mcnemar_sequential(6, 0)
+    assert early.known_after == late.known_after == 14  # the seventh pair
+
+
+@pytest.mark.slow
+def test_of_1000_campaigns_of_five_equal_policies_at_most_one_in_twenty_decides_anything():
+    """Looked at after every row. 50 expected at most; 65 is two standard deviations (6.9) above."""
+    rng, false = np.random.default_rng(2026_11_22), 0
+    for _ in range(1000):
+        won = correlated(rng, 300, [0.7] * 5).astype(np.int64)
+        rows = 5 * np.arange(1, 301)
+        pairs = [Evidence(rows, won[:, i] - won[:, j], 300) for i, j in combinations(range(5), 2)]
+        false += bool(np.any(holm_of_minima(pairs, 1500)[1] <= 0.05))
+    assert false <= 65
+
+
+def test_what_differs_is_found_and_named_best_first():
+    found = compare(table_of(correlated(np.random.default_rng(5), 400, [0.6, 0.9, 0.75])))
+    assert [each.policy for each in found.standings] == ["b", "c", "a"]
+    assert {pair.better for pair in found.pairs} == {"b", "c"}
+    assert [each.letters for each in found.standings] == ["a", "b", "c"]
+
+
+def test_left_over_trials_are_paired_in_order_of_arrival():
+    rows = [Trial("0", "a", True), Trial("1", "a", False), Trial("7", "b", True), Trial("0", "b", False)]
+    found = evidence_of(Trials(rows=tuple(rows), policies=("a", "b")), "a", "b")
+    assert found.by_number == 1
+    assert list(found.rows) == [3, 4]  # 1 of a with 7 of b, complete at row 3; trial 0 at row 4
+    assert list(found.wins) == [-1, 1]
+
+
+@given(differ=st.sets(st.sampled_from(list(combinations("abcdef", 2)))))
+def test_two_policies_share_a_letter_exactly_if_they_are_not_told_apart(differ):
+    names = "abcdef"
+    marks = letters(names, sorted(differ))
+    for pair in combinations(names, 2):
+        assert bool(set(marks[pair[0]]) & set(marks[pair[1]])) == (pair not in differ)
+
+
+def test_the_number_of_trials_that_would_decide_does_and_one_fewer_does_not():
+    more = more_trials(8, 3, 40, 0.05)
+    for count, decided in ((more, True), (more - 1, False)):
+        share = 1 + count / 40
+        assert (mcnemar_sequential(8 * share, 3 * share) <= 0.05) == decided
+    assert more_trials(5, 5, 40, 0.05) is None
+
+
+HEAD = "trial,policy,success\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("trial,who,success\n0,a,1\n", "has no column policy"),
+        ("trial,policy\n0,a\n", "has no column success"),
+        (HEAD + "0,a,1\n0,b,maybe\n", "row 3: success is 'maybe'"),
+        (HEAD + "0,a,1\n0,b,1\n0,a,0\n", "row 4: is trial 0 of a again, after row 2"),
+        (HEAD + "0,a,1\n1,a,1\n", "holds 1 policy"),
+        (HEAD + "0,a\n", "row 2: has 2 cells, the header 3"),
+        (HEAD, "holds 0 policy"),
+        ("trial,policy,success,success\n0,a,1,1\n", "has two columns success"),
+        ("trial,policy,success,stream\n0,a,1,fresh\n0,b,1,border\n", "row 3: is of the stream 'border'"),
+        ("", "is empty"),
+    ],
+)
+def test_a_table_that_cannot_be_judged_is_refused_in_a_sentence(tmp_path, capsys, text, said):
+    path = tmp_path / "t.csv"
+    path.write_text(text)
+    assert run(["compare", str(path)]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_draws_that_differ_within_a_trial_are_refused(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text("trial;policy;success;tilt\n0;a;1;0.1\n0;b;0;0.2\n")
+    assert read_trials(path).policies == ("a", "b")
+    with pytest.raises(InputError, match=re.escape("tilt is 0.2 in trial 0, and 0.1 in row 2")):
+        read_trials(path, ["tilt"])
+
+
+def test_missing_trials_are_counted_aloud(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text(HEAD + "0,a,1\n0,b,0\n2,a,1\n")
+    assert read_trials(path).doubts == (
+        "b did not run trial 2", "nobody ran trial 1",
+        "if a trial was left out because of how it ended, no figure here holds",
+    )  # fmt: skip
+
+
+def test_the_command_reads_a_campaigns_table_and_gives_json(tmp_path, capsys):
+    path = tmp_path / "results.csv"
+    lines = [f"{t},{p},{int(won)},7" for t in range(20) for p, won in (("lmc", True), ("replay", t % 2 == 0))]
+    path.write_text("\n".join(["trial,skill,success,seed", *lines]) + "\n")
+    assert run(["compare", str(path), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert [p["policy"] for p in said["policies"]] == ["lmc", "replay"]
+    (pair,) = said["comparisons"]
+    assert (pair["only_first"], pair["only_second"], pair["by_number"]) == (10, 0, 20)
+    assert pair["p_value"] == pytest.approx(mcnemar_sequential(10, 0))
+    assert run(["compare", str(path)]) == 0
+    assert "lmc is better; known after row 28" in capsys.readouterr().out  # the seventh trial that replay loses is 13
