@@ -84,6 +84,10 @@ _OPTIONS = [
         "--wrench-includes-tool-weight/--wrench-without-tool-weight", default=None,
         help="Whether the tool's weight is still in it.",
     ),
+    click.option(
+        "--calibration", type=click.Path(path_type=Path),
+        help="File of skillframe calibrate: its bias and weight are taken off.",
+    ),
     click.option("--pose-topic", help="Topic of a ROS bag with the tool's pose, or with --robot its joint states."),
     click.option("--pose-frames", metavar="BASE,TOOL", help="Frames of a ROS bag's transforms (/tf, /tf_static)."),
     click.option("--wrench-topic", help="Topic of a ROS bag with the wrench (WrenchStamped)."),
@@ -101,7 +105,7 @@ def reading_options(function: Callable[..., Any]) -> Callable[..., Any]:
     return function
 
 
-def _settings(options: dict[str, Any]) -> dict[str, Any]:
+def reading_settings(options: dict[str, Any]) -> dict[str, Any]:
     """The options that were given. A second --columns is the wrench file's."""
     columns = options.pop("columns")
     if len(columns) > 2 or (len(columns) == 2 and options["wrench"] is None):
@@ -143,7 +147,7 @@ def convert(source: Path, out: Path, as_json: bool, **options: Any) -> int:
     from skillframe.conditioning.audit import audit
     from skillframe.extend.reading import read_demonstration, write_demonstration
 
-    demonstration = read_demonstration(source, **_settings(options))
+    demonstration = read_demonstration(source, **reading_settings(options))
     found = audit(demonstration)
     write_demonstration(demonstration, out)
     for text in found.notes:
@@ -176,7 +180,7 @@ def check(files: tuple[Path, ...], as_json: bool, **options: Any) -> int:
     from skillframe.errors import SkillframeError
     from skillframe.extend.reading import read_demonstration
 
-    settings, demonstrations = _settings(options), []
+    settings, demonstrations = reading_settings(options), []
     for path in files:
         try:
             demonstrations.append(read_demonstration(path, **settings))

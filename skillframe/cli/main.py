@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 COMMANDS = {
     "quickstart": "The whole way in minutes: demonstrate, learn, run, prove, report.",
     "demonstration": "Record, check and convert demonstrations.",
+    "calibrate": "Find a force sensor's bias, tool and mounting from free air.",
     "condition": "Filter a demonstration's wrench; remove bias and tool weight.",
     "segment": "Cut whole demonstrations into phases and learn a policy.",
     "learn": "Learn a skill from demonstrations.",

@@ -5,6 +5,8 @@ With the tool's attitude R (tool to base), the reference point r in tool coordin
 - `frame = "tool"`: \(F_b = R F\), \(T_b = R T\);
 - `point = r`: \(T_{tool} = T_r + (R r) \times F\);
 - `includes_tool_weight`: \(F - m g\), \(T - (R c) \times m g\), with \(g = (0, 0, -9.81)\) m/s^2;
+- `calibration = "tool.json"`: bias, weight and mounting as `skillframe calibrate` found them (`calibration`, equation
+  (1)), before all others; the file's path starts in the recording's folder;
 - `sign = "teacher"`: the sensor saw the teacher's force on the tool, so the environment's is its opposite. That is
   Newton's law for a tool without inertia: it holds while \(m \ddot x\) is small beside the forces (quasi-static).
 """
@@ -12,10 +14,12 @@ With the tool's attitude R (tool to base), the reference point r in tool coordin
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from skillframe.demonstration.calibration import read_calibration
 from skillframe.demonstration.options import ReadOptions
 from skillframe.demonstration.record import resolve_point
 from skillframe.errors import InputError, UnknownName
@@ -23,7 +27,7 @@ from skillframe.frames import Float, cross, move_wrench, rotate, rotate_spatial
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 FRAMES, SIGNS = ("base", "tool"), ("environment", "teacher")
-KEYS = ("frame", "point", "sign", "includes_tool_weight", "tool_mass", "tool_com")
+KEYS = ("frame", "point", "sign", "includes_tool_weight", "tool_mass", "tool_com", "calibration")
 STANDARD = {"frame": "base", "point": "tool", "sign": "environment", "includes_tool_weight": False}
 
 
@@ -45,7 +49,22 @@ def declared_wrench(source: str, meta: Mapping[str, Any], options: ReadOptions) 
             raise InputError(f"{source}: wrench.{key}", str(UnknownName("value", str(declared[key]), choices)))
     if not isinstance(declared.get("includes_tool_weight", False), bool):
         raise InputError(f"{source}: wrench.includes_tool_weight", "is neither true nor false", "correct the metadata")
-    return declared
+    return _calibrated(source, declared) if "calibration" in declared else declared
+
+
+def _calibrated(source: str, declared: dict[str, Any]) -> dict[str, Any]:
+    """What is declared of a wrench whose sensor was calibrated: it is in the sensor's axes."""
+    name, where = declared["calibration"], f"{source}: wrench.calibration"
+    if not isinstance(name, str):
+        raise InputError(where, f"is no file: {name!r}", "give a file written by skillframe calibrate")
+    if declared.get("frame", "tool") != "tool":
+        raise InputError(
+            where, "is of a sensor on the tool, and the wrench is in base axes",
+            "apply it to the recording as the sensor gave it, with wrench.frame = tool",
+        )  # fmt: skip
+    if "tool_mass" in declared:
+        raise InputError(where, "holds the tool's weight, and wrench.tool_mass is given too", "give one of them")
+    return {**declared, "frame": "tool", "calibration": str(Path(source).parent / name)}
 
 
 def to_standard(
@@ -62,12 +81,17 @@ def to_standard(
     """
     notes: list[str] = []
     said: dict[str, Any] = {**declared, **{k: v for k, v in STANDARD.items() if k in declared}}
+    calibration = said.pop("calibration", None)
+    if calibration is not None:
+        wrench = read_calibration(Path(calibration)).clean(wrench, rotation)
+        said["includes_tool_weight"] = False
+        notes.append(f"bias and weight were taken off as {Path(calibration).name} says")
     if declared.get("frame") == "tool":
         wrench = rotate_spatial(rotation, wrench)
     point = _point(source, declared.get("point"), meta)
     if np.any(point):
         wrench = move_wrench(wrench, -rotate(rotation, point))
-    if declared.get("includes_tool_weight"):
+    if declared.get("includes_tool_weight") and calibration is None:
         if "tool_mass" in declared:
             wrench = wrench - weight_wrench(rotation, *_payload(source, declared))
         else:

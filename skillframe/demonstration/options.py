@@ -47,6 +47,7 @@ class ReadOptions:
         wrench_point: where it was taken: "tool", "x,y,z" in the tool frame, or a frame's name.
         wrench_sign: whose wrench it is; "teacher" is turned round, which holds while inertia is small.
         wrench_includes_tool_weight: whether the tool's weight is still in it.
+        calibration: file of `skillframe calibrate`, whose bias and weight are taken off the sensor's readings.
         pose_topic: topic of a ROS bag with the tool's pose or, with `robot`, its joint states.
         pose_frames: "BASE,TOOL", frames of a ROS bag's transforms: the tool's pose is that of the second in the first.
         wrench_topic: topic of a ROS bag with the wrench.
@@ -72,6 +73,7 @@ class ReadOptions:
     wrench_point: str | None = None
     wrench_sign: Literal["environment", "teacher"] | None = None
     wrench_includes_tool_weight: bool | None = None
+    calibration: Path | None = None
     pose_topic: str | None = None
     pose_frames: str | None = None
     wrench_topic: str | None = None
@@ -89,7 +91,8 @@ class ReadOptions:
     def wrench_settings(self) -> dict[str, Any]:
         """What the settings say about the wrench, by metadata key."""
         keys = ("frame", "point", "sign", "includes_tool_weight")
-        return {k: v for k in keys if (v := getattr(self, f"wrench_{k}")) is not None}
+        said = {k: v for k in keys if (v := getattr(self, f"wrench_{k}")) is not None}
+        return {**said, **({"calibration": str(self.calibration.resolve())} if self.calibration else {})}
 
 
 def read_options(values: Mapping[str, Any]) -> ReadOptions:

@@ -80,14 +80,17 @@ def test_every_python_block_in_the_docs_parses():
             ast.parse(block, filename=str(page))
 
 
-def test_every_evidence_page_names_its_command_and_is_linked_both_ways_with_an_explanation():
-    explained = {page.name: page.read_text(encoding="utf-8") for page in (DOCS / "explanation").glob("*.md")}
+def test_every_evidence_page_names_its_command_and_is_linked_both_ways_with_an_explanation_or_a_how_to():
+    rooms = ("explanation", "how-to")
+    explained = {
+        f"{room}/{p.name}": p.read_text(encoding="utf-8") for room in rooms for p in (DOCS / room).glob("*.md")
+    }
     pages = list((DOCS / "evidence").glob("*.md"))
     assert pages
     for page in pages:
         text = page.read_text(encoding="utf-8")
         assert re.search(r"make (figures|bench)|pytest", text), page.name
-        sources = re.findall(r"\.\./explanation/([\w-]+\.md)", text)
+        sources = re.findall(r"\.\./((?:explanation|how-to)/[\w-]+\.md)", text)
         assert any(f"../evidence/{page.name}" in explained[source] for source in sources), page.name
 
 
