@@ -73,6 +73,20 @@ def test_the_relative_task_exerts_one_wrench_on_both_arms_and_none_against_oppos
     assert np.abs(opposite).max() < 600.0 * 0.02 * DT
 
 
+@given(seed=st.integers(0, 1000))
+def test_a_pair_that_is_off_as_a_whole_is_held_with_the_whole_stiffness_that_compliance_took_away(seed):
+    """Both arms off by the same e: (e_1 + e_2) / 2 is e, and F = K_c e + D_c (v_d - v), both written out."""
+    skill, position, rotation, rng = started(relative(configured(PHASE, "E", FRAMES)), seed, n=1)
+    skill.step(observe(0.0, position, rotation))
+    ahead = skill.step(observe(DT, position, rotation)).pose.position
+    off = 0.01 * rng.normal(size=3)
+    wrench = skill.step(observe(DT, ahead - off, rotation, skill._twist.copy())).feedforward[0, 0]
+    x = rotation[0, :, :, 0]  # both arms' compliant axes of translation, 600 N/m each
+    held = 600.0 * 0.5 * sum(np.outer(a, a) for a in x) @ off
+    # another tick's advance is 0.02 mm, of which the pair has half
+    assert np.abs(wrench[:3] - held).max() < 600.0 * 0.02 * DT
+
+
 def test_independent_arms_exert_nothing_on_each_other():
     skill, position, rotation, rng = started(configured(PHASE, "E", FRAMES))
     assert not skill.step(observe(DT, position + rng.normal(size=position.shape), rotation)).feedforward.any()

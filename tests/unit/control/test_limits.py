@@ -111,6 +111,12 @@ def test_a_torque_rate_above_the_limit_for_some_ticks_running_stops_the_trial():
     assert run_ramp(1500.0, RATE_PERSISTENCE) == [f"torque rate limit: above 1000 Nm/s for {RATE_PERSISTENCE} ticks"]
 
 
+def test_an_impact_may_keep_the_limiter_busy_for_19_milliseconds_and_not_for_20():
+    """Twice what an impact takes. The figure stands in the message and in docs."""
+    assert run_ramp(1500.0, 19) == []
+    assert run_ramp(1500.0, 20) == ["torque rate limit: above 1000 Nm/s for 20 ticks"]
+
+
 def test_one_calm_tick_starts_the_count_again():
     drive = motors(1)
     for torque in [0.0, *[1e3] * (RATE_PERSISTENCE - 1)]:

@@ -1,0 +1,73 @@
+"""What the constants of direction and axes decide: the share of outliers, the price of an axis, the heading's prior."""
+
+import math
+
+import numpy as np
+import pytest
+from skillframe_lmc.axes import compliant_axes
+from skillframe_lmc.directions import choose
+from skillframe_lmc.heading import Heading, doubt
+from skillframe_lmc.intervals import Motion
+from skillframe_lmc.sectors import Sectors, sectors
+from skillframe_lmc.settings import Settings
+
+from skillframe.frames import Float
+
+DOWN = np.array([0.0, 0.0, -1.0])
+
+
+def leaning(*degrees: float) -> Float:
+    """Unit vectors that lean so far from straight down, towards x."""
+    angle = np.radians(degrees)
+    return np.stack([np.sin(angle), np.zeros(len(angle)), -np.cos(angle)], axis=1)
+
+
+def free(*degrees: float) -> Sectors:
+    """Free motions, whose pyramids are cones about them."""
+    return Sectors(leaning(*degrees), np.zeros((len(degrees), 3)), np.zeros(len(degrees), dtype=bool))
+
+
+def test_one_interval_in_five_may_go_astray_and_two_may_not() -> None:
+    """Two strays to both sides, 80 degrees off: the cone about any push that has one of them opens by 40 / 4 * 3."""
+    one, two = (choose([free(*given)] * 2, Settings()).direction for given in ((0, 0, 0, 0, 80), (0, 0, 0, 80, -80)))
+    assert one is not None
+    assert math.degrees(math.acos(one @ DOWN)) < 3.0  # the disc over which the choice is averaged
+    assert two is None
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 8])
+def test_an_axis_pays_where_the_way_along_it_exceeds_its_price(count: int) -> None:
+    """n means with the same part s across the push: n s^2 / sigma^2 against ln max(n, 2) + 2."""
+    sigma = 0.1
+    least = sigma * math.sqrt((math.log(max(count, 2)) + 2.0) / count)
+    for share, axes in ((0.99, 0), (1.01, 1)):
+        means = np.tile([share * least, 0.0, -0.9], (count, 1))
+        assert len(compliant_axes(means, DOWN, sigma).axes) == axes
+
+
+@pytest.mark.parametrize(("degrees", "held"), [(0.0, 0.0), (2.0, 1.0), (8.0, 4.0), (30.0, 4.29718346348)])
+def test_half_of_the_way_from_the_heading_is_held_against_a_push_up_to_0_15_rad(degrees: float, held: float) -> None:
+    """0.15 rad are 8.594 degrees. Out of the chords' plane it is the sine that counts."""
+    push = leaning(degrees)
+    assert math.degrees(doubt(push, Heading(DOWN, None))[0]) == pytest.approx(held, abs=1e-6)
+    sine = 0.5 * min(math.sin(math.radians(degrees)), 0.15)
+    assert doubt(push, Heading(None, np.array([1.0, 0.0, 0.0])))[0] == pytest.approx(sine, abs=1e-12)
+
+
+def test_among_pushes_that_explain_the_motion_alike_the_one_nearest_to_the_heading_is_taken() -> None:
+    """Free motions to both sides by 4 degrees leave everything between them as deep; the chords decide."""
+    given, found = [free(*[-4.0] * 5), free(*[4.0] * 5)], {}
+    for chords in (-3.0, 3.0):
+        choice = choose(given, Settings(), Heading(leaning(chords)[0], None)).direction
+        assert choice is not None
+        found[chords] = math.degrees(math.atan2(choice[0], -choice[2]))
+    assert found[-3.0] < -0.3 and found[3.0] > 0.3
+
+
+def test_of_a_turn_only_what_the_teacher_drove_and_what_was_free_has_a_sector() -> None:
+    """Five intervals about z: three against a torque, one driven by it, one under too small a torque to count."""
+    turned = np.tile([0.0, 0.0, 0.1], (5, 1))
+    torque = np.array([[0.3, 0.0, -0.5], [0.0, 0.3, -0.5], [0.3, 0.3, -0.5], [0.4, 0.0, 0.2], [0.0, 0.0, 0.01]])
+    motion = Motion(turned, torque, (turned * torque).sum(axis=1), 0.05, 0.5, 0.5, 1.0)
+    assert list(sectors(motion, teacher_driven_only=True).contact) == [True, True, True, False]
+    assert list(sectors(motion).contact) == [True, True, True, True, False]
