@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from skillframe.campaign.axes import Axis, Value, cells_of, parse_axis
 from skillframe.campaign.quantities import GROUPS, check_axis, check_name, check_value, in_si
@@ -45,10 +45,13 @@ class Expect:
     Attributes:
         rate: lowest acceptable success rate.
         skill: label of the skill it is asked of; None asks it of the first one.
+        by: what has to reach it for exit code 0: the "rate" that was counted, or its whole 95 % "interval", as for the
+            verdict (`verdict`).
     """
 
     rate: float | None = None
     skill: str | None = None
+    by: Literal["rate", "interval"] = "rate"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,10 +135,12 @@ class CampaignSpec:
     def plain(self) -> dict[str, Any]:
         """The campaign as plain JSON values, as `from_plain` reads them, without its folder.
 
-        Scores are in it where there are some, so that the hashes of campaigns without them stay as they were.
+        Scores are in it where there are some, and `expect.by` where it is not "rate", so that the hashes of campaigns
+        without them stay as they were.
         """
         values = {key: value for key, value in asdict(self).items() if key not in ("vary", "folder", "scores")}
         values["skills"] = list(self.skills)
+        values["expect"] = {k: v for k, v in values["expect"].items() if (k, v) != ("by", "rate")}
         values |= {"scores": list(self.scores)} if self.scores else {}
         return {**values, "vary": {name: axis.plain() for name, axis in self.vary.items()}}
 

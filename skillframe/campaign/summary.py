@@ -196,9 +196,13 @@ def read_summary(folder: Path) -> dict[str, Any]:
 
 
 def below_bar(spec: CampaignSpec, summary: Mapping[str, Any]) -> str:
-    """A sentence if a complete campaign's rate is below its threshold, else ""."""
-    label = spec.expect.skill or spec.labels[0]
-    rate = summary["skills"][label]["rate"]
-    if spec.expect.rate is None or not summary["complete"] or rate >= spec.expect.rate:
+    """A sentence if a complete campaign does not reach its threshold, else "". `Expect.by` says what has to."""
+    label, required = spec.expect.skill or spec.labels[0], spec.expect.rate
+    if required is None or not summary["complete"]:
         return ""
-    return f"{label}: success rate {rate:.3f} is below the threshold of {spec.expect.rate:g}"
+    figures = summary["skills"][label]
+    if spec.expect.by == "interval":
+        word, why = judged(required, figures, complete=True)
+        return "" if word == "pass" else f"{label}: {word}: {why}"
+    rate = figures["rate"]
+    return "" if rate >= required else f"{label}: success rate {rate:.3f} is below the threshold of {required:g}"

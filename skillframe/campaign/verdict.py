@@ -9,7 +9,8 @@ Required is a success probability of at least p, `[expect] rate`. With the rate'
 
 There is none to go by where nothing was required, where the campaign has not ended, where its design allows no interval
 (`validity`), or where the table was changed after the campaign had written it. The exit code of `campaign run` goes by
-the rate itself, as it always did: it is 0 for some campaigns that are undecided, and for all that pass.
+the rate itself, as it always did: it is 0 for some campaigns that are undecided, and for all that pass. A campaign file
+with `[expect] by = "interval"` makes it 0 for those that pass, and for no other.
 """
 
 from __future__ import annotations

@@ -58,9 +58,9 @@ def _running(function: Callable[..., int]) -> Callable[..., int]:
 def run(file: Path, out: Path, as_json: bool, **settings: Any) -> int:
     """Run the campaign that FILE (campaign.toml) declares.
 
-    Exit code 0; 1 if a success rate is below `[expect] rate`; 2 if something given cannot be used, or if files, memory,
-    plug-ins or workers stop it; 130 after Ctrl-C and 143 after SIGTERM. Everything that was finished is kept, and
-    `campaign resume` goes on.
+    Exit code 0; 1 if a success rate is below `[expect] rate` (or its interval not above it, with `by = "interval"`); 2
+    if something given cannot be used, or if files, memory, plug-ins or workers stop it; 130 after Ctrl-C and 143 after
+    SIGTERM. Everything that was finished is kept, and `campaign resume` goes on.
 
     \b
     Example:

@@ -7,6 +7,7 @@ import pytest
 from many_campaigns import IN_ORDER, KINDS, WAYS, count, seen, sobol
 from scipy.stats import binom
 
+from skillframe.campaign.axes import Axis
 from skillframe.campaign.sampling import draws
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.summary import rates
@@ -59,6 +60,31 @@ def test_a_whole_grid_has_the_exact_interval(kind):
     _, skills, _ = seen(kind, 1, "complete")
     assert skills["a.skill.json"]["method"].startswith("Clopper-Pearson")
     assert skills["a.skill.json"]["interval_95"] is not None
+
+
+def test_a_grid_of_30_by_7_gives_an_interval_that_contains_its_own_rate_and_a_part_of_it_gives_none():
+    """A valley over offset and tilt: by tilt 30, 30, 30, 30, 20, 17 and 0 of 30, so 157 of 210, 0.748.
+
+    The first 24 trials, all at the first tilt, succeed; stopped there the rate was said to be 0.806 or more.
+    """
+    vary = {
+        "fixture.offset_x": Axis(kind="grid", numbers=tuple(float(x) for x in np.linspace(-0.02, 0.02, 30))),
+        "fixture.tilt_y": Axis(kind="grid", numbers=tuple(float(x) for x in np.linspace(0.0, 0.9, 7))),
+    }
+    spec = CampaignSpec(name="c", seed=1, trials=210, robot="r", world="w", skills=("a.json",), vary=vary)
+    tilts = draws(spec, range(210))["fixture.tilt_y"]
+    wins, rows, seen = (
+        dict(zip(np.unique(tilts), (30, 30, 30, 30, 20, 17, 0), strict=True)),
+        [],
+        dict.fromkeys(tilts, 0),
+    )
+    for trial, tilt in enumerate(tilts):
+        seen[tilt] += 1
+        rows.append({"trial": trial, "skill": "a.json", "success": seen[tilt] <= wins[tilt], "failure": ""})
+    whole, part = rates(spec, rows, complete=True)["a.json"], rates(spec, rows[:24], complete=False)["a.json"]
+    assert (whole["successes"], whole["rate"]) == (157, pytest.approx(0.748, abs=5e-4))
+    assert whole["interval_95"][0] < 0.748 < whole["interval_95"][1]
+    assert (part["successes"], part["trials"], part["interval_95"]) == (24, 24, None)
 
 
 @pytest.mark.figures

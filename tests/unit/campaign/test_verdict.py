@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from campaign_fakes import FakeParams, run, start
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import binom
 
 from skillframe.campaign.folder import load
 from skillframe.campaign.spec import Expect
@@ -68,3 +70,32 @@ def test_a_summary_holds_the_verdict_where_something_is_required_and_the_exit_co
     near = replace(spec, expect=Expect(rate=figures["rate"]))
     assert judged(figures["rate"], figures, complete=True).word == "undecided"
     assert below_bar(near, summary) == ""
+
+
+def test_by_the_interval_only_a_pass_ends_with_0_and_the_sentence_is_the_verdict_s(campaign, tmp_path):
+    """The rate is reached in both; 6 trials show 0.01 and not the rate that they had."""
+    out = start(campaign(trials=6, extra='[expect]\nrate = 0.01\nby = "interval"'), tmp_path / "out")
+    summary, spec = run(out), load(out, FakeParams)
+    assert spec.expect == Expect(rate=0.01, by="interval")
+    assert below_bar(spec, summary) == ""
+    near = replace(spec, expect=Expect(rate=summary["skills"]["a.skill.json"]["rate"], by="interval"))
+    assert below_bar(near, summary).startswith("a.skill.json: undecided: the ")
+    assert below_bar(replace(spec, expect=Expect(rate=1.0, by="interval")), summary).startswith("a.skill.json: fail: ")
+
+
+def test_by_the_interval_a_skill_below_what_is_required_passes_in_at_most_one_campaign_in_40():
+    """Summed over all counts: 20 trials of a skill of 0.8 against 0.9 pass in 21 % by the rate (docs), 0 here."""
+    counts = np.arange(21)
+    chance = binom.pmf(counts, 20, 0.8)
+    assert chance[counts >= 18].sum() == pytest.approx(0.206, abs=0.001)
+    for true in (0.5, 0.8, 0.95):
+        shown = [verdict_of(true + 1e-9, clopper_pearson(int(s), 20), complete=True).word == "pass" for s in counts]
+        assert binom.pmf(counts, 20, true)[shown].sum() <= 0.025
+
+
+def test_what_decides_the_exit_code_is_in_the_plain_campaign_only_where_it_was_chosen(campaign, tmp_path):
+    """Else the hashes of campaigns that were run before would change."""
+    spec = load(start(campaign(trials=6, extra="[expect]\nrate = 0.5"), tmp_path / "out"), FakeParams)
+    assert spec.plain()["expect"] == {"rate": 0.5, "skill": None}
+    chosen = replace(spec, expect=Expect(rate=0.5, by="interval"))
+    assert chosen.from_plain(chosen.plain()).expect == chosen.expect
