@@ -111,10 +111,12 @@ def _end(outcome: Outcome, out: Path, quick: bool, as_json: bool, interrupted: i
 def _show(entries: Sequence[Mapping[str, Any]], as_json: bool) -> None:
     from skillframe.cli.output import PAGE_WIDTH, emit_json, table
     from skillframe_papers import store
+    from skillframe_papers.counts import with_intervals
 
     if as_json:
         emit_json(store.table(entries))
         return
     columns = ("row", "summary", "published", "ours", "verdict", "values_are", "wall_s")
     head = ("row", "what", "published", "ours", "verdict", "values", "wall [s]")
-    table(head, [[each[c] for c in columns] for each in entries], PAGE_WIDTH)
+    shown = [{**each, "ours": with_intervals(each["ours"])} for each in entries]
+    table(head, [[each[c] for c in columns] for each in shown], PAGE_WIDTH)

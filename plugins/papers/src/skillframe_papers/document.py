@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from skillframe_papers.counts import SAID, with_intervals
+
 HEAD = ("row", "what", "published", "ours", "verdict", "values")
 ORIGINS = {
     "predicted": "predicted: every constant was fixed before this figure was looked at",
@@ -22,11 +24,11 @@ def render(entries: Sequence[Mapping[str, Any]]) -> str:
         "```text", _command(entries), "```", "",
         f"{len(entries)} rows, {_count(entries, 'pass')} pass, {_count(entries, 'fail')} fail, "
         f"{_count(entries, 'reported')} are reported without a verdict. One after another they took {wall:.1f} "
-        f"minutes, and {cpu:.1f} minutes of processor time, which several cores share.", "",
+        f"minutes, and {cpu:.1f} minutes of processor time, which several cores share. {SAID}", "",
         _row(HEAD), _row(["---"] * len(HEAD)),
     ]  # fmt: skip
     keys = ("row", "summary", "published", "ours", "verdict", "values_are")
-    lines += [_row([each[key] for key in keys]) for each in entries]
+    lines += [_row([_shown(key, each[key]) for key in keys]) for each in entries]
     for each in entries:
         lines += ["", *_details(each)]
     return "\n".join(lines) + "\n"
@@ -61,6 +63,11 @@ def _row(cells: Sequence[object]) -> str:
     return f"| {' | '.join(_cell(cell) for cell in cells)} |"
 
 
+def _shown(key: str, value: object) -> object:
+    """Our figures with intervals behind their counts. What was published stands as it is."""
+    return with_intervals(value) if key == "ours" else value
+
+
 def _cell(value: object) -> str:
     text = " ".join(str(value).split())
     for special in ("\\", "|", "*", "_", "<", "[", "`", "$"):
@@ -71,14 +78,15 @@ def _cell(value: object) -> str:
 def _details(each: Mapping[str, Any]) -> list[str]:
     facts = [
         f"- published: {_cell(each['published'])} ({_cell(each['source'])})",
-        f"- ours: {_cell(each['ours'])}",
+        f"- ours: {_cell(with_intervals(each['ours']))}",
         f"- threshold: {_cell(threshold(each))}; **{each['verdict']}**",
         f"- {origin(each)}",
     ]
-    facts += [f"- difference: {_cell(each['difference'])}"] if each["difference"] else []
+    facts += [f"- difference: {_cell(with_intervals(each['difference']))}"] if each["difference"] else []
     facts += [f"- `{each['command']}`, {each['wall_s']:.0f} s ({each['cpu_s']:.0f} s of processor time)"]
     lines = [f"## Row {each['row']}: {_cell(each['summary'])}", "", *facts]
     table = each["table"]
     if table["rows"]:
-        lines += ["", _row(table["head"]), _row(["---"] * len(table["head"])), *(_row(row) for row in table["rows"])]
+        rows = [_row([with_intervals(cell) for cell in row]) for row in table["rows"]]
+        lines += ["", _row(table["head"]), _row(["---"] * len(table["head"])), *rows]
     return lines

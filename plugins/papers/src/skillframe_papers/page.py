@@ -11,6 +11,7 @@ from typing import Any
 
 from skillframe.reports.markup import Markup, data_uri, figure, join, note, table, tag
 from skillframe.reports.page import POLICY
+from skillframe_papers.counts import SAID, with_intervals
 from skillframe_papers.document import origin, threshold
 
 BADGES = {"pass": "badge won", "fail": "badge lost", "reported": "badge"}
@@ -73,13 +74,13 @@ def _hero(entries: Sequence[Mapping[str, Any]]) -> Markup:
     )
     quick = any(each["quick"] for each in entries)
     lines = [
-        (tag("a", each["row"], href=f"#row-{each['row']}"), each["summary"], each["published"], each["ours"],
-         _badge(each), each["values_are"])
+        (tag("a", each["row"], href=f"#row-{each['row']}"), each["summary"], each["published"],
+         with_intervals(each["ours"]), _badge(each), each["values_are"])
         for each in entries
     ]  # fmt: skip
     return tag(
         "header", tag("p", "Reproduction", class_="eyebrow"), tag("h1", "The papers' results, row by row"),
-        tag("p", lead, class_="lead"),
+        tag("p", lead, class_="lead"), note(SAID),
         note("This was a quick run: fewer trials than behind the table of the docs.") if quick else "",
         table(HEAD, lines, class_="rows", numeric=9), class_="hero",
     )  # fmt: skip
@@ -92,18 +93,19 @@ def _badge(each: Mapping[str, Any]) -> Markup:
 def _section(each: Mapping[str, Any]) -> Markup:
     facts = [
         ("published", f"{each['published']} ({each['source']})"),
-        ("ours", each["ours"]),
+        ("ours", with_intervals(each["ours"])),
         ("threshold", threshold(each)),
         ("values", origin(each)),
-        ("difference", each["difference"]),
+        ("difference", with_intervals(each["difference"])),
         ("command", tag("code", each["command"])),
         ("computed in", _effort(each)),
     ]
     listed = tag("dl", *(join([tag("dt", k), tag("dd", v)]) for k, v in facts if v), class_="facts")
     behind = each["table"]
+    rows = [[with_intervals(cell) for cell in row] for row in behind["rows"]]
     return tag(
         "section", tag("h2", f"{each['row']}. {each['summary']} ", _badge(each)), listed,
-        table(behind["head"], behind["rows"], numeric=9) if behind["rows"] else "",
+        table(behind["head"], rows, numeric=9) if rows else "",
         tag("div", *(_picture(p) for p in each["pictures"]), class_="figures") if each["pictures"] else "",
         id=f"row-{each['row']}",
     )  # fmt: skip

@@ -1,0 +1,57 @@
+"""Counts that tables and pages show have their intervals behind them."""
+
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import binom
+from skillframe_papers import document, page
+from skillframe_papers.counts import SAID, with_intervals
+
+from skillframe.files.documents import read_json
+
+COMMITTED = Path(document.__file__).parent / "reproduced" / "reproduce.json"
+DOCS = Path(__file__).resolve().parents[3] / "docs" / "explanation" / "reproduced.md"
+
+
+@given(st.integers(1, 400), st.data())
+def test_each_bound_leaves_one_in_forty_beyond_it(count, data):
+    """The tail of the binomial at each bound is 2.5 %, to the whole per cents that are shown."""
+    hits = data.draw(st.integers(0, count))
+    shown = re.fullmatch(rf"{hits} of {count} \((\d+) to (\d+) %\)", with_intervals(f"{hits} of {count}"))
+    low, high = (int(bound) / 100.0 for bound in shown.groups())
+    assert low <= hits / count + 0.005 and high >= hits / count - 0.005
+    if hits:
+        assert binom.sf(hits - 1, count, max(low - 0.005, 0.0)) <= 0.025 <= binom.sf(hits - 1, count, low + 0.005)
+    if hits < count:
+        assert binom.cdf(hits, count, min(high + 0.005, 1.0)) <= 0.025 <= binom.cdf(hits, count, high - 0.005)
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("found in 20 of 20 pairs", "found in 20 of 20 (83 to 100 %) pairs"),
+        ("12 of 12 groups of 3", "12 of 12 (74 to 100 %) groups of 3"),
+        ("10 of 12 (52 to 98 %) of them", "10 of 12 (52 to 98 %) of them"),
+        ("10 of 12 is 52 to 98 % with 95 % confidence", "10 of 12 is 52 to 98 % with 95 % confidence"),
+        ("13 of 12, 0 of 0, 1.5 of 3", "13 of 12, 0 of 0, 1.5 of 3"),
+    ],
+)  # fmt: skip
+def test_only_counts_get_an_interval_and_get_it_once(text, shown):
+    assert with_intervals(text) == shown
+    assert with_intervals(shown) == shown
+
+
+def test_every_count_of_the_committed_table_has_its_interval_on_page_and_in_docs():
+    entries = [{**each, "pictures": []} for each in read_json(COMMITTED, "")]
+    for text in (page.render(entries), document.render(entries)):
+        ours = re.sub(r"<[^>]+>", " ", text)
+        assert "20 of 20 (83 to 100 %)" in ours and SAID in ours
+        bare = re.findall(r"\b\d+ of \d+\b(?! (?:\(\d+ to \d+ %\)|is \d+ to))", ours)
+        assert set(bare) <= set(re.findall(r"\d+ of \d+", " ".join(f"{e.get('weak')} {e['bar']}" for e in entries)))
+
+
+def test_the_page_of_the_docs_is_the_committed_table():
+    assert DOCS.read_text(encoding="utf-8") == document.render(read_json(COMMITTED, ""))
