@@ -24,6 +24,7 @@ from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.trouble import needed
 from skillframe.control.motors import unstated
 from skillframe.document.source import load_skill
+from skillframe.errors import InputError
 from skillframe.execution.executor import QUANTITIES, simulate
 from skillframe.execution.prepare import load_robot_model, load_world, prepare
 from skillframe.execution.scores import ScoreFailed, score_notes, scores_of
@@ -37,6 +38,8 @@ from skillframe.world.scene import Scene
 
 TRACE_HZ = 100.0
 ANALYTIC_SAMPLES = 33
+TAIL = 3.0
+"""Of a normal axis one draw in 370 lies further out than so many standard deviations (ours)."""
 
 
 def evaluate(job: ChunkJob) -> list[Row]:
@@ -74,6 +77,7 @@ def describe(spec: CampaignSpec) -> dict[str, Any]:
         if name.startswith("world."):
             _scene(spec, {name: value})
         _check_quantity(robot, name, value)
+    _check_tails(spec, robot)
     for name, value in spec.fixed.items():
         _check_quantity(robot, name, value)
     tool = {
@@ -114,6 +118,23 @@ def _declared_values(spec: CampaignSpec) -> Iterator[tuple[str, Value]]:
     """Ends, means and listed values of what varies."""
     for name, axis in spec.vary.items():
         yield from ((name, value) for value in (axis.numbers[:1] if axis.kind == "normal" else axis.numbers))
+
+
+def _check_tails(spec: CampaignSpec, robot: RobotModel) -> None:
+    """Refuse a normal axis that leaves its quantity's range within `TAIL` deviations: trials there could not run."""
+    for name, axis in spec.vary.items():
+        if axis.kind != "normal":
+            continue
+        mean, deviation = (float(number) for number in axis.numbers)
+        for value in (mean - TAIL * deviation, mean + TAIL * deviation):
+            try:
+                if name.startswith("world."):
+                    _scene(spec, {name: value})
+                _check_quantity(robot, name, value)
+            except InputError as error:
+                reached = f"reaches {value:.6g} at {TAIL:g} standard deviations: {error.problem}"
+                fix = "give a smaller standard deviation, with its unit if it is not in SI, or a uniform axis"
+                raise InputError(f"vary.{name}.normal", reached, fix) from None
 
 
 def _check_quantity(robot: RobotModel, name: str, value: Value) -> None:

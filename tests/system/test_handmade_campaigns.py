@@ -34,6 +34,16 @@ SLIPS = {
     "noise below zero": ("start.tilt_y", "sensor.force_noise", "sensor.force_noise: -0.2 N is beyond 0N to 100N"),
     "beyond all machines": ("[-0.2, 0.2]", "[0, 1e9]", "start.tilt_y: 1e+09 rad is beyond -90deg to 90deg"),
     "metres": ("start.tilt_y", 'start.offset_x" = { choice = [5] }\n"start.tilt_y', "did you mean 5mm?"),
+    "a wide spread": (
+        "uniform = [-0.2, 0.2]",
+        "normal = [0, 0.53]",  # 1.59 rad at 3 standard deviations, and 1.571 rad are allowed
+        "vary.start.tilt_y.normal: reaches -1.59 at 3 standard deviations: -1.59 rad is beyond -90deg to 90deg",
+    ),
+    "a spread below zero": (
+        '"start.tilt_y" = { uniform = [-0.2, 0.2]',
+        '"world.friction" = { normal = [0.2, 0.1]',
+        "vary.world.friction.normal: reaches -0.1 at 3 standard deviations: ",
+    ),
     "a piece of a world": ("[vary]", "[set]\nworld.radius = 5\n[vary]", "radius: 5 m is beyond 0.1mm to 0.2m; did you"),
     "a far centre": ("seed = 7", 'seed = 7\ncoc = "10,0,0"', "point 10,0,0: x: 10 m is beyond -3m to 3m"),
     "no group": ("start.tilt_y", "tilt", "unknown quantity 'tilt'; did you mean 'start.tilt_z'? (there are: start.*"),
@@ -67,7 +77,8 @@ def test_a_slip_is_refused_before_anything_is_made(
 
 
 def test_what_is_right_runs_from_a_file_with_a_byte_order_mark(campaign: Path) -> None:
-    campaign.write_text("\ufeff" + TEXT)
+    text = TEXT.replace("uniform = [-0.2, 0.2]", "normal = [0, 0.52]")  # 1.56 rad at 3 deviations, 1.571 are allowed
+    campaign.write_text("\ufeff" + text)
     assert run(["campaign", "run", str(campaign), "--out", str(campaign.parent / "out")]) == 0
 
 
