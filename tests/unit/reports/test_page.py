@@ -1,3 +1,4 @@
+import html
 import json
 import re
 import shutil
@@ -53,6 +54,15 @@ def test_the_page_reaches_for_nothing_outside_and_forbids_it(folder):
     assert OUTSIDE.findall(text) == []
     assert not re.search(r"https?://", text)
     assert "default-src &#x27;none&#x27;" in text
+
+
+def test_the_page_says_which_bodies_nobody_looked_at(copy):
+    shutil.rmtree(copy / "traces")  # stills are no matter here
+    assert not any("bodies" in text.lower() for text in read_chapters([copy])[0].notes)
+    summary = json.loads((copy / "summary.json").read_text())
+    said = 'bodies that could touch without ending a trial, by [collisions] ignore of r: <b> with "c"'
+    (copy / "summary.json").write_text(json.dumps({**summary, "unwatched": said}))
+    assert html.escape(f"B{said[1:]}.") in page(copy)
 
 
 def test_the_same_files_give_the_same_bytes_well_below_the_limit(folder, tmp_path):
