@@ -118,7 +118,7 @@ def commands():
 
 
 def shown():
-    """(place, line) of every command line that help texts and pages show."""
+    """(place, line) of every command line that help texts, pages and the change log show, in blocks and sentences."""
     pages = [*DOCS.rglob("*.md"), DOCS.parent / "README.md", *DOCS.parent.glob("plugins/*/README.md")]
     texts = {f"help of skillframe {words}": command.help or "" for words, command in commands().items()}
     for page in pages:
@@ -127,6 +127,9 @@ def shown():
     for place, text in texts.items():
         for line in re.findall(r"^ *(?:\$ )?skillframe (.+)$", text.replace("\\\n", " "), re.MULTILINE):
             yield place, line
+    for page in [*pages, DOCS.parent / "CHANGELOG.md"]:
+        for line in re.findall(r"(?<!`)`skillframe ([a-z][^`]*)`", page.read_text(encoding="utf-8")):
+            yield page.name, line
 
 
 @pytest.mark.needs_plugins

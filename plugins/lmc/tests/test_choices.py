@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from skillframe_lmc.axes import compliant_axes
+from skillframe_lmc.axes import compliant_axes, straightness
 from skillframe_lmc.directions import choose
 from skillframe_lmc.heading import Heading, doubt
 from skillframe_lmc.intervals import Motion
@@ -43,6 +43,13 @@ def test_an_axis_pays_where_the_way_along_it_exceeds_its_price(count: int) -> No
     for share, axes in ((0.99, 0), (1.01, 1)):
         means = np.tile([share * least, 0.0, -0.9], (count, 1))
         assert len(compliant_axes(means, DOWN, sigma).axes) == axes
+
+
+@pytest.mark.parametrize(("length", "share"), [(0.35, 0.5), (0.7, 1.0), (0.95, 1.0)])
+def test_the_noise_of_a_mean_shrinks_with_it_below_a_length_of_0_7(length: float, share: float) -> None:
+    """To and fro shortens a mean direction and its noise alike. 15 mm over 60 mm halve 0.3."""
+    means = np.array([[length, 0.0, 0.0], [0.0, 0.0, -length]])
+    assert straightness(0.06, 0.015, None, means) == pytest.approx(0.15 * share, rel=1e-12)
 
 
 @pytest.mark.parametrize(("degrees", "held"), [(0.0, 0.0), (2.0, 1.0), (8.0, 4.0), (30.0, 4.29718346348)])

@@ -203,6 +203,8 @@ def test_a_screw_motion_keeps_its_pitch_under_the_speed_caps(pitch: float) -> No
     assert nu == pytest.approx(turn * found["pitch"], rel=1e-12)
     assert nu <= 0.020 + 1e-12
     assert turn <= math.radians(5.0) + 1e-12
+    # shown at 0.3 rad/s, faster than either cap lets it be: one of them is met
+    assert turn == pytest.approx(math.radians(5.0)) or nu == pytest.approx(0.020)
 
 
 def test_without_a_turn_there_is_no_pitch() -> None:

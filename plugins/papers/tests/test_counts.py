@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom
 from skillframe_papers import document, page
@@ -16,6 +16,7 @@ COMMITTED = Path(document.__file__).parent / "reproduced" / "reproduce.json"
 DOCS = Path(__file__).resolve().parents[3] / "docs" / "explanation" / "reproduced.md"
 
 
+@settings(max_examples=30)
 @given(st.integers(1, 400), st.data())
 def test_each_bound_leaves_one_in_forty_beyond_it(count, data):
     """The tail of the binomial at each bound is 2.5 %, to the whole per cents that are shown."""

@@ -1,6 +1,7 @@
 """Which phase is it now: what the filter weighs by formula, and that it never goes back a way that nobody has shown."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from scipy.stats import multivariate_normal
@@ -12,8 +13,10 @@ from skillframe_segmenter.segmentation import segment
 from tests.figures import quasistatic as made
 
 
-def learned(task="ls", seed=12):
-    taught = [t.demonstration for t in made.demonstrations(task, seed)]
+@cache
+def learned():
+    """A policy's model of lowering and sliding, and what taught it."""
+    taught = [t.demonstration for t in made.demonstrations("ls", 12)]
     return from_document(segment(taught, None, {}, "wrench_hmm")["phase_model"]), taught
 
 
