@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from skillframe.cli.certify import certify, check
 from skillframe.cli.endings import TRACE
 from skillframe.cli.interrupts import terminable
 from skillframe.cli.numbers import COUNT, NATURAL, WithUnit
@@ -158,6 +159,10 @@ def replay(folder: Path, trial: int, skill: str | None, out: Path | None) -> int
         click.echo(f"not as in the campaign: {line}", err=True)
     click.echo("identical to the last bit" if not found.changed else f"differs in {', '.join(found.changed)}")
     return 1 if found.changed else 0
+
+
+command.add_command(certify)
+command.add_command(check)
 
 
 def _options(settings: dict[str, Any]) -> Options:

@@ -27,7 +27,7 @@ FLOORS = [
     {"document"},
     {"execution"},
     {"teaching", "campaign"},
-    {"reports", "conformance", "comparison"},
+    {"reports", "conformance", "comparison", "certify"},
     {"api"},
     {"testing"},
     {"cli"},

@@ -1,0 +1,142 @@
+"""What is asked of a skill, and the trials that are looked at first: a campaign of its own in the same folder."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from skillframe.campaign.axes import Axis
+from skillframe.campaign.folder import Describe, prepare
+from skillframe.campaign.replay import pick_label
+from skillframe.campaign.spec import CampaignSpec, Expect, Stop
+from skillframe.errors import InputError
+from skillframe.files import write_whole
+from skillframe.files.documents import read_json
+from skillframe.frames import Float
+
+QUESTION, LOOK = "question.json", "look"
+FORMAT, VERSION = "skillframe.question", 1
+LOOKS = {1: 64, 2: 128, 3: 256, 4: 512}
+"""Trials that are looked at, by the number of ranges: our choice, from the volumes that they certify in simulations."""
+NORMAL = 2.0
+"""Standard deviations to either side that a normal axis is looked at."""
+FIX = "start again with skillframe campaign certify FILE.toml --out FOLDER"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Question:
+    """What is asked.
+
+    Attributes:
+        rate: success probability that the skill is to have in the box, at least.
+        confidence: with which the claim holds.
+        ranges: quantity to the ends of its declared range (SI).
+    """
+
+    rate: float
+    confidence: float
+    ranges: dict[str, tuple[float, float]]
+
+    @property
+    def alpha(self) -> float:
+        """Chance of a false first claim."""
+        return 1.0 - self.confidence
+
+    def scaled(self, rows: Mapping[str, Any] | list[dict[str, Any]]) -> Float:
+        """Points (n, d) of rows, each quantity scaled to -1 to 1 over its range."""
+        given = [rows] if isinstance(rows, Mapping) else rows
+        ends = np.array(list(self.ranges.values()))
+        points = np.array([[float(row[name]) for name in self.ranges] for row in given]).reshape(-1, len(self.ranges))
+        result: Float = 2.0 * (points - ends[:, 0]) / (ends[:, 1] - ends[:, 0]) - 1.0
+        return result
+
+    def in_si(self, scaled: Float) -> Float:
+        """The inverse of `scaled`, for (d,)."""
+        ends = np.array(list(self.ranges.values()))
+        result: Float = ends[:, 0] + (scaled + 1.0) * (ends[:, 1] - ends[:, 0]) / 2.0
+        return result
+
+
+def begin(
+    spec: CampaignSpec, out: Path, describe: Describe, params: type, *, rate: float, confidence: float,
+    skill: str | None = None, look: int | None = None,
+) -> Question:  # fmt: skip
+    """Write the question into a new folder and prepare the trials to look at.
+
+    Args:
+        spec: the campaign whose ranges are asked about.
+        out: the folder, absent or empty.
+        describe: as of `campaign.folder.prepare`.
+        params: the world's parameter dataclass.
+        rate: success probability, at least.
+        confidence: of the claim.
+        skill: its label or the label's beginning; None for the first.
+        look: trials to look at; None for `LOOKS`.
+
+    Raises:
+        InputError: axes that are no ranges, too many ranges, or a folder that holds something.
+        UnknownName: no such skill.
+    """
+    for name, value in (("--rate", rate), ("--confidence", confidence)):
+        if not 0.5 <= value < 1.0:
+            raise InputError(name, f"is {value:g}", "give a number from 0.5 up to, and not, 1")
+    ranges = _ranges(spec)
+    label = pick_label(spec.labels, skill)
+    question = Question(rate=rate, confidence=confidence, ranges=ranges)
+    one = replace(
+        spec, skills=(spec.skills[spec.labels.index(label)],), trials=look or LOOKS[len(ranges)], stop=Stop(),
+        expect=Expect(), vary={**spec.vary, **{n: Axis(kind="sobol", numbers=ends) for n, ends in ranges.items()}},
+    )  # fmt: skip
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise InputError(out, "exists and is not an empty folder", "choose another --out")
+    prepare(one, out / LOOK, describe, params)
+    content = {"format": FORMAT, "version": VERSION, **asdict(question)}
+    write_whole(out / QUESTION, (json.dumps(content, indent=2, sort_keys=True) + "\n").encode())
+    return question
+
+
+def _ranges(spec: CampaignSpec) -> dict[str, tuple[float, float]]:
+    ranges: dict[str, tuple[float, float]] = {}
+    for name, axis in sorted(spec.vary.items()):
+        if axis.kind in ("uniform", "sobol"):
+            ranges[name] = (float(axis.numbers[0]), float(axis.numbers[1]))
+        elif axis.kind == "normal":
+            mean, spread = float(axis.numbers[0]), float(axis.numbers[1])
+            ranges[name] = (mean - NORMAL * spread, mean + NORMAL * spread)
+        elif axis.kind != "choice":
+            raise InputError(
+                f"vary.{name}", f"is a {axis.kind} axis, from which no fresh trial can be drawn",
+                "make it uniform, normal or choice",
+            )  # fmt: skip
+    if not 1 <= len(ranges) <= max(LOOKS):
+        raise InputError(
+            "vary", f"declares {len(ranges)} ranges", f"a box has 1 to {max(LOOKS)}: put the others under [set]"
+        )
+    degenerate = next((name for name, (low, high) in ranges.items() if not low < high), None)
+    if degenerate is not None:
+        raise InputError(f"vary.{degenerate}", "has no width", "give a standard deviation above 0, or fix it in [set]")
+    return ranges
+
+
+def read_question(folder: Path) -> Question:
+    """The question of a folder.
+
+    Raises:
+        InputError: not such a folder, or damaged.
+    """
+    path = folder / QUESTION
+    if not path.is_file():
+        raise InputError(folder, "asks no question", FIX)
+    content = read_json(path, FIX)
+    try:
+        if content["format"] != FORMAT or content["version"] != VERSION:
+            raise KeyError
+        ranges = {str(k): (float(v[0]), float(v[1])) for k, v in content["ranges"].items()}
+        return Question(rate=float(content["rate"]), confidence=float(content["confidence"]), ranges=ranges)
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError):
+        raise InputError(path, "is damaged", FIX) from None
