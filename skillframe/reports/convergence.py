@@ -80,7 +80,8 @@ def cell_map(results: Results, skill: str, names: Sequence[str], limits: Sequenc
     lines = [axes.frame(), *(boundary(axes, (across, up), limit) for limit in limits)]
     parts = [*(cell for cell, _ in cells), *lines, *dots, *(words for _, words in cells)]
     svg = picture(axes, f"Success of {skill} over {across.label} and {up.label}", *parts, class_="map")
-    return figure(skill, f"{rate.successes} of {rate.trials} trials succeeded.", svg, class_="plot")
+    said = f"{rate.successes} of {rate.trials} trials succeeded ({results.said(rate)})."
+    return figure(skill, said, svg, class_="plot")
 
 
 def _cell(

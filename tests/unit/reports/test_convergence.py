@@ -37,7 +37,9 @@ def test_every_trial_is_in_one_cell_and_one_point(results):
     drawn = cell_map(results, "peg.skill.json", names, [])
     counts = [part.split("<")[0] for part in drawn.split('class="count"')[1:]]
     assert sum(int(c.split("/")[1]) for c in counts) == 200
-    assert sum(int(c.split(">")[1].split("/")[0]) for c in counts) == results.rate("peg.skill.json").successes
+    whole = results.rate("peg.skill.json")
+    assert sum(int(c.split(">")[1].split("/")[0]) for c in counts) == whole.successes
+    assert f"{whole.successes} of 200 trials succeeded ({results.said(whole)})." in drawn and "95 % interval" in drawn
     points = [part.split("<")[0] for part in rate_curves(results, names[0], []).split("<title>")[2:]]
     assert sum(int(p.split(" of ")[1].split(",")[0]) for p in points) == 2 * 200
 
