@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from skillframe.errors import InputError
+from skillframe.machine.law.vdc_adaptation import adapt
 from skillframe.machine.law.vdc_reference import ToolTask
 from skillframe.robot.model import load_model
 from skillframe.robot.payload import with_payload
@@ -198,6 +199,21 @@ def test_projection_stops_at_a_bound_and_never_weakens_the_proof(seed):
     rate = projected_rate(estimate, drive, 7.0, lower, upper)
     assert np.all((true - estimate) * (drive - rate / 7.0) <= 1e-15)
     assert not np.any((estimate >= upper) & (rate > 0)) and not np.any((estimate <= lower) & (rate < 0))
+
+
+@given(SEEDS)
+def test_a_parameter_learns_along_its_drive_up_to_its_bound_and_not_past_any_truth_within_them(seed):
+    """One step of dt: (theta - theta^)^2 changes by at most -2 dt (theta - theta^) rho s + (dt rho s)^2."""
+    rng, dt = np.random.default_rng(seed), 1e-3
+    lower, upper = -rng.random(20), rng.random(20)
+    estimate, true = rng.uniform(lower, upper), rng.uniform(lower, upper)
+    rate = 300.0 * rng.normal(size=20)
+    after = adapt(estimate, rate, (lower, upper), dt)
+    free = (after > lower) & (after < upper)
+    np.testing.assert_allclose((after - estimate)[free], dt * rate[free], rtol=1e-9, atol=1e-15)
+    assert np.all((after >= lower) & (after <= upper))
+    left, most = (true - after) ** 2 - (true - estimate) ** 2, (dt * rate) ** 2 - 2.0 * dt * (true - estimate) * rate
+    assert np.all(left <= most + 1e-12)
 
 
 @given(SEEDS)

@@ -9,7 +9,9 @@ from skillframe_dualarm.dual_peg import DualPegParams, build
 
 from skillframe.errors import InputError, UnknownName
 from skillframe.extend.registry import registry
+from skillframe.frames import Pose
 from skillframe.testing import WorldConformance
+from skillframe.world.scene import State
 
 TIP = (0.0, 0.0, 0.15)
 FRAMES = {"wrist": (0.0, 0.0, 0.0), "tip": TIP}
@@ -96,3 +98,14 @@ def test_the_plugin_provides_a_coordinator_whose_arms_have_their_own_centres():
 def test_a_peg_that_cannot_be_is_refused(words, value):
     with pytest.raises(InputError, match=words):
         build(DualPegParams(**value))
+
+
+def test_the_two_arms_peg_is_in_once_its_tip_is_50_of_60_millimetres_deep_and_in_the_hole():
+    """Beside the hole, or past what holds it, a tip may be as deep. The hole's radius is 16.75 mm."""
+
+    def done(x, z):
+        tip = Pose(np.array([[x, 0.0, z]]), np.eye(3)[None])
+        return bool(build(DualPegParams()).goal(State(tip, np.zeros((1, 6))))[0])
+
+    assert not done(0.0, -0.0499) and done(0.0, -0.0501)
+    assert done(0.016, -0.055) and not done(0.017, -0.055) and not done(0.1, -0.055)

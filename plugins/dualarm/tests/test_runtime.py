@@ -103,6 +103,15 @@ def test_arms_approach_at_the_stated_speed_in_their_shares():
     assert np.allclose(np.linalg.norm(command.twist[..., :3], axis=-1), [0.015, 0.005], atol=1e-12)
 
 
+def test_the_first_arm_moves_along_the_desired_direction_and_the_second_against_it():
+    phase = replace(PHASE, arms=tuple(replace(arm, share=0.5) for arm in PHASE.arms))
+    skill, position, rotation, _ = started(phase, n=1)
+    for k in range(2):
+        twist = skill.step(observe(k * DT, position, rotation)).twist[0, :, :3]
+    forward = rotation[0, 0] @ np.array(phase.desired_direction)
+    assert np.allclose(twist, 0.02 * 0.5 * np.stack([forward, -forward]), atol=1e-12)
+
+
 def test_the_push_of_blocked_arms_never_exceeds_its_limit_and_they_come_to_rest():
     skill, position, rotation, _ = started(replace(PHASE, stall_s=0.5), n=1)
     for k in range(6000):

@@ -7,6 +7,7 @@ import pytest
 from skillframe_search.contact import in_contact, push_direction, samples, surface_axes
 from skillframe_search.example import PUSH, searching
 from skillframe_search.exploration import CUT, Exploration
+from skillframe_search.forces import ForceModel
 from skillframe_search.phase import read_phase
 from skillframe_search.plan import area, exerted, keyed, plan
 
@@ -127,6 +128,25 @@ def test_samples_are_never_farther_out_than_the_cut():
     # the truncated normal's covariance is (1 - c^2/2 / (exp(c^2/2) - 1)) of the full one in two dimensions
     share = 1.0 - 0.5 * CUT**2 / np.expm1(0.5 * CUT**2)
     np.testing.assert_allclose(np.cov(drawn.T), share * found.spread, atol=6e-7)
+
+
+def test_samples_lean_as_the_covariance_says():
+    """Correlated by 0.9. 0.02 is 4 standard errors of a correlation of 0.9 over 2000 samples."""
+    given = np.array([[4e-6, 5.4e-6], [5.4e-6, 9e-6]])
+    found = Exploration(coordinates=("across_1", "across_2"), mean=(0.0, 0.0), covariance=tuple(map(tuple, given)))
+    drawn = found.draw(np.random.default_rng(1), 2000)
+    assert np.corrcoef(drawn.T)[0, 1] == pytest.approx(0.9, abs=0.02)
+    assert np.diag(np.cov(drawn.T)) == pytest.approx(np.diag(given), rel=0.15)  # 4 of 3.2 %
+
+
+def test_a_force_is_expected_by_the_regression_of_its_equation_written_out():
+    """One component: E[w | v] = m_w + S_wv S_vv^-1 (v - m_v)."""
+    rng = np.random.default_rng(2)
+    root, mean, rates = rng.normal(size=(8, 8)), rng.normal(size=8), rng.normal(size=(5, 2))
+    whole = root @ root.T + np.eye(8)
+    model = ForceModel(weights=(1.0,), means=(tuple(mean),), covariances=(tuple(map(tuple, whole)),))
+    expected = mean[2:] + (rates - mean[:2]) @ np.linalg.solve(whole[:2, :2], whole[:2, 2:])
+    np.testing.assert_allclose(model.wrench(rates), expected, rtol=1e-9)
 
 
 def test_the_way_into_the_hole_is_cut():

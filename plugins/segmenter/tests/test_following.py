@@ -2,12 +2,13 @@
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 from scipy.stats import multivariate_normal
 from skillframe_segmenter.features import soft_pair
 from skillframe_segmenter.model import from_document
-from skillframe_segmenter.observer import Filter, follow
+from skillframe_segmenter.observer import NOBODY, Debounce, Filter, follow
 from skillframe_segmenter.segmentation import segment
 
 from tests.figures import quasistatic as made
@@ -43,6 +44,16 @@ def test_a_motion_counts_two_and_a_half_times_and_a_wrench_a_third_of_that():
     weight = model.initial * np.exp(2.5 * model.temper * (log - log.max()))
     found = Filter(model).step(motion, wrench)[0]
     np.testing.assert_allclose(found, weight / weight.sum() @ model.membership, rtol=1e-6, atol=1e-12)
+
+
+def test_one_odd_window_makes_no_switch_and_two_alike_do():
+    """Two trials side by side; a window that is not sure starts the count again."""
+    debounce = Debounce(SimpleNamespace(switch_posterior=0.8, switch_windows=2), 2)
+    sure = [np.eye(2)[[k, 1 - k]] * 0.8 + 0.1 for k in (0, 1, 0, 0)]
+    asked = [debounce.decide(posterior).tolist() for posterior in sure]
+    assert asked == [[NOBODY, NOBODY]] * 3 + [[0, 1]]
+    assert debounce.decide(np.full((2, 2), 0.5)).tolist() == [NOBODY, NOBODY]
+    assert debounce.decide(sure[0]).tolist() == [NOBODY, NOBODY]
 
 
 def twice(one):

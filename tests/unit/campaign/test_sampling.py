@@ -76,6 +76,13 @@ def test_every_prefix_of_whole_sweeps_covers_the_grid_evenly():
     assert cells[:6] == cells[6:12] == cells[12:]
 
 
+def test_axes_of_a_grid_that_are_equally_long_meet_in_every_combination():
+    """Where lengths have no common divisor, axes that run side by side would do so, too."""
+    axes = {f"start.tilt_{axis}": Axis(kind="grid", numbers=(0.0, 0.1, 0.2)) for axis in "xy"}
+    drawn = draws(spec(axes), range(9))
+    assert len(set(zip(*drawn.values(), strict=True))) == 9
+
+
 @pytest.mark.parametrize("count", [16, 64, 256])
 def test_each_sobol_axis_puts_one_point_into_each_of_2_to_the_m_equal_slices(count):
     drawn = draws(spec({name: axis for name, axis in DESIGNS.items() if axis.kind == "sobol"}), range(count))

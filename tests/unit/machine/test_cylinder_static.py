@@ -22,6 +22,31 @@ def parameters(**changes):
     return eq.derive(values | changes)
 
 
+@settings(max_examples=30)
+@given(st.floats(10.0, 1000.0), st.floats(1e3, 1e5))
+def test_an_edge_passes_the_root_of_its_drop_and_near_none_a_straight_line(ratio, transition):
+    """Sharp-edged orifice, Q = c sqrt(dp). Off by (transition / dp)^2 / 4, 0.25 % at ten times the transition."""
+    drop = ratio * transition
+    assert eq.edge_flow(drop, transition) == pytest.approx(math.sqrt(drop), rel=0.3 / ratio**2)
+    assert eq.edge_flow(-drop, transition) == -eq.edge_flow(drop, transition)
+    small = transition / ratio
+    assert eq.edge_flow(small, transition) == pytest.approx(small / math.sqrt(transition), rel=0.3 / ratio**2)
+
+
+@settings(max_examples=20)
+@given(st.floats(10e5, 150e5), st.floats(10e5, 150e5), st.floats(0.05, 0.5))
+def test_what_leaks_out_of_one_chamber_enters_the_other_from_high_to_low(pressure_a, pressure_b, position):
+    """Valve shut, piston held: flows are p' V / B, of both chambers opposite and c_l (p_a - p_b)."""
+    p = parameters(leakage=1e-12)
+    y = np.array([0.0, 0.0, pressure_a, pressure_b, 190e5, 0.0])[:, None]
+    still = np.zeros(1)
+    rate = eq.pressure_rates(p, y, eq.PistonMotion(np.array([position]), still, still, still))[:2, 0]
+    volume = np.array([p.dead_volume_a + p.area_a * position, p.dead_volume_b + p.area_b * (p.stroke - position)])
+    flow = rate * volume / np.array([eq.bulk_modulus(x, p) for x in (pressure_a, pressure_b)])
+    leak = 1e-12 * (pressure_a - pressure_b)
+    np.testing.assert_allclose(flow, [-leak, leak], rtol=1e-9, atol=1e-20)
+
+
 @pytest.mark.parametrize("load", [-4e4, 0.0, 5.5e4])
 def test_the_pressures_at_the_start_hold_the_load_to_rounding(cylinder, load):
     b = bank(cylinder, FREE | {"initial_force": load})
