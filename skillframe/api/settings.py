@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import is_dataclass
 from math import isnan
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
-from skillframe.config.fields import settings_of
+from skillframe.config.fields import settings_of, texts
 from skillframe.config.of_runs import OF_RUNS
 from skillframe.config.units import doubt
 from skillframe.extend.records import WorldType
 from skillframe.extend.registry import registry
+from skillframe.robot.spec import RobotFile, RobotSpec
 from skillframe.world.quantities import VARIED
 
 
@@ -38,6 +40,32 @@ def of_world(record: WorldType) -> Iterator[dict[str, Any]]:
     """Rows of a world's own parameters."""
     for each in settings_of(record.params):
         yield {**each, "name": f"world.{each['name']}", "world": record.name}
+
+
+def of_robot() -> Iterator[dict[str, Any]]:
+    """Rows of the keys of robot.toml: "control.rate_hz", "home.NAME" in a table by names, "arm[].name" in a list.
+
+    Each with `name`, `world` (None), `unit`, `default`, `about` and `range`, as of trials. A unit that nobody types
+    stands in the text alone.
+    """
+    said = texts(RobotSpec)  # word for word the same fields, and described there
+    for row in _keys(RobotFile, ""):
+        yield {**row, "about": row["about"] or said.get(row["name"].removesuffix(".NAME"), ""), "world": None}
+
+
+def _keys(kind: type, group: str) -> Iterator[dict[str, Any]]:
+    """Rows of a record and of the records in it. `group` is what stands before its keys."""
+    hints = get_type_hints(kind)
+    for row in settings_of(kind):
+        hint, name = hints[row["name"]], f"{group}{row['name']}"
+        parts = [hint, *get_args(hint)]
+        many = ".NAME" if dict in (getattr(each, "__origin__", None) for each in parts) else ""
+        many = "[]" if isinstance(row["default"], tuple) and any(map(is_dataclass, parts)) else many
+        inner = next((each for each in parts if is_dataclass(each)), None)
+        if isinstance(inner, type):
+            yield from _keys(inner, f"{name}{many}.")
+        else:
+            yield {**row, "name": f"{name}{many}"}
 
 
 def doubts(world: str, settings: Mapping[str, Any]) -> list[str]:

@@ -13,7 +13,11 @@ LEAST_CORNER, LARGEST_CORNER = 5.0, 0.08
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopClosure:
-    """A closed chain: the origins of two frames of the tree coincide."""
+    """A closed chain: the origins of two frames of the tree coincide.
+
+    Attributes:
+        frame_a, frame_b: names of two links, whose frames coincide.
+    """
 
     frame_a: str
     frame_b: str
@@ -50,12 +54,16 @@ class Actuation:
     """An actuator (an FMU) on a joint.
 
     Attributes:
-        parameters: of the FMU, by its names; inputs, outputs: our names to the FMU's.
+        joint: that it drives.
+        fmu: its name, or its file beside robot.toml.
+        parameters: of the FMU, by its names.
+        inputs, outputs: our names to the FMU's.
         nominal: what the controller takes the actuator for, by our names, where the FMU is not told so in `parameters`.
         initial_force: the FMU's parameter for the force [N] that it holds at the start; "" if it has none.
         unused: inputs and outputs of the FMU that are left alone on purpose, so that nothing is said of them.
-        velocity_gain, force_gain: k_x [m] and k_f [m^2/(N s)] of its piston (`skillframe.machine.law.vdc_actuator`);
-            None: they follow from its figures (`skillframe.machine.law.gains`).
+        velocity_gain: k_x of its piston [m] (`skillframe.machine.law.vdc_actuator`); None: it follows from its
+            figures (`skillframe.machine.law.gains`).
+        force_gain: k_f of its piston [m^2/(N s)]; likewise.
     """
 
     joint: str

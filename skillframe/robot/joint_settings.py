@@ -15,7 +15,8 @@ class JointDynamics:
     """What resists a joint's motion. None keeps what the URDF says.
 
     Attributes:
-        friction: [N m or N]; damping: [N m s/rad or N s/m].
+        friction: of the joint, whatever its speed [N m or N].
+        damping: of the joint [N m s/rad or N s/m].
     """
 
     friction: float | None = None

@@ -36,7 +36,12 @@ _URDF_SUFFIXES = (".urdf", ".xml", ".xacro", ".sdf")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arm:
-    """One arm: a name, and the URDF frame (flange, wrist) that tools are mounted on, z axis out along the tool."""
+    """One arm.
+
+    Attributes:
+        name: of the arm.
+        tool_frame: the URDF frame (flange, wrist) that tools are mounted on, z axis out along the tool.
+    """
 
     name: str
     tool_frame: str
@@ -94,7 +99,16 @@ class LinkInertia:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotFile:
-    """The keys of robot.toml, word for word (contract: robot.toml)."""
+    """The keys of robot.toml, word for word (contract: robot.toml). Those without a line here: `RobotSpec`.
+
+    Attributes:
+        urdf: file of the robot, from the folder of robot.toml.
+        summary: one line for people.
+        arm: what holds tools: one of it, or several.
+        control: what the arm takes, and how often a second.
+        limits: what stops a run.
+        workspace: where a world's fixture stands.
+    """
 
     urdf: str
     summary: str = ""

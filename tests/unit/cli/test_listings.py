@@ -17,6 +17,9 @@ from skillframe.errors import InputError, UnknownName
 from skillframe.execution.prepare import split_settings
 from skillframe.extend.homes import HOMES, where_to_get
 from skillframe.extend.registry import Registry, registry
+from skillframe.robot.interface import Control
+from skillframe.robot.spec import Limits, RobotFile
+from skillframe.robot.surroundings import Obstacle
 from skillframe.world.placement import check_quantities
 from skillframe.world.quantities import QUANTITIES, VARIED
 
@@ -74,8 +77,23 @@ def test_every_setting_that_a_run_takes_is_listed_with_a_line_about_it(capsys):
     assert next(row for row in only if row["name"] == "world.slope")["unit"] == "rad"
 
 
+def test_every_key_of_a_robot_file_is_listed_with_a_line_about_it(capsys):
+    rows = {row["name"]: row for row in listed(capsys, "settings", "--robot-toml")}
+    assert all(row["about"] for row in rows.values())
+    groups = {name.partition(".")[0].removesuffix("[]") for name in rows}
+    assert groups == {field.name for field in fields(RobotFile)}
+    for record, group in ((Control, "control."), (Limits, "limits."), (Obstacle, "obstacle[].")):
+        assert {name for name in rows if name.startswith(group)} == {group + field.name for field in fields(record)}
+    assert {"home.NAME", "inertia.NAME.mass", "dynamics.joint.NAME.friction", "actuation[].force_gain"} <= set(rows)
+    assert (rows["control.rate_hz"]["unit"], rows["control.rate_hz"]["range"]) == ("Hz", [1.0, 1e5])
+    assert rows["limits.force_n"]["default"] == Limits().force_n
+    assert run(["settings", "--robot-toml", "--world", "valley"]) == 2
+    assert "leave out --world" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
-    "words", ["settings", "skills list", "worlds list", "worlds show peg_in_hole", "export --list"]
+    "words",
+    ["settings", "settings --robot-toml", "skills list", "worlds list", "worlds show peg_in_hole", "export --list"],
 )
 def test_a_listing_in_a_pipe_is_no_wider_than_a_terminal(words, capsys):
     assert run(words.split()) == 0
