@@ -10,7 +10,6 @@ import importlib
 import sys
 import warnings
 from collections.abc import Sequence
-from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 
@@ -41,17 +40,20 @@ FOLDERS = frozenset({"skillframe.actuation", "skillframe.reproduce"})
 """Packages that are no more and still hold doors."""
 
 
-class Doors(MetaPathFinder, Loader):
-    """Finds modules under the names of 0.1."""
+class Doors:
+    """Finds and loads modules under the names of 0.1. The base classes of importlib take long to import."""
 
     def find_spec(self, name: str, path: Sequence[str] | None, target: ModuleType | None = None) -> ModuleSpec | None:
         """The door of a name, or None."""
         if name in FOLDERS:
-            return ModuleSpec(name, self, is_package=True)
+            return ModuleSpec(name, self, is_package=True)  # type: ignore[arg-type]  # a loader by its verbs
         if name not in MOVED:
             return None
         warnings.warn(f"{name} is {MOVED[name]} now; the old path goes with 0.3", DeprecationWarning, stacklevel=2)
-        return ModuleSpec(name, self)
+        return ModuleSpec(name, self)  # type: ignore[arg-type]
+
+    def create_module(self, spec: ModuleSpec) -> None:
+        """None: an ordinary module, until the one of the new path takes its place."""
 
     def exec_module(self, module: ModuleType) -> None:
         """Put the module of the new path in the place of the old one."""

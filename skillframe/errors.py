@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from difflib import SequenceMatcher
 from importlib.util import find_spec
 
 MOST_NAMES = 30
@@ -128,6 +127,7 @@ class SkillframeWarning(UserWarning):
 
 def suggest(name: str, known: Iterable[str]) -> str | None:
     """Nearest of the known names, or None if none is near. A name can be near as a whole or by its beginning."""
+    from difflib import SequenceMatcher
 
     def likeness(other: str) -> tuple[float, float, str]:
         texts = (other, other[: len(name)])

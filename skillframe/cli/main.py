@@ -49,7 +49,6 @@ COMMANDS = {
 
 NO_ARGUMENTS: Any = getattr(click.exceptions, "NoArgsIsHelpError", ())
 """Help in place of an answer; older releases of click have no error of its own for it."""
-SUMMARY_WIDTH = 80
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -75,7 +74,7 @@ class LazyGroup(click.Group):
         """The list in `--help`, made without importing a command of the core."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, COMMANDS[name]) for name in _own()])
-        added = [(name, _summary(command)) for name, command in _added().items()]
+        added = [(name, command.summary()) for name, command in _added().items()]
         if added:
             with formatter.section("Commands of plug-ins"):
                 formatter.write_dl(added)
@@ -109,13 +108,6 @@ def _added(*, selected: bool = True) -> dict[str, PluginCommand]:
 
     found = plugin_commands().items()
     return {name: each for name, each in found if name not in COMMANDS and each.selected == selected}
-
-
-def _summary(command: PluginCommand) -> str:
-    try:
-        return command.load().get_short_help_str(limit=SUMMARY_WIDTH)
-    except SkillframeError as error:
-        return str(error)
 
 
 def _unknown(name: str) -> SkillframeError:

@@ -117,7 +117,7 @@ def distribution_rows(registry: Registry) -> list[dict[str, Any]]:
     for command in plugin_commands().values():
         for row in (rows[name] for name in command.distributions if name in rows):
             row["provides"].append(f"command:{command.name}")
-            if command.name in COMMANDS or command.point is None:
+            if command.name in COMMANDS or not command.place:
                 rivals = ("skillframe",) if command.name in COMMANDS else command.distributions
                 error = f"the command {command.name} is in {' and '.join(rivals)}, too"
                 row["error"] = f"{row['error']}; {error}" if row["error"] else error

@@ -1,39 +1,54 @@
 """Commands that plug-ins add to `skillframe`: found by their metadata, imported when they are used.
 
-An entry point in the group `skillframe.commands` names a click command::
+An entry point in the group `skillframe.commands` names a click command, or a `LazyCommand`, which names its module::
 
     [project.entry-points."skillframe.commands"]
-    my_command = "skillframe_my_plugin.command:command"
+    my_command = "skillframe_my_plugin:my_command"
 
-`skillframe --help` imports it for its line of summary, so its module imports nothing heavy. `SKILLFRAME_PLUGINS` leaves
-out a command together with the plug-ins of its distribution.
+    my_command = LazyCommand("Does what I need.", "skillframe_my_plugin.command:command")
+
+`skillframe --help` imports what the entry point names for its line of summary, so that module imports nothing heavy.
+`SKILLFRAME_PLUGINS` leaves out a command together with the plug-ins of its distribution.
 """
 
 from __future__ import annotations
 
 import os
-import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import redirect_stdout
-from dataclasses import dataclass, replace
-from importlib.metadata import EntryPoint, distributions
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from skillframe.errors import SkillframeError
-from skillframe.extend.hookspecs import GROUP as PLUGINS
+from skillframe.extend.contract import GROUP as PLUGINS
+from skillframe.extend.metadata import EntryPoint, declaring
 
 if TYPE_CHECKING:
     import click
 
 GROUP = "skillframe.commands"
+SUMMARY_WIDTH = 80
 
 
 class BadCommand(SkillframeError):
     """A command of a plug-in that cannot be used. Says whose and why."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+class LazyCommand:
+    """A command that is imported when it is used, and not for its line of summary.
+
+    Attributes:
+        summary: one line for listings.
+        place: of the click command, "package.module:name".
+    """
+
+    __slots__ = ("place", "summary")
+
+    def __init__(self, summary: str, place: str) -> None:
+        self.summary, self.place = summary, place
+
+
 class PluginCommand:
     """A command as its distribution's metadata declares it.
 
@@ -42,14 +57,20 @@ class PluginCommand:
         distributions: names of those that bring it; one, unless several bring the same name.
         version: of the first.
         selected: False where `SKILLFRAME_PLUGINS` leaves out every plug-in of the distribution.
-        point: where the command is; None if several distributions bring the name.
+        place: where the command is, "package.module:name"; "" if several distributions bring the name.
     """
 
-    name: str
-    distributions: tuple[str, ...]
-    version: str
-    selected: bool
-    point: EntryPoint | None
+    def __init__(self, name: str, distributions: tuple[str, ...], version: str, selected: bool, place: str) -> None:
+        self.name, self.distributions, self.version = name, distributions, version
+        self.selected, self.place = selected, place
+
+    def summary(self) -> str:
+        """Its line in a listing, or what is wrong with it."""
+        try:
+            found = self._named(self.place)
+            return found.summary if isinstance(found, LazyCommand) else self.load().get_short_help_str(SUMMARY_WIDTH)
+        except BadCommand as error:
+            return str(error)
 
     def load(self) -> click.Command:
         """The command, its module imported now. What the module prints goes to stderr.
@@ -59,18 +80,28 @@ class PluginCommand:
         """
         import click
 
-        if self.point is None:
+        place, found = self.place, self._named(self.place)
+        if isinstance(found, LazyCommand):
+            place, found = found.place, self._named(found.place)
+        if not isinstance(found, click.Command):
+            raise self._bad(f"is {found!r} at {place}, which is no click command")
+        return found
+
+    def _named(self, place: str) -> Any:
+        """What stands at "package.module:name"."""
+        if len(self.distributions) > 1:
             rivals = " and ".join(self.distributions)
             raise BadCommand(f"the command {self.name} is in {rivals}; uninstall all but one")
+        module, _, attribute = place.partition("[")[0].partition(":")
         try:
             with redirect_stdout(sys.stderr):
-                found = self.point.load()
+                found: Any = import_module(module.strip())
+                for part in filter(None, attribute.strip().split(".")):
+                    found = getattr(found, part)
         except (Exception, SystemExit) as error:  # one plug-in must not take the rest down
             if os.environ.get("SKILLFRAME_STRICT_PLUGINS") == "1":
                 raise
             raise self._bad(f"cannot be loaded ({type(error).__name__}: {error})") from error
-        if not isinstance(found, click.Command):
-            raise self._bad(f"is {found!r} at {self.point.value}, which is no click command")
         return found
 
     def _bad(self, problem: str) -> BadCommand:
@@ -86,36 +117,22 @@ def plugin_commands() -> dict[str, PluginCommand]:
         other = found.get(command.name)
         if other is not None and other.selected == command.selected:
             rivals = (*other.distributions, *command.distributions)
-            found[command.name] = replace(other, distributions=rivals, point=None)
+            found[command.name] = PluginCommand(other.name, rivals, other.version, other.selected, "")
         elif other is None or command.selected:
             found[command.name] = command
     return {name: found[name] for name in sorted(found)}
 
 
 def _declared() -> Iterator[PluginCommand]:
-    """Commands, a distribution after the other. The first of one name on the path is the one that imports."""
-    seen: set[str] = set()
-    for distribution in distributions():
-        if not re.search(rf"^\[{re.escape(GROUP)}\]", distribution.read_text("entry_points.txt") or "", re.MULTILINE):
-            continue
-        try:
-            name, version = str(distribution.metadata["Name"]), str(distribution.metadata["Version"])
-            points = list(distribution.entry_points)
-        except Exception:  # metadata is foreign text; whatever it raises, `plugins list` names its plug-ins with it
-            continue
-        if name.lower() in seen:
-            continue
-        seen.add(name.lower())
+    for distribution, version, points in declaring(GROUP):
         selected = _is_selected(points)
-        for point in points:
-            if point.group == GROUP:
-                yield PluginCommand(
-                    name=point.name, distributions=(name,), version=version, selected=selected, point=point
-                )
+        for group, name, place in points:
+            if group == GROUP:
+                yield PluginCommand(name, (distribution,), version, selected, place)
 
 
-def _is_selected(points: list[EntryPoint]) -> bool:
+def _is_selected(points: Sequence[EntryPoint]) -> bool:
     setting = os.environ.get("SKILLFRAME_PLUGINS")
     return setting is None or any(
-        point.group == PLUGINS and point.name in {name.strip() for name in setting.split(",")} for point in points
+        group == PLUGINS and name in {each.strip() for each in setting.split(",")} for group, name, _ in points
     )

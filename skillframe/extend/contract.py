@@ -13,6 +13,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
+GROUP = "skillframe"
+"""Entry points of plug-ins."""
 CONTRACT = "0.2"
 """Of this skillframe."""
 OLDEST = "0.1"

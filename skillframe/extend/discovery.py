@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 from importlib.metadata import Distribution, EntryPoint, distributions
 
-from skillframe.extend import hookspecs
+from skillframe.extend.contract import GROUP
 from skillframe.extend.plugin import BadPlugin, Plugin
 
 
@@ -19,7 +19,7 @@ def installed() -> list[tuple[Plugin, Callable[[], object]]]:
     seen: set[str] = set()
     for distribution in distributions():
         text = distribution.read_text("entry_points.txt") or ""
-        if not re.search(rf"^\[{hookspecs.GROUP}\]", text, re.MULTILINE):
+        if not re.search(rf"^\[{GROUP}\]", text, re.MULTILINE):
             continue
         name, version = _identity(distribution)
         if name.lower() in seen:  # the first on the path is the one that imports
@@ -52,7 +52,7 @@ def _requires(distribution: Distribution) -> tuple[str, ...]:
 
 def _entries(distribution: Distribution, name: str) -> list[tuple[str, Callable[[], object]]]:
     try:
-        points = [point for point in distribution.entry_points if point.group == hookspecs.GROUP]
+        points = [point for point in distribution.entry_points if point.group == GROUP]
     except Exception as error:  # a damaged entry_points.txt
         return [(name, _raiser(BadPlugin(f"entry_points.txt of {name} cannot be read ({error}); install it again")))]
     return [(point.name, _loader(point)) for point in points]

@@ -18,6 +18,7 @@ from collections.abc import Iterable
 
 import pluggy
 
+from skillframe.extend.contract import GROUP
 from skillframe.extend.records import (
     CoordinatorType,
     DriveType,
@@ -32,7 +33,6 @@ from skillframe.extend.records import (
     WorldType,
 )  # fmt: skip
 
-GROUP = "skillframe"
 hookspec = pluggy.HookspecMarker(GROUP)
 hookimpl = pluggy.HookimplMarker(GROUP)
 """Decorator of a plug-in's functions that implement the hooks below."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from skillframe.errors import SkillframeError, UnknownName
-from skillframe.extend import hookspecs
+from skillframe.extend.contract import GROUP
 from skillframe.extend.records import (
     CoordinatorType,
     DriveType,
@@ -101,7 +101,7 @@ def hook_problems(module: object) -> Iterator[BadPlugin]:
     """Hooks that would silently never be called: misspelt names, and hooks without the marker."""
     for name in dir(module):
         function = getattr(module, name, None)
-        marker = getattr(function, f"{hookspecs.GROUP}_impl", None)
+        marker = getattr(function, f"{GROUP}_impl", None)
         marked = isinstance(marker, dict)
         optional = isinstance(marker, dict) and marker["optionalhook"]  # a hook of a newer core, declared as such
         if name not in KINDS.values() and callable(function) and (marked or name.startswith("skillframe_")):

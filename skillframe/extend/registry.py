@@ -19,7 +19,7 @@ import pluggy
 
 from skillframe.errors import UnknownName
 from skillframe.extend import hookspecs
-from skillframe.extend.contract import ATTRIBUTE, contract_problem, requirement_problem
+from skillframe.extend.contract import ATTRIBUTE, GROUP, contract_problem, requirement_problem
 from skillframe.extend.discovery import installed
 from skillframe.extend.homes import where_to_get
 from skillframe.extend.plugin import KINDS as KINDS
@@ -54,7 +54,7 @@ class Registry:
     """
 
     def __init__(self) -> None:
-        self._manager = pluggy.PluginManager(hookspecs.GROUP)
+        self._manager = pluggy.PluginManager(GROUP)
         self._manager.add_hookspecs(hookspecs)
         self._records: dict[str, dict[str, tuple[Any, Plugin]]] = {kind: {} for kind in KINDS}
         self._conflicts: dict[tuple[str, str], PluginConflict] = {}

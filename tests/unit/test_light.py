@@ -34,6 +34,14 @@ def test_help_loads_no_scientific_library():
     assert not loaded_by("from skillframe.cli.main import run; assert run(['--help']) == 0") & HEAVY
 
 
+@pytest.mark.needs_plugins
+def test_help_names_the_commands_of_plugins_and_loads_no_parser_of_metadata():
+    code = "from skillframe.cli.main import run; assert run(['--help']) == 0"
+    loaded = loaded_by(code + "\nimport sys; assert 'skillframe_papers' in sys.modules", "papers")
+    # what `skillframe --help` took twice its processor time for
+    assert not loaded & {"email", "csv", "zipfile", "tomllib", "json", "dataclasses", "pluggy", "difflib"}
+
+
 def test_an_entry_module_of_a_plugin_loads_nothing_heavy():
     for plugin in PLUGINS:
         package = next((plugin / "src").iterdir()).name.removesuffix(".py")

@@ -2,22 +2,9 @@
 
 Read `published` (the rows, with what ours must reach), `rows` (a module a subject: how each is computed), `jobs` (what
 is to be computed), `runner` (each group of rows in a process), `store` (what is kept), `page` and `document` (what is
-shown), `committed` (has a verdict changed?). This module is all that is imported when plug-ins are listed.
+shown), `committed` (has a verdict changed?). This module is all that `skillframe --help` imports.
 """
 
-from __future__ import annotations
+from skillframe.extend.commands import LazyCommand
 
-from collections.abc import Iterable
-
-from skillframe import hookimpl
-from skillframe.extend.records import RowType
-
-skillframe_contract = "0.2"
-
-
-@hookimpl
-def skillframe_rows() -> Iterable[RowType]:
-    """The published results."""
-    from skillframe_papers.published import row_types
-
-    return row_types()
+reproduce = LazyCommand("The papers' results, row by row.", "skillframe_papers.command:command")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from skillframe_papers.runner import Outcome
 
 
-@click.command(name="reproduce", short_help="The papers' results, row by row.")
+@click.command(name="reproduce")
 @click.argument("rows", nargs=-1, metavar="[ROW]...")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("reproduce"), show_default=True,
               help="Folder for rows, reproduce.json, reproduce.html and reproduce.md.")  # fmt: skip

@@ -1,0 +1,18 @@
+"""What skillframe-papers registers. This module is all that is imported when plug-ins are listed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from skillframe import hookimpl
+from skillframe.extend.records import RowType
+
+skillframe_contract = "0.2"
+
+
+@hookimpl
+def skillframe_rows() -> Iterable[RowType]:
+    """The published results."""
+    from skillframe_papers.published import row_types
+
+    return row_types()
