@@ -12,6 +12,7 @@ What the simulator knows and no sensor tells, the true contact force, is `skillf
 
 from __future__ import annotations
 
+import itertools
 import sys
 
 import numpy as np
@@ -40,6 +41,9 @@ class LimitGuard:
         self.energy = np.zeros(count)
         """(N,) work of the controller on the tool so far [J]."""
         self._centre, self._squares, self._bounds = _glance(limits)
+        self._values: Float = np.zeros((count, len(self._centre)))
+        ends = (0, 3, 9, 15, 21)
+        self._parts = [self._values[:, begin:end] for begin, end in itertools.pairwise(ends)]
 
     def violations(
         self, position: Float, twist: Float, wrench: Float, command: Float, rows: NDArray[np.int64]
@@ -54,7 +58,9 @@ class LimitGuard:
             rows: indices of the trials that still run.
         """
         self.energy += np.vecdot(command, twist) * self._dt
-        values = np.concatenate([position, twist, wrench, command], axis=-1)
+        for part, given in zip(self._parts, (position, twist, wrench, command), strict=True):
+            part[...] = given
+        values = self._values
         if self._surely_fine(values):
             return []
         force, torque, speed = norm(wrench[:, :3]), norm(wrench[:, 3:]), norm(twist[:, :3])
@@ -74,7 +80,8 @@ class LimitGuard:
     def _surely_fine(self, values: Float) -> bool:
         """Are all trials well inside all limits? One look for the many ticks in which nothing happens."""
         from_centre = values - self._centre
-        sums = (from_centre * from_centre) @ self._squares
+        from_centre *= from_centre
+        sums = from_centre @ self._squares
         if self._limits.energy_j is not None and not (self.energy <= self._limits.energy_j).all():
             return False
         if self._motors is not None and self._motors.counting:

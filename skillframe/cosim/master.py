@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.cosim.bond import bond_work, relative_residual
+from skillframe.cosim.bond import BondLedger, bond_work, relative_residual
 from skillframe.cosim.plant import Float, Mechanics, Motion
 from skillframe.errors import SkillframeError
 from skillframe.fmu.actuator import Actuators
@@ -60,8 +60,6 @@ class Master:
 
     Attributes:
         time: now [s]; force: (count,) on the bonds now [N]; steps: internal macro steps taken.
-        difference: (count,) work of the plant minus work of the actuator since the start [J].
-        exchanged: (count,) sum of |work| [J].
 
     Raises:
         SkillframeError: bonds do not match, or halving is asked for and cannot be done.
@@ -88,7 +86,19 @@ class Master:
             raise SkillframeError("step halving needs actuators whose state can be restored; leave tolerance_j out")
         self.time, self.steps = 0.0, 0
         self.force = np.zeros(bank.count)
-        self.difference, self.exchanged = np.zeros(bank.count), np.zeros(bank.count)
+        self._ledger = BondLedger(bank.count)
+
+    @property
+    def difference(self) -> Float:
+        """(count,) work of the plant minus work of the actuator since the start [J]."""
+        lost: Float = self._ledger.sums()[0].copy()
+        return lost
+
+    @property
+    def exchanged(self) -> Float:
+        """(count,) sum of |work| [J]."""
+        passed: Float = self._ledger.sums()[1].copy()
+        return passed
 
     def start(
         self,
@@ -109,7 +119,7 @@ class Master:
         self.bank.start(time, parameters)
         self.time, self.steps = time, 0
         self.force = self.bank.y[:, self._force].copy()
-        self.difference[:], self.exchanged[:] = 0.0, 0.0
+        self._ledger.start()
 
     def step(self, command: Float | float) -> bool:
         """One macro step H under a command (count,). Returns False if an actuator has failed (see `trouble`)."""
@@ -142,16 +152,20 @@ class Master:
     def _keep(self) -> None:
         self.plant.save()
         self.bank.save()
-        self._kept = (self.time, self.steps, self.force.copy(), self.difference.copy(), self.exchanged.copy())
+        self._kept = (self.time, self.steps, self.force.copy(), self._ledger.sums().copy())
 
     def _return(self) -> None:
         self.plant.restore()
         self.bank.restore()
-        self.time, self.steps, self.force, self.difference, self.exchanged = self._kept
+        self.time, self.steps, self.force, sums = self._kept
+        self._ledger.restore(sums)
 
-    def _show(self, position: Float, velocity: Float, acceleration: Float | float) -> None:
+    def _show(self, position: Float, velocity: Float, acceleration: Float | float | None) -> None:
+        """Inputs of the bank. Without an acceleration it keeps that of the step's begin."""
         at_position, at_velocity, at_acceleration = self._shown
-        at_position[:], at_velocity[:], at_acceleration[:] = position, velocity, acceleration
+        at_position[:], at_velocity[:] = position, velocity
+        if acceleration is not None:
+            at_acceleration[:] = acceleration
 
     def _exchange(self, step: float) -> bool:
         begin = self.plant.motion(self.force)
@@ -162,10 +176,12 @@ class Master:
             x, v, a = self.plant.motion(after)
         else:
             (x, v), a = self._where(), begin.acceleration
-        self._account(begin, x, v, after, given, step)
+        if self.settings.tolerance_j is not None:
+            self.mismatch: Float = np.abs(after * (v - begin.velocity - begin.acceleration * step)) * step
+        self._ledger.add((self.force, after), (begin.position, x), (begin.velocity, v), given, step)
         self.force = after
         if self._refresh:
-            self._show(x, v, a)
+            self._show(x, v, a if self._where is None else None)
             fine = self.bank.refresh() and fine
             self.force = self._felt(after)
         self.time += step
@@ -207,13 +223,6 @@ class Master:
             shares = (j / count, (j + 1) / count)
             begin, end = (self.force + share * (after - self.force) for share in shares)
             self.plant.advance(begin, end, step / count)
-
-    def _account(self, begin: Motion, x: Float, v: Float, after: Float, given: Float, step: float) -> None:
-        received = bond_work(self.force, after, x - begin.position, begin.velocity, v, step)
-        if self.settings.tolerance_j is not None:
-            self.mismatch: Float = np.abs(after * (v - begin.velocity - begin.acceleration * step)) * step
-        self.difference = self.difference + received - given
-        self.exchanged = self.exchanged + np.abs(received)
 
     @property
     def residual(self) -> Float:

@@ -58,7 +58,7 @@ def timed(count, seconds=SECONDS):
 
     with np.errstate(invalid="ignore", over="ignore"):
         made.run(seconds, note)
-    assert not made.limited.any(), made.reason
+    assert not made.outcomes.limited.any(), made.outcomes.reason
     spent = [(after[0] - before[0], before[1]) for before, after in itertools.pairwise(marks)]
     fastest = min(cpu for cpu, touching in spent if touching)
     mean = sum(cpu for cpu, _ in spent) / len(spent)

@@ -143,10 +143,10 @@ class ForceEstimator:
         if self._tick == 0:
             self._begin()
         self._tick += 1
-        valid = np.sum(self._since >= self.settings.settle + self.settings.memory, axis=-1) >= 2
+        level = sliding + 1.0 * (self._since >= self.settings.settle + self.settings.memory)
         feedback = self._feedback.step(self.raw)
         answered = standing_out(feedback, sigma, self.settings.doubted)
-        return Estimate(self._smooth(), sigma, valid, feedback, answered)
+        return Estimate(self._smooth(), sigma, level, feedback, answered)
 
     def friction(self, terms: Terms) -> Float:
         """(N, k) of every cylinder as it is known now, nominal and what was identified [N]."""

@@ -46,6 +46,7 @@ class CoupledPlant:
         self.active: NDArray[np.int64] = np.arange(self.trials)
         self.load: Float = np.zeros((self.trials, plant.model.nv))
         self._saved: tuple[Float, Float] = plant.state
+        self._all: Float = np.zeros_like(self.load)
 
     def motion(self, force: Float) -> Motion:
         """Motion (count,) of the pistons now, with forces (count,) [N] acting on them."""
@@ -95,6 +96,7 @@ class CoupledPlant:
         self.plant.set_state(*self._saved, self.active)
 
     def _torque(self, force: Float) -> Float:
-        torque: Float = force.reshape(self.trials, -1) @ self._spread
+        """Generalised forces (N, nv), in an array that the next call uses again."""
+        torque = np.matmul(force.reshape(self.trials, -1), self._spread, out=self._all)
         torque += self.load
         return torque

@@ -145,7 +145,7 @@ class MachineDrive:
         self.home = self.plant.tool_pose().position[:, self.task.axes].copy()
         self.joint = z[:, 2:].copy()
         nothing = np.zeros((self.count, 2))
-        self.estimate = Estimate(nothing, nothing, np.zeros(self.count, dtype=bool), nothing, nothing)
+        self.estimate = Estimate(nothing, nothing, np.zeros((self.count, len(self.chain.actuated))), nothing, nothing)
         self.demand = Demand(*(np.zeros((self.count, len(self.chain.actuated))) for _ in range(3)))
         self.estimator.start(self._measured())
 
@@ -166,8 +166,8 @@ class MachineDrive:
                 raise InputError(where, text, "map it under outputs of its [[actuation]]")
 
     def _measured(self) -> Measured:
-        gauges = self.gauges
-        return Measured(gauges.z, gauges.rate, *gauges.pressures, self.estimate.answered, self.estimate.sigma)
+        g, estimate = self.gauges, self.estimate
+        return Measured(g.z, g.rate, g.pressure_a, g.pressure_b, estimate.answered, estimate.sigma)
 
     def prepare(self) -> list[Broken]:
         """Swing in the air and identify friction and payload, then hold what was found."""
@@ -257,7 +257,9 @@ class MachineDrive:
         )
 
     def _valve(self, reference: Reference) -> None:
-        measured = self._seen._replace(z=self.gauges.now, force=self.estimate.answered, sigma=self.estimate.sigma)
+        _, rate, pressure_a, pressure_b, _, _ = self._seen
+        now, estimate = self.gauges.now, self.estimate
+        measured = Measured(now, rate, pressure_a, pressure_b, estimate.answered, estimate.sigma)
         self._wanted = reference
         self.demand = self.law.step(measured, reference, self.active)
 
@@ -265,8 +267,10 @@ class MachineDrive:
         """Trials whose readings, oil and motion do not fit each other, or whose coupling is to blame for that."""
         if self.watch is None:
             return []
-        seen, valve = self._seen._replace(force=self.estimate.answered), self.demand.valve
-        found = self.watch.look(seen, self.terms, self._wanted, valve, self.active, swing=swing, alarms=alarms)
+        if not (self.watch.due(self.demand.valve) or alarms):
+            return []
+        seen = self._seen._replace(force=self.estimate.answered)
+        found = self.watch.look(seen, self.terms, self._wanted, self.active, swing=swing, alarms=alarms)
         coupled = {one.row: one for one in self.actuated.violations(0, self.active)} if found else {}
         return [coupled.get(one.row, one) for one in found]
 
@@ -297,7 +301,9 @@ class MachineDrive:
         position[:, plane] = self.terms.tip + self.gauges.lag * self.terms.tip_rate
         twist, wrench = np.zeros((self.count, 6)), np.zeros((self.count, 6))
         twist[:, plane], wrench[:, plane] = self.terms.tip_rate, self.estimate.feedback
-        return Observation(np.full(self.count, time), self.dt, Pose(position, tool.rotation.copy()), twist, wrench)
+        times = np.empty(self.count)
+        times.fill(time)
+        return Observation(times, self.dt, Pose(position, tool.rotation.copy()), twist, wrench)
 
     def _read(self, observation: Observation) -> Observation:
         """The same with the force as it is now, for the record. A skill that answers the force sees it late."""
@@ -341,9 +347,8 @@ class MachineDrive:
         return result
 
     def _columns(self) -> dict[str, Float]:
-        pressure_a, pressure_b = self.gauges.pressures
         return {
-            "pressure_a": pressure_a, "pressure_b": pressure_b, "valve": self.demand.valve,
+            "pressure_a": self.gauges.pressure_a, "pressure_b": self.gauges.pressure_b, "valve": self.demand.valve,
             "piston_force": self.demand.present - self.estimator.friction(self.terms),
             "piston_force_true": self.actuated.force, "force_sigma": self.sigma.stated(self.estimate),
             "force_valid": self.estimate.valid.astype(float),

@@ -33,7 +33,7 @@ def plane_reference(
     law = np.zeros((len(seen.time), 6))
     error = (command.pose.position - seen.pose.position)[:, plane]
     law[:, plane] = push + _times(stiffness, error) + _times(damping, velocity - seen.twist[:, plane])
-    still = np.zeros_like(joint)
+    still = np.zeros(joint.shape)
     return Reference(command.pose.position[:, plane], velocity, stiffness, damping, push, joint, still), law
 
 

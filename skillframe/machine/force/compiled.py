@@ -99,10 +99,9 @@ class CompiledEstimator:
         due = self._tick % self._every == 0
         if due:
             self._load[:] = self._chain.load_gravity(measured.z)
-        values = (
-            measured.rate, measured.pressure_a, measured.pressure_b, terms.mass, terms.drift, terms.gravity,
-            terms.jacobian, terms.arms, terms.piston_rate,
-        )  # fmt: skip
+        _, rate, pressure_a, pressure_b, _, _ = measured
+        mass, drift, gravity, jacobian, arms, _, piston_rate, _, _ = terms
+        values = (rate, pressure_a, pressure_b, mass, drift, gravity, jacobian, arms, piston_rate)
         for own, value in zip(self._given, values, strict=True):
             own[...] = value
         self._look(self._everyone)
@@ -117,7 +116,7 @@ class CompiledEstimator:
         self._fresh[0] = 0.0
         self._tick += 1
         _, _, force, sigma, feedback, answered = self._told
-        return Estimate(force, sigma, (sliding > 1.0).sum(axis=-1) >= 2, feedback, answered)
+        return Estimate(force, sigma, sliding, feedback, answered)
 
     def friction(self, terms: Terms) -> Float:
         """(N, k) of every cylinder as it is known now, nominal and what was identified [N]."""

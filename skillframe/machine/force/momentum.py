@@ -34,7 +34,7 @@ class Estimate(NamedTuple):
 
     Attributes:
         force: (N, 2) base x and z [N]; sigma: (N, 2) its standard deviation, from W [N].
-        valid: (N,) two pistons or more have been sliding for long enough; else stiction leaves 400 N open and more.
+        level: (N, k) of every piston: 1 once it slides, 2 once the estimate's memory holds nothing else, 0 else.
         feedback: (N, 2) the force for whatever answers it, a law or a hand: it comes some 50 ms late, and has no gain
             to speak of at the frequencies at which a machine in contact rings.
         answered: (N, 2) what of the feedback stands out of its uncertainty (`standing_out`): for the law of a machine.
@@ -42,9 +42,15 @@ class Estimate(NamedTuple):
 
     force: Float
     sigma: Float
-    valid: NDArray[np.bool_]
+    level: Float
     feedback: Float
     answered: Float
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """Whether (N,) two pistons or more slide for long enough. Else stiction leaves 400 N open and more."""
+        found: NDArray[np.bool_] = (self.level > 1.0).sum(axis=-1) >= 2
+        return found
 
 
 _SPEEDS = ("stiction_speed", "least_speed", "sliding_speed")

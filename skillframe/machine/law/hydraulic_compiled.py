@@ -76,6 +76,7 @@ class CompiledLaw:
             cylinder_table(self.cylinders), np.array(gains.velocity), np.array(gains.force), self._scalars,
         )  # fmt: skip
         given = [part for part in self._reference if part is not None]
+        self._told_of = (*self._measured, *given)
         own = [self.theta, self.friction, self._memory, self.deadband, self.supply]
         inputs = [*self._measured, *given, *own, *knowledge]
         law, terms = law_function(self.chain, axes), terms_function(self.chain, axes)
@@ -108,16 +109,14 @@ class CompiledLaw:
 
     def terms(self, measured: Measured) -> Terms:
         """The model's terms where the machine is measured to be. The arrays are used again by the call after next."""
-        np.copyto(self._measured.z, measured.z)
-        np.copyto(self._measured.rate, measured.rate)
+        self._measured.z[...], self._measured.rate[...] = measured.z, measured.rate
         self._turn ^= 1
         self._describe[self._turn](self._everyone)
         return self._terms[self._turn]
 
     def step(self, measured: Measured, reference: Reference, ids: NDArray[np.int64]) -> Demand:
         """A sample for the trials in `ids`, the other rows mean nothing. The call after next uses the arrays again."""
-        for own, given in zip((*self._measured, *self._reference), (*measured, *reference), strict=True):
-            assert own is not None
+        for own, given in zip(self._told_of, (*measured, *reference), strict=True):
             own[...] = 0.0 if given is None else given
         self._turn ^= 1
         self._steps[self._turn](ids)

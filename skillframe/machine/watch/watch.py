@@ -44,27 +44,31 @@ class MachineWatch:
         self._tool = ToolWatch(count, period)
         self._told: Float = np.zeros((count, len(names[1])))
 
+    def due(self, valve: Float) -> bool:
+        """Take in the command (N, k) of a tick. Is it one in which all are looked at?"""
+        self._told += valve
+        self._tick += 1
+        return self._tick % RECENT == 0
+
     def look(
-        self, seen: Measured, terms: Terms, reference: Reference, valve: Float, active: NDArray[np.int64], *,
-        swing: bool = False, alarms: Collection[int] = (),
+        self, seen: Measured, terms: Terms, reference: Reference, active: NDArray[np.int64], *, swing: bool = False,
+        alarms: Collection[int] = (),
     ) -> list[Broken]:  # fmt: skip
         """The trials among `active` that are not to go on, each for the first thing that was found.
+
+        To be called in ticks that are `due`, and in those with alarms.
 
         Args:
             seen: readings.
             terms: of the model there.
             reference: what the law follows.
-            valve: (N, k) command of this tick.
             active: trials that run.
             swing: before the skill starts.
             alarms: trials that break a limit in this tick, whose readings are looked at now.
         """
-        self._told += valve
-        self._tick += 1
         due = self._tick % RECENT == 0
-        if not (due or alarms):
-            return []
-        raw = np.roll(self._gauges.raw, -self._gauges.turn, axis=0)
+        last, turn = self._gauges.raw, self._gauges.turn
+        raw = np.concatenate([last[turn:], last[:turn]])
         found = self._readings.look(raw, self._gauges.chambers, terms.piston_rate)
         if due:
             knowledge = Knowledge(self._law.supply, self._law.deadband, self._valves.supply_deviation)

@@ -7,6 +7,7 @@ import pytest
 from cosim_fakes import CYLINDER, Boom, monolithic
 
 from skillframe.cosim import CosimSettings, Master, bond_work, coupling_numbers, require_stable
+from skillframe.cosim.bond import BLOCK, BondLedger
 from skillframe.cosim.coupling import StepTooLarge
 from skillframe.errors import SkillframeError
 from skillframe.fmu.actuator import ActuatorSpec
@@ -191,6 +192,26 @@ def test_the_work_of_a_linear_force_on_a_cubic_path_is_exact():
         x, v = np.poly1d(c), np.poly1d(c).deriv()
         exact = (np.poly1d([(f1 - f0) / h, f0]) * v).integ()(h)
         assert bond_work(f0, f1, x(h) - x(0), v(0), v(h), h) == pytest.approx(exact, rel=1e-11, abs=1e-12)
+
+
+def test_a_ledger_sums_steps_of_any_length_however_seldom_it_is_asked_and_goes_back_to_what_was_kept():
+    rng, ledger = np.random.default_rng(0), BondLedger(3)
+    lost, exchanged = np.zeros(3), np.zeros(3)
+    for k in range(2 * BLOCK + 3):
+        f0, f1, x0, x1, v0, v1, given = rng.normal(size=(7, 3))
+        step = 1e-3 * (1 + k % 3)
+        ledger.add((f0, f1), (x0, x1), (v0, v1), given, step)
+        work = bond_work(f0, f1, x1 - x0, v0, v1, step)
+        lost, exchanged = lost + work - given, exchanged + np.abs(work)
+        if k == 50:
+            kept = ledger.sums().copy()
+            np.testing.assert_array_equal(kept, [lost, exchanged])  # the same additions one after the other
+    np.testing.assert_array_equal(ledger.sums(), [lost, exchanged])
+    ledger.add((f0, f1), (x0, x1), (v0, v1), given, step)
+    ledger.restore(kept)
+    np.testing.assert_array_equal(ledger.sums(), kept)
+    ledger.start()
+    assert not ledger.sums().any()
 
 
 def test_a_failed_actuator_is_named_and_the_master_says_so():

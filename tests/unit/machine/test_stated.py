@@ -11,9 +11,7 @@ DT = 1e-3
 
 def estimate(force, sigma, late=None):
     force, sigma = np.atleast_2d(force), np.atleast_2d(sigma)
-    return Estimate(
-        force, sigma, np.ones(len(force), dtype=bool), force if late is None else np.atleast_2d(late), force
-    )
+    return Estimate(force, sigma, np.full((len(force), 3), 2.0), force if late is None else np.atleast_2d(late), force)
 
 
 def swung(sizes, seed=3):

@@ -254,8 +254,9 @@ def test_a_trial_that_breaks_a_limit_is_looked_at_at_once_and_its_neighbour_when
     for tick in range(1, 61):
         gauges.sample()
         alarms = [1] if tick == 55 else []
-        for row, code, text in judge.look(measured, terms, wanted, zeros, np.arange(2), alarms=alarms):
-            found.setdefault(row, (tick, code.value, text))
+        if judge.due(zeros) or alarms:
+            for row, code, text in judge.look(measured, terms, wanted, np.arange(2), alarms=alarms):
+                found.setdefault(row, (tick, code.value, text))
     words = "sensor: pressure_a of tilt_piston repeats 0.00077 bar to the bit"
     assert found == {1: (55, "sensor", words), 0: (60, "sensor", words)}
 
