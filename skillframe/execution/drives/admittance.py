@@ -19,6 +19,7 @@ from skillframe.control.endings import Broken
 from skillframe.control.inner_loop import InnerLoop
 from skillframe.control.joint_steps import JointRange, JointSteps
 from skillframe.control.motors import joint_limits
+from skillframe.control.ringing import RingWatch
 from skillframe.execution.drives.torque import OneArm, TorqueDrive
 from skillframe.execution.setup import Setup
 from skillframe.frames import Float, Pose, norm, skew
@@ -54,7 +55,8 @@ class AdmittanceDrive(TorqueDrive):
         self._joints, self._sent = start, start if self.arm.kind == "position" else np.zeros_like(start)
         floor = (self.arm.damping, self.arm.turning_damping(self._lever))
         bounds = Bounds(floor, self.arm.push, self.arm.stiffness)
-        self.admittance = AdmittanceLaw(self.rows, self._dt_command, bounds)
+        watch = RingWatch(self.rows, self._dt_command, self.arm.total_delay, self.arm.push[0])
+        self.admittance = AdmittanceLaw(self.rows, self._dt_command, bounds, watch)
         self._steps = JointSteps(start.take(self._dofs, axis=1), self._limits, self.arm.total_delay, self._dt_command)
         self._inner = InnerLoop(self.arm, start, self.limb.mass_matrix, self.dt)
         self._tick, self._law = 0, np.zeros((self.rows, 6))

@@ -5,6 +5,7 @@ import pytest
 from scipy.linalg import expm
 
 from skillframe.control.admittance import QUIET_FORCE, QUIET_TORQUE, AdmittanceLaw, Bounds, felt
+from skillframe.control.ringing import RingWatch
 from skillframe.errors import InputError
 from skillframe.frames import Pose, rotation_matrix, rotation_vector
 from skillframe.robot.interface import VIRTUAL_INERTIA, VIRTUAL_MASS
@@ -162,13 +163,13 @@ def test_the_least_stable_damping_is_the_published_tables_and_within_the_formula
     assert formula(loop) == pytest.approx(damping, rel=0.2)
 
 
-def pressed(loop, damping, seconds, push=0.0, speed=0.0, one_side=False):
+def pressed(loop, damping, seconds, push=0.0, speed=0.0, one_side=False, watch=None):
     """Contact forces over time of this law, with the arm of the equations between it and the wall."""
     from skillframe.control.inner_loop import InnerLoop
 
     arm = arm_of(loop)
     h, heavy = arm.ticks * 1e-3, 1e7  # a joint so heavy that the wall does not move it from where its servo wants it
-    law = AdmittanceLaw(1, h, Bounds((damping, 1.0), (np.inf, np.inf)))
+    law = AdmittanceLaw(1, h, Bounds((damping, 1.0), (np.inf, np.inf)), watch)
     law.twist[0, 0] = speed
     place = np.array([[-speed * 0.1 if speed else 1e-4]])
     commanded, velocity = place.copy(), np.full((1, 1), speed)
@@ -217,3 +218,31 @@ def test_the_peak_at_touch_down_is_that_of_the_table_whatever_the_delay(loop, sh
     if loop.delay == 8:
         own = -pressed(loop, damping, 0.8, 20.0, 20.0 / damping, one_side=True).min()
         assert own == pytest.approx(found, rel=0.06)  # its servo lags a tick, in 26 ms
+
+
+def watched(loop, push=20.0):
+    return RingWatch(1, 1.0 / loop.rate, loop.total_delay, push)
+
+
+@pytest.mark.parametrize("loop", [Loop(), Loop(rate=125, delay=20), Loop(rate=500, delay=8, velocity=True)])
+def test_on_a_wall_four_times_as_stiff_as_declared_the_law_bounces_and_with_the_watch_it_comes_to_rest(loop):
+    """c is 1.5 / 4 there, below the least of 0.57. While the force rings c is 1.5 again, and only the push stays."""
+    damping = 1.5 * loop.stiffness / 4.0 * loop.total_delay
+    speed = 20.0 / damping
+    bare, calm = (
+        -pressed(loop, damping, 2.5, 20.0, speed, one_side=True, watch=w)[1500:] for w in (None, watched(loop))
+    )
+    assert bare.min() == 0.0 and bare.max() > 50.0  # it leaves the wall and hits it at 2.5 times the push
+    assert calm.min() > 10.0 and calm.max() < 30.0  # what grows again is calmed at a quarter of the push, 5 N
+
+
+@pytest.mark.parametrize("loop", [Loop(), Loop(rate=125, delay=20)])
+@pytest.mark.parametrize("stiffer", [1.0, 4.0])
+def test_the_watch_does_not_make_a_touch_down_harder(loop, stiffer):
+    """When the force is felt the peak is on its way: more damping then changes its rest by at most a tenth."""
+    damping = 1.5 * loop.stiffness / stiffer * loop.total_delay
+    speed = 20.0 / damping
+    bare, calm = (
+        -pressed(loop, damping, 0.3, 20.0, speed, one_side=True, watch=w).min() for w in (None, watched(loop))
+    )
+    assert calm < 1.1 * bare
