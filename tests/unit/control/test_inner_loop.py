@@ -94,6 +94,22 @@ def test_the_bias_is_carried_and_masses_are_looked_at_every_twentieth_tick():
     assert len(asked) == 3
 
 
+@pytest.mark.parametrize("kind", ["position", "velocity"])
+def test_a_joint_that_was_pushed_off_comes_back_as_two_equal_time_constants_say(kind):
+    """e'' + 2 s e' + s^2 e = 0 from rest: e = e_0 (1 + s t) exp(-s t)."""
+    start, mass = np.zeros((1, 1)), 2.0
+    loop = InnerLoop(arm(kind), start, lambda: np.full((1, 1, 1), mass), DT)
+    place, speed, ways = np.full((1, 1), 0.01), np.zeros((1, 1)), []
+    for _ in range(40):
+        torque = loop.torque(start, place, speed, np.zeros((1, 1)))
+        speed = speed + DT * torque / mass
+        place = place + DT * speed
+        ways.append(place[0, 0])
+    late = SERVO * DT * np.arange(1, 41)
+    # a joint's step is of first order: a tick off at the fastest, which is s e_0 / e
+    np.testing.assert_allclose(ways, 0.01 * (1.0 + late) * np.exp(-late), atol=SERVO * DT * 0.01 / np.e)
+
+
 def test_the_filters_step_does_not_depend_on_how_often_the_tick_is_cut():
     """Exact: two ticks of half the length are one tick."""
     from skillframe.control.inner_loop import _exact_step

@@ -149,3 +149,20 @@ def test_a_push_against_a_joint_at_its_end_does_not_wind_up():
         loop._tick(tick)
     assert np.all(drive._joints[0, drive._dofs] <= stop + 1e-9)
     assert np.abs(drive.admittance.twist).max() < 1e-3
+
+
+def test_what_a_velocity_s_integral_is_off_fades_with_a_second():
+    """The arm stands, nothing pushes and nothing is stiff: the integral goes to the joints as exp(-t)."""
+    model = load_model(load_robot("ur5e"))  # six joints, of which none is spare to go home
+    model = replace(model, spec=replace(model.spec, control=KINDS["velocity"]))
+    air = {"start.offset_z": np.array([0.05])}
+    loop = begin(Hold(np.zeros((6, 6))), setup("velocity", model=model), air, generators(1))
+    loop.prepare()
+    drive = loop.drive
+    off = np.array([1.0, -2.0, 3.0, 1.0, -1.0, 2.0]) * 1e-3
+    drive._joints = drive._joints.copy()
+    drive._joints[:, drive._dofs] += off
+    for tick in range(400):
+        loop._tick(tick)
+    left = (drive._joints - drive.limb.joint_positions())[0, drive._dofs]
+    np.testing.assert_allclose(left, off * np.exp(-0.4), atol=2e-5)  # 2 % of the least: what the joints move meanwhile
