@@ -1,4 +1,4 @@
-"""Walls, forearms and tables on four robots, two arms against each other: what passed through ends with both names."""
+"""Walls, forearms and tables on seven robots, two arms against each other: what passed through ends with both names."""
 
 from dataclasses import replace
 
@@ -26,6 +26,9 @@ ROBOTS = {  # world, first body of the arm, elbow, wrist
     "dual_panda": ("dual_peg", "left_joint2", "left_joint4", "left_joint6"),
     "panda_servo": ("free", "joint2", "joint4", "joint6"),
     "hiab_xs031": ("pallets", "lift", "tilt", "extension"),
+    "fr3": ("free", "joint2", "joint4", "joint6"),
+    "kuka_iiwa14": ("free", "joint2", "joint4", "joint6"),
+    "ur5e": ("free", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint"),
 }
 
 
