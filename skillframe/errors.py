@@ -21,6 +21,7 @@ EXTRAS: Mapping[str, str] = {
     "ros": "reading a ROS bag",
     "fmu": "an FMU",
     "crane": "a hydraulic machine",
+    "parts": "a world of mesh files",
 }
 """What each extra of the distribution is for; pyproject.toml says what it installs."""
 LIBRARIES: Mapping[str, tuple[str, str]] = {
@@ -35,6 +36,8 @@ LIBRARIES: Mapping[str, tuple[str, str]] = {
     "fmpy": ("fmpy", "fmu"),
     "lxml": ("lxml", "fmu"),
     "casadi": ("casadi", "crane"),
+    "trimesh": ("trimesh", "parts"),
+    "manifold3d": ("manifold3d", "parts"),
 }
 """By module: the distribution that it comes from, and the first extra that installs that."""
 

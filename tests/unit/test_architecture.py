@@ -22,7 +22,7 @@ FLOORS = [
     {"config", "handover"},
     {"demonstration", "sequence", "robot", "fmu"},
     {"conditioning", "control", "cosim", "world"},
-    {"machine"},
+    {"machine", "parts"},
     {"extend"},
     {"document"},
     {"execution"},

@@ -1,0 +1,194 @@
+"""`fixture.toml` as checked records: which mesh stands, which is held, how they touch, and when they are assembled.
+
+Paths are relative to the file and may not leave its folder, so that a campaign's folder can hold all of it. STL, OBJ,
+PLY and OFF carry no unit, and none is guessed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from skillframe.config import build, read_toml
+from skillframe.errors import InputError
+
+Units = Literal["m", "cm", "mm", "um", "in"]
+SCALES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
+"""Metres per unit of a mesh file."""
+DENSITY = 2700.0
+"""Of the held part where the file gives neither mass nor density [kg/m3]: aluminium."""
+_Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeshPlace:
+    """Where a mesh lies in the frame in which the two parts are assembled.
+
+    Attributes:
+        xyz: of the mesh's origin [m, -100m to 100m].
+        rpy: roll, pitch and yaw about fixed x, y, z [rad, -360deg to 360deg].
+    """
+
+    xyz: _Vector = (0.0, 0.0, 0.0)
+    rpy: _Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FixturePart:
+    """`[fixture]`, the part that stands still.
+
+    Attributes:
+        mesh: its file.
+        units: of the file; GLB has metres.
+        pose: of the mesh; the identity if both parts were exported from one assembly.
+        table: whether it stands on a table, a plane under its lowest point.
+    """
+
+    mesh: str
+    units: Units | None = None
+    pose: MeshPlace = field(default_factory=MeshPlace)
+    table: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HeldPart:
+    """`[tool]`, the part in the robot's grip.
+
+    Attributes:
+        mesh: its file.
+        units: of the file; GLB has metres.
+        assembled: where the mesh is when done.
+        density: of the part in kg/m3 [1 to 30000].
+        mass: of the part, in place of its density [kg, 0.1g to 100kg].
+        tip: point of the assembled part in the frame of `assembled` [m], or "auto": its lowest end, in the middle.
+        grip: from the wrist to the tip [m, 20mm to 1m].
+    """
+
+    mesh: str
+    units: Units | None = None
+    assembled: MeshPlace = field(default_factory=MeshPlace)
+    density: float | None = None
+    mass: float | None = None
+    tip: Literal["auto"] | _Vector = "auto"
+    grip: float = 0.2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactKeys:
+    """`[contact]`.
+
+    Attributes:
+        friction: Coulomb coefficient [0 to 5].
+    """
+
+    friction: float = 0.2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StartKeys:
+    """Where runs start.
+
+    Attributes:
+        above_mouth: height of the tip over the mouth [m, 0m to 200mm].
+    """
+
+    above_mouth: float = 0.001
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SeatedKeys:
+    """How near the assembled pose counts as seated.
+
+    Attributes:
+        height: along the axis [m, 1um to 100mm].
+        sideways: [m, 1um to 100mm].
+        tilt: of the axis [rad, 0.1deg to 90deg].
+    """
+
+    height: float = 0.001
+    sideways: float = 0.002
+    tilt: float = 0.035
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShownKeys:
+    """How a simulated person shows it: from the mouth, tilted about y, then about x.
+
+    Attributes:
+        tilt: at the start [rad, 0deg to 30deg].
+        deep: how far the lowest corner is in the mouth at the start, or less where it does not fit [m, 0m to 50mm].
+    """
+
+    tilt: float = 0.12217304763960307
+    deep: float = 0.0007
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TaskKeys:
+    """`[task]`.
+
+    Attributes:
+        axis: of insertion in the frame of `pose` and `assembled`; "auto" takes the first free of -z, z, -x, x, -y, y.
+        start: where runs start.
+        seated: what counts as done.
+        demonstration: how it is shown.
+    """
+
+    axis: Literal["auto"] | _Vector = (0.0, 0.0, -1.0)
+    start: StartKeys = field(default_factory=StartKeys)
+    seated: SeatedKeys = field(default_factory=SeatedKeys)
+    demonstration: ShownKeys = field(default_factory=ShownKeys)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FixtureFile:
+    """A whole `fixture.toml`.
+
+    Attributes:
+        summary: what it is, for people.
+    """
+
+    fixture: FixturePart
+    tool: HeldPart
+    contact: ContactKeys = field(default_factory=ContactKeys)
+    task: TaskKeys = field(default_factory=TaskKeys)
+    summary: str = ""
+
+
+def read_fixture(path: Path) -> FixtureFile:
+    """A checked fixture file.
+
+    Raises:
+        InputError: a key or value that cannot be used, a mesh without units, or a mesh that is not there.
+    """
+    file = build(FixtureFile, read_toml(path), str(path))
+    for key, part in (("fixture", file.fixture), ("tool", file.tool)):
+        _check_mesh(part, path, key)
+    if file.tool.mass is not None and file.tool.density is not None:
+        raise InputError(f"{path}: tool", "has mass and density", "keep one of the two")
+    if not isinstance(file.task.axis, str) and not any(file.task.axis):
+        raise InputError(f"{path}: task.axis", "is zero", 'give for example [0, 0, -1], or "auto"')
+    return file
+
+
+def _check_mesh(part: FixturePart | HeldPart, path: Path, key: str) -> None:
+    file = path.parent / part.mesh
+    if not file.is_file():
+        raise InputError(f"{path}: {key}.mesh", f"no such file: {part.mesh!r}", "it is relative to the fixture file")
+    if not file.resolve().is_relative_to(path.parent.resolve()):
+        what = f"{part.mesh} lies outside the fixture file's folder"
+        raise InputError(f"{path}: {key}.mesh", what, "put meshes and fixture file into one folder")
+    if part.units is None and file.suffix.lower() != ".glb":
+        what = f"is missing: {part.mesh} does not say what its numbers are"
+        raise InputError(f"{path}: {key}.units", what, 'write for example units = "mm"')
+
+
+def mesh_files(path: Path) -> dict[str, Path]:
+    """The mesh files of a fixture file by the names that it uses.
+
+    Raises:
+        InputError: as `read_fixture`.
+    """
+    file = read_fixture(path)
+    return {name: path.parent / name for name in (file.fixture.mesh, file.tool.mesh)}

@@ -1,0 +1,206 @@
+"""How two parts go together: the way out, the mouth, the depth, and the play along the way, all found from the meshes.
+
+The parts are brought into the *fixture frame*: its origin is the middle of the mouth, z points out of it. Distances are
+the smallest between the two surfaces (`manifold3d`'s `min_gap`, exact for triangles), the held part lifted by steps.
+Overlap is told by its mean thickness, 2 V / A of what the parts have in common.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from skillframe.errors import InputError
+from skillframe.frames import Float, rotation_matrix
+from skillframe.parts.declared import FixtureFile, MeshPlace
+from skillframe.parts.solid import MeshPart, arrays_of
+
+TOUCH = 1e-5
+"""Overlap that is let pass [m]: what a contact sinks by."""
+NEAR = 8e-4
+"""Material this near to the held part, sideways, belongs to the mouth [m]."""
+_STEP, _MOST_STEPS = 5e-4, 160
+_GAPS, _FAR = 24, 5e-3
+_RATIO = 50.0
+Axis = tuple[float, float, float]
+_AXES = ((0, 0, -1), (0, 0, 1), (-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0))
+
+
+class PartsFit(NamedTuple):
+    """Two parts that go together, in the fixture frame [m].
+
+    Attributes:
+        plug: the held part, assembled; socket: the standing one (`manifold3d.Manifold`).
+        depth: from the mouth to the tip of the assembled part.
+        clearance: the median of the smallest distances along the way, (K,) `gaps` at `lifts` above the assembled pose.
+        radius: half the longer side of what goes into the mouth, seen along the axis.
+        turn: (3, 3) from the frame of `pose` and `assembled` to the fixture frame.
+        axis: of insertion in that frame.
+    """
+
+    plug: Any
+    socket: Any
+    depth: float
+    clearance: float
+    gaps: Float
+    lifts: Float
+    radius: float
+    turn: Float
+    axis: Axis
+
+
+def fit(plug: MeshPart, socket: MeshPart, file: FixtureFile) -> PartsFit:
+    """How a held part goes into a standing one.
+
+    Raises:
+        InputError: they overlap, lie apart, are of other scales, or the one cannot leave the other.
+    """
+    _check_scales(plug, socket)
+    one, two = moved(plug.solid, file.tool.assembled), moved(socket.solid, file.fixture.pose)
+    _check_places(plug, socket, one, two)
+    _check_overlap(plug, socket, one, two)
+    turn, axis = _axis(plug, socket, one, two, file)
+    one, two = (_turned(each, turn) for each in (one, two))
+    mouth = _mouth(one, two)
+    tip = _tip(one, mouth, turn, file)
+    one, two = (each.translate([-tip[0], -tip[1], -mouth]) for each in (one, two))
+    depth = float(mouth - tip[2])
+    if depth <= 0.0:
+        what = f"{plug.name} does not go into {socket.name}: nothing of it lies below a mouth"
+        raise InputError("the assembled pose", what, "move [tool] assembled, or give task.axis")
+    lifts: Float = depth * np.arange(1.0, _GAPS + 1.0) / (_GAPS + 1.0)
+    gaps: Float = np.array([_lifted(one, lift).min_gap(two, _FAR) for lift in lifts])
+    inside = np.reshape(one.trim_by_plane([0.0, 0.0, -1.0], 0.0).bounding_box(), (2, 3))
+    radius = 0.5 * float(np.ptp(inside[:, :2], axis=0).max())
+    return PartsFit(one, two, depth, float(np.median(gaps)), gaps, lifts, radius, turn, axis)
+
+
+def moved(solid: Any, place: MeshPlace) -> Any:
+    """A solid placed as a fixture file says."""
+    roll, pitch, yaw = (rotation_matrix(angle * np.eye(3)[k]) for k, angle in enumerate(place.rpy))
+    return _turned(solid, yaw @ pitch @ roll).translate(list(place.xyz))
+
+
+def _turned(solid: Any, rotation: Float) -> Any:
+    return solid.transform(np.column_stack([rotation, np.zeros(3)]))
+
+
+def _lifted(solid: Any, lift: float) -> Any:
+    return solid.translate([0.0, 0.0, float(lift)])
+
+
+def _check_scales(plug: MeshPart, socket: MeshPart) -> None:
+    ratio = plug.size / socket.size
+    if not 1.0 / _RATIO <= ratio <= _RATIO:
+        large, small = (plug, socket) if ratio > 1.0 else (socket, plug)
+        what = f"{large.name} is {max(ratio, 1.0 / ratio):.0f} times as large as {small.name}"
+        raise InputError("the two parts", what, "correct the units of one of them")
+
+
+def _check_places(plug: MeshPart, socket: MeshPart, one: Any, two: Any) -> None:
+    (a, b), (c, d) = (np.reshape(each.bounding_box(), (2, 3)) for each in (one, two))
+    apart = float(np.linalg.norm(np.maximum(0.0, np.maximum(a - d, c - b))))
+    if apart > 0.0:
+        what = f"{plug.name} lies {1000.0 * apart:.3g} mm from {socket.name} in the assembled pose"
+        raise InputError("the assembled pose", what, "export both from one assembly, or set [tool] assembled")
+
+
+def _thickness(common: Any) -> float:
+    """Mean thickness of a solid [m]."""
+    return 0.0 if common.is_empty() else 2.0 * float(common.volume()) / float(common.surface_area())
+
+
+def _check_overlap(plug: MeshPart, socket: MeshPart, one: Any, two: Any) -> None:
+    bodies = (one ^ two).decompose()
+    worst = max(bodies, key=_thickness, default=None)
+    if worst is not None and _thickness(worst) > TOUCH:
+        deep, where = 1000.0 * _thickness(worst), np.reshape(worst.bounding_box(), (2, 3)).mean(axis=0)
+        point = ", ".join(f"{1000.0 * x:.1f}" for x in where)
+        what = f"{plug.name} and {socket.name} overlap by {deep:.2g} mm at ({point}) mm"
+        more = f"{deep / (1000.0 * TOUCH):.0f} times what is let pass; move [tool] assembled (press fits are refused)"
+        raise InputError("the assembled pose", what, more)
+
+
+def _axis(
+    plug: MeshPart, socket: MeshPart, one: Any, two: Any, file: FixtureFile
+) -> tuple[Float, tuple[float, float, float]]:
+    """The turn that lets the axis point down, of the axis that is given or of the first that is free."""
+    given = file.task.axis
+    blocked = []
+    for axis in _AXES if given == "auto" else (given,):
+        along = np.array(axis, dtype=float) / np.linalg.norm(axis)
+        turn = _down(along)
+        stands = _in_the_way(_turned(one, turn), _turned(two, turn))
+        if stands is None:
+            return turn, (float(along[0]), float(along[1]), float(along[2]))
+        blocked.append((along, *stands))
+    along, deep, lift = max(blocked, key=lambda each: each[2])
+    out = ", ".join(f"{-x + 0.0:g}" for x in along)
+    what = f"{plug.name} cannot leave {socket.name} along ({out}): {1000.0 * deep:.2g} mm of it stand in the way "
+    what += f"at {1000.0 * lift:.3g} mm of lift"
+    fix = "such parts need more than one straight motion" if given == "auto" else 'give another axis, or "auto"'
+    raise InputError("task.axis", what, fix)
+
+
+def _down(axis: Float) -> Float:
+    """The smallest rotation (3, 3) that turns a unit vector to -z."""
+    down = np.array([0.0, 0.0, -1.0])
+    if float(axis @ down) < -1.0 + 1e-12:
+        return rotation_matrix(np.array([np.pi, 0.0, 0.0]))
+    turn = np.cross(axis, down)
+    size = float(np.linalg.norm(turn))
+    return rotation_matrix(turn * (np.arctan2(size, float(axis @ down)) / size)) if size > 0.0 else np.eye(3)
+
+
+def _in_the_way(plug: Any, socket: Any) -> tuple[float, float] | None:
+    """How thick what stands in the way is, and at which lift [m], or None if the held part comes out."""
+    whole = float(socket.bounding_box()[5] - plug.bounding_box()[2])
+    count = int(np.clip(np.ceil(whole / _STEP), 8, _MOST_STEPS))
+    for lift in whole * (np.arange(count) + 1.0) / count if whole > 0.0 else ():
+        here = _lifted(plug, lift)
+        if here.min_gap(socket, TOUCH) < TOUCH and (deep := _thickness(here ^ socket)) > TOUCH:
+            return deep, float(lift)
+    return None
+
+
+def _mouth(plug: Any, socket: Any) -> float:
+    """Height of the mouth: the highest point of the standing part near the held part's shadow.
+
+    Near is `NEAR`, or twice, four or eight times that where nothing is so near above the held part's lowest end.
+    """
+    low, high, tip = (float(solid.bounding_box()[k]) for solid, k in ((socket, 2), (socket, 5), (plug, 2)))
+    for near in NEAR * np.array([1.0, 2.0, 4.0, 8.0]):
+        shadow = plug.project().offset(float(near)).extrude(high - low + 2.0 * NEAR).translate([0.0, 0.0, low - NEAR])
+        beside = shadow ^ socket
+        if not beside.is_empty() and (top := float(beside.bounding_box()[5])) > tip + NEAR:
+            return top
+    return tip
+
+
+def _tip(plug: Any, mouth: float, turn: Float, file: FixtureFile) -> Float:
+    """The tip (3,) of the assembled part, after the turn."""
+    if file.tool.tip != "auto":
+        return np.asarray(turn @ np.array(file.tool.tip), dtype=float)
+    low = float(plug.bounding_box()[2])
+    inside = plug.trim_by_plane([0.0, 0.0, -1.0], -mouth) if low < mouth else plug
+    middle = np.reshape(inside.bounding_box(), (2, 3)).mean(axis=0)
+    return np.array([middle[0], middle[1], low])
+
+
+def tilted(fit: PartsFit, tilt: Float, tip: Float) -> Any:
+    """The held part with its tip at a point (3,) and turned about it by a rotation vector (3,)."""
+    at_tip = fit.plug.translate([0.0, 0.0, fit.depth])
+    return _turned(at_tip, rotation_matrix(tilt)).translate([float(x) for x in tip])
+
+
+def lowest(points: Float, tilt: Float) -> Float:
+    """Height of the lowest of points (P, 3) relative to the tip for rotation vectors (N, 3), (N,) [m]."""
+    found: Float = (rotation_matrix(tilt)[:, 2] @ points.T).min(axis=1)
+    return found
+
+
+def corners(fit: PartsFit) -> Float:
+    """The corners (P, 3) of the held part's hull relative to its tip [m]."""
+    found: Float = arrays_of(fit.plug.hull())[0] + np.array([0.0, 0.0, fit.depth])
+    return found

@@ -1,0 +1,163 @@
+"""A fixture file loaded: its parts, how they go together, and what they collide with. Kept while unchanged."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from skillframe.frames import Float
+from skillframe.parts.checks import (
+    HEAVY,
+    SHARE,
+    check_clearance,
+    check_facets,
+    check_pieces,
+    check_walls,
+)
+from skillframe.parts.declared import DENSITY, FixtureFile, mesh_files, read_fixture
+from skillframe.parts.fit import PartsFit, corners, fit, lowest, tilted
+from skillframe.parts.pieces import MOST_PIECES, ConvexPieces, pieces_of
+from skillframe.parts.solid import MeshPart, arrays_of, read_part
+
+SIDEWAYS = 6e-3
+"""How far beside the held part a cropped standing part is still touched [m]."""
+_ABOVE = 2e-3
+_FREE = 1e-5
+_TRIES = (1.0, 0.75, 0.5, 0.25, 0.0)
+
+
+class CutPart(NamedTuple):
+    """A part as it collides and is drawn.
+
+    Attributes:
+        pieces: what it collides with, in the fixture frame, assembled.
+        rest: the solid that is only drawn, because the other part cannot come there; None if all of it collides.
+    """
+
+    pieces: ConvexPieces
+    rest: Any
+
+
+class LoadedParts(NamedTuple):
+    """Everything that a fixture file and its meshes say.
+
+    Attributes:
+        name: for people.
+        file: as declared; fit: as found.
+        plug, socket: as they collide.
+        mass: of the held part [kg]; center: (3,) of its mass, inertia: (3,) about it, in fixture axes from its tip.
+        starts: the tip's height above the mouth [m] and the tilt (3,) [rad] of each demonstration.
+        notes: sentences that people should read.
+        hashes: SHA-256 of the file and its meshes.
+    """
+
+    name: str
+    file: FixtureFile
+    fit: PartsFit
+    plug: CutPart
+    socket: CutPart
+    mass: float
+    center: Float
+    inertia: Float
+    starts: tuple[tuple[float, Float], ...]
+    notes: tuple[str, ...]
+    hashes: Mapping[str, str]
+
+
+def name_of(path: Path) -> str:
+    """What a world of a file is called: the file's stem, or its folder where the file is called fixture.toml."""
+    return path.resolve().parent.name if path.name == "fixture.toml" else path.stem
+
+
+def load(path: Path) -> LoadedParts:
+    """A fixture file and its meshes, checked.
+
+    Raises:
+        InputError: what is wrong, and in which file.
+        MissingDependency: the extra `parts` is not installed.
+    """
+    hashes = {name: _digest(file) for name, file in {path.name: path, **mesh_files(path)}.items()}
+    return _load(path, tuple(hashes.items()))
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+@lru_cache(maxsize=8)
+def _load(path: Path, hashes: tuple[tuple[str, str], ...]) -> LoadedParts:
+    file = read_fixture(path)
+    plug, socket = (read_part(path.parent / each.mesh, each.units) for each in (file.tool, file.fixture))
+    found = fit(plug, socket, file)
+    check_clearance(found)
+    check_facets(found, plug, socket)
+    check_walls(found, plug, socket)
+    held, standing = (_side(part, solid, found) for part, solid in ((plug, found.plug), (socket, found.socket)))
+    mass, center, inertia, notes = _inertia(found, plug, file)
+    return LoadedParts(
+        name_of(path), file, found, held, standing, mass, center, inertia, _starts(found, file),
+        (*plug.notes, *socket.notes, *notes), dict(hashes),
+    )  # fmt: skip
+
+
+def _side(part: MeshPart, solid: Any, found: PartsFit) -> CutPart:
+    """The pieces of a whole part, or, where they are too many, of what the other part can reach of it."""
+    allowed = SHARE * found.clearance
+    pieces, rest = pieces_of(solid, allowed), None
+    if not 0 < len(pieces.hulls) <= MOST_PIECES:
+        box = _reach(found)
+        near = solid ^ box
+        if not near.is_empty() and near.volume() < 0.999 * solid.volume():
+            pieces, rest = pieces_of(near, allowed), solid - box
+    check_pieces(pieces, found, part)
+    return CutPart(pieces, rest)
+
+
+def _reach(found: PartsFit) -> Any:
+    """Where the parts can meet, as a solid in the fixture frame: around the held part, below the standing one's top."""
+    import manifold3d
+
+    plug, socket = (np.reshape(each.bounding_box(), (2, 3)) for each in (found.plug, found.socket))
+    low = np.maximum(plug[0], socket[0]) - SIDEWAYS
+    high = np.minimum(plug[1], socket[1]) + SIDEWAYS
+    high[2] = socket[1, 2] + _ABOVE
+    return manifold3d.Manifold.cube([float(x) for x in high - low]).translate([float(x) for x in low])
+
+
+def _inertia(found: PartsFit, plug: MeshPart, file: FixtureFile) -> tuple[float, Float, Float, tuple[str, ...]]:
+    """Mass, centre and moments of inertia of the held part from its mesh, and what is to be said of it."""
+    import trimesh
+
+    vertices, faces = arrays_of(found.plug)
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    density = DENSITY if file.tool.density is None else file.tool.density
+    mass = float(mesh.volume) * density if file.tool.mass is None else file.tool.mass
+    inertia = np.diag(mesh.moment_inertia) * (mass / float(mesh.volume))
+    notes = []
+    if file.tool.mass is None and mass > HEAVY:
+        notes.append(f"{plug.name} weighs {mass:.2g} kg at {density:g} kg/m3; a hollow part? give mass")
+    return mass, np.asarray(mesh.center_mass) + np.array([0.0, 0.0, found.depth]), inertia, tuple(notes)
+
+
+def _starts(found: PartsFit, file: FixtureFile) -> tuple[tuple[float, Float], ...]:
+    """Heights of the tip and tilts from which it is shown: tilted about y, then about x, as deep as it fits.
+
+    Where the tilted part does not fit into the mouth with its lowest corner that deep, it is a quarter less, and so on.
+    """
+    shown, starts, points = file.task.demonstration, [], corners(found)
+    for axis in (1, 0):
+        tilt = shown.tilt * np.eye(3)[axis]
+        lift = -float(lowest(points, tilt[None])[0])
+        heights = [lift - share * min(shown.deep, found.depth) for share in _TRIES]
+        free = [h for h in heights if _is_free(found, tilt, h)]
+        starts.append((free[0] if free else lift + file.task.start.above_mouth, tilt))
+    return tuple(starts)
+
+
+def _is_free(found: PartsFit, tilt: Float, height: float) -> bool:
+    return bool(tilted(found, tilt, np.array([0.0, 0.0, height])).min_gap(found.socket, _FREE) >= _FREE)

@@ -1,0 +1,223 @@
+"""A mesh file as a closed solid in metres, or one sentence that says why it is none.
+
+Triangles are counted edge by edge: in a closed surface every edge is run through once each way. Bodies that overlap are
+united, a body inside another that is turned inwards is a cavity. trimesh reads the formats, manifold3d unites.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.errors import InputError, need
+from skillframe.frames import Float, cross
+from skillframe.parts.declared import SCALES
+from skillframe.robot.meshes import LARGEST_FILE
+
+FORMATS = (".stl", ".obj", ".ply", ".off", ".glb")
+SMALLEST, LARGEST = 1e-3, 2.0
+"""Sizes of parts that are believed [m]."""
+MOST_TRIANGLES, THINNED_BY = 40_000, 2e-6
+_SAME = 1e-6  # of the size: vertices that are nearer are one
+_CHANGED = 0.01
+Faces = NDArray[np.int64]
+
+
+class MeshPart(NamedTuple):
+    """A part.
+
+    Attributes:
+        name: its file's, for messages.
+        solid: a `manifold3d.Manifold` in the file's frame [m].
+        notes: sentences on what was done to it.
+        sha256: of the file.
+    """
+
+    name: str
+    solid: Any
+    notes: tuple[str, ...]
+    sha256: str
+
+    @property
+    def size(self) -> float:
+        """Its largest extent along an axis of its file [m]."""
+        return float(np.ptp(np.reshape(self.solid.bounding_box(), (2, 3)), axis=0).max())
+
+
+def read_part(path: Path, units: str | None) -> MeshPart:
+    """A part from its mesh file.
+
+    Args:
+        path: STL, OBJ, PLY, OFF or GLB.
+        units: of its numbers; None for metres.
+
+    Raises:
+        MissingDependency: the extra `parts` is not installed.
+        InputError: it cannot be read, is not closed, or has a size that no part has.
+    """
+    need("trimesh")
+    need("manifold3d")
+    raw = _content(path)
+    vertices, faces = _triangles(raw, path)
+    _check_numbers(vertices, faces, path)
+    _check_size(vertices, units or "m", path)
+    vertices, faces = _merged(vertices * SCALES[units or "m"], faces)
+    _check_closed(vertices, faces, path)
+    solid, notes = _united(vertices, faces, path)
+    if solid.num_tri() > MOST_TRIANGLES:
+        before, solid = solid.num_tri(), solid.simplify(THINNED_BY)
+        kept = f"{path.name} has {before:,} triangles; {solid.num_tri():,} are kept within {THINNED_BY * 1e6:g} um"
+        notes = (*notes, kept)
+    return MeshPart(path.name, solid, notes, hashlib.sha256(raw).hexdigest())
+
+
+def arrays_of(solid: Any) -> tuple[Float, Faces]:
+    """Vertices (V, 3) [m] and triangles (F, 3) of a solid."""
+    mesh = solid.to_mesh64()
+    return np.array(mesh.vert_properties[:, :3], dtype=float), np.array(mesh.tri_verts, dtype=np.int64)
+
+
+def solid_of(vertices: Float, faces: Faces) -> Any:
+    """A `manifold3d.Manifold` of a closed mesh."""
+    import manifold3d
+
+    points = np.ascontiguousarray(vertices, dtype=np.float64)
+    return manifold3d.Manifold(
+        manifold3d.Mesh64(vert_properties=points, tri_verts=np.ascontiguousarray(faces, dtype=np.uint64))
+    )
+
+
+def united(solids: Sequence[Any]) -> Any:
+    """The union of solids."""
+    import manifold3d
+
+    return manifold3d.Manifold.batch_boolean(list(solids), manifold3d.OpType.Add)
+
+
+def _content(path: Path) -> bytes:
+    ending = path.suffix.lower()
+    if ending in (".step", ".stp"):
+        raise InputError(
+            path, "is a STEP file, which is not read", "export it as STL, with a finer tolerance than the play"
+        )
+    if ending not in FORMATS:
+        raise InputError(path, f"is no mesh that is read (there are: {', '.join(FORMATS)})", "export it as STL")
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise InputError(path, f"is larger than {LARGEST_FILE / 1e6:g} MB", "export it coarser")
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(path, f"cannot be read ({error.strerror or error})", "check the path") from None
+
+
+def _triangles(raw: bytes, path: Path) -> tuple[Float, Faces]:
+    import trimesh
+
+    kind = path.suffix.lower().removeprefix(".")
+    try:
+        mesh = trimesh.load(io.BytesIO(raw), file_type=kind, force="mesh", process=False)
+        vertices, faces = np.array(mesh.vertices, dtype=float), np.array(mesh.faces, dtype=np.int64)
+    except Exception as error:  # its readers raise whatever they stumble on
+        said = f" ({' '.join(str(error).split())[:120]})" if str(error) else ""
+        raise InputError(path, f"cannot be read as {kind.upper()}{said}", "export it again") from None
+    return vertices.reshape(-1, 3), faces.reshape(-1, 3)
+
+
+def _check_numbers(vertices: Float, faces: Faces, path: Path) -> None:
+    if not len(faces):
+        raise InputError(path, "is empty: it holds no triangle", "export it again")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise InputError(path, "has triangles of vertices that it does not have", "export it again")
+    if bad := int(np.sum(~np.isfinite(vertices).all(axis=1))):
+        raise InputError(path, f"holds {bad} vertices that are not finite numbers", "export it again")
+
+
+def _check_size(vertices: Float, units: str, path: Path) -> None:
+    extent = float(np.ptp(vertices, axis=0).max())
+    size = extent * SCALES[units]
+    if SMALLEST <= size <= LARGEST:
+        return
+    likely = [word for word in ("mm", "m", "cm", "in", "um") if SMALLEST <= extent * SCALES[word] <= LARGEST]
+    fix = f'say units = "{likely[0]}"' if likely else "check what it was exported as"
+    raise InputError(path, f"is {size:.3g} m long in {units}, and a part is 1 mm to 2 m", fix)
+
+
+def _merged(vertices: Float, faces: Faces) -> tuple[Float, Faces]:
+    """Vertices that are one as one. Triangles without an area are left out."""
+    grid = _SAME * float(np.ptp(vertices, axis=0).max())
+    _, first, same = np.unique(np.round(vertices / grid), axis=0, return_index=True, return_inverse=True)
+    faces = same.reshape(-1)[faces]
+    whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    return vertices[first], faces[whole]
+
+
+def _check_closed(vertices: Float, faces: Faces, path: Path) -> None:
+    ways = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    edges, number = np.unique(np.sort(ways, axis=1), axis=0, return_inverse=True)
+    forward = np.bincount(number.reshape(-1), weights=np.where(ways[:, 0] < ways[:, 1], 1, -1), minlength=len(edges))
+    odd = np.bincount(number.reshape(-1), minlength=len(edges)) % 2 == 1
+    if odd.any():
+        where = _mm(vertices[edges[odd][0]].mean(axis=0))
+        what = f"has {int(odd.sum())} open edges, one near {where} mm: what is inside cannot be told"
+        raise InputError(path, what, "close it where it was drawn")
+    if (forward != 0).any():
+        where = _mm(vertices[edges[forward != 0][0]].mean(axis=0))
+        what = (
+            f"has triangles turned against their neighbours at {int((forward != 0).sum())} edges, one near {where} mm"
+        )
+        raise InputError(path, what, "let its normals point outwards where it was drawn")
+
+
+def _united(vertices: Float, faces: Faces, path: Path) -> tuple[Any, tuple[str, ...]]:
+    """One solid out of all bodies of a mesh, and what had to be done for it."""
+    notes = []
+    bodies = _bodies(vertices, faces)
+    volumes = [_volume(vertices, body) for body in bodies]
+    if sum(volumes) < 0.0:
+        notes.append(f"{path.name} is inside out (volume {sum(volumes) * 1e6:.3g} cm3); its triangles were turned")
+        bodies, volumes = [body[:, ::-1] for body in bodies], [-each for each in volumes]
+    full = [_checked(vertices, body, path) for body, volume in zip(bodies, volumes, strict=True) if volume > 0.0]
+    voids = [_checked(vertices, body[:, ::-1], path) for body, v in zip(bodies, volumes, strict=True) if v < 0.0]
+    if not full:
+        raise InputError(path, "has no volume", "export a solid body, not a surface")
+    solid = united(full)
+    if len(full) > 1:
+        lost = 1.0 - solid.volume() / sum(each for each in volumes if each > 0.0)
+        more = f" ({100.0 * lost:.2g} % of their volume was counted twice)" if lost > _CHANGED else ""
+        notes.append(f"{path.name} consists of {len(full)} bodies; overlapping ones were united{more}")
+    return (solid - united(voids) if voids else solid), tuple(notes)
+
+
+def _bodies(vertices: Float, faces: Faces) -> list[Faces]:
+    """The triangles of each connected body."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    a, b = faces[:, [0, 1]].T, faces[:, [1, 2]].T
+    links = coo_matrix((np.ones(2 * len(faces)), np.concatenate([a, b], axis=1)), shape=[len(vertices)] * 2)
+    count, label = connected_components(links, directed=False)
+    of_face = label[faces[:, 0]]
+    return [faces[of_face == k] for k in range(count) if (of_face == k).any()]
+
+
+def _volume(vertices: Float, faces: Faces) -> float:
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return float(np.sum(a * cross(b, c))) / 6.0
+
+
+def _checked(vertices: Float, faces: Faces, path: Path) -> Any:
+    used, faces = np.unique(faces, return_inverse=True)
+    solid = solid_of(vertices[used], faces.reshape(-1, 3))
+    if solid.status().name != "NoError" or solid.is_empty():
+        raise InputError(path, f"is no solid ({solid.status().name})", "repair it where it was drawn")
+    return solid
+
+
+def _mm(point: Any) -> str:
+    return "(" + ", ".join(f"{1000.0 * float(x):.1f}" for x in point) + ")"
