@@ -89,7 +89,9 @@ class ValveIdentification:
 
     Attributes:
         overlap, overlap_deviation: (N, k) found, share of the travel. lag: (N, k) [s].
+        ratio: (N, k) flow that was found over the rated one.
         supply, supply_deviation: (N, k) found [Pa], within `reach`; supply_found: (N, k) wherever it is.
+        supply_moved: (N, k) how far the last fit went from the one before [Pa].
     """
 
     def __init__(self, cylinders: Cylinders, count: int, dt: float, settings: ValveSettings | None = None) -> None:
@@ -110,9 +112,11 @@ class ValveIdentification:
         self._before: tuple[Float, Float] | None = None
         self.overlap, self.supply = (np.tile(x, (self._shape[0], 1)) for x in (c.deadband, c.supply_pressure))
         self.supply_found: Float = self.supply
+        self.supply_moved: Float = np.zeros(self._shape)
         self.overlap_deviation: Float = np.full(self._shape, s.overlap)
         self.supply_deviation: Float = np.full(self._shape, s.supply)
         self.lag: Float = np.zeros(self._shape)
+        self.ratio: Float = np.ones(self._shape)
 
     @property
     def compensated(self) -> Float:
@@ -166,7 +170,8 @@ class ValveIdentification:
         weight = n / (s.alike * spread)
         mean = weight * off / rows / (weight + 1.0 / s.supply**2)
         self.supply_found = nominal + mean
-        self.supply = nominal * np.clip(1.0 + mean / nominal, 1.0 - s.reach, 1.0 + s.reach)
+        before, self.supply = self.supply, nominal * np.clip(1.0 + mean / nominal, 1.0 - s.reach, 1.0 + s.reach)
+        self.supply_moved = np.abs(self.supply - before)
         self.supply_deviation = 1.0 / np.sqrt(weight + 1.0 / s.supply**2)
 
     def _solve_overlap(self) -> None:
@@ -181,6 +186,7 @@ class ValveIdentification:
         determinant = h11 * h22 - h12 * h12
         alpha, beta = (h22 * g1 - h12 * g2) / determinant, (h11 * g2 - h12 * g1) / determinant
         self.overlap, self.overlap_deviation = beta / alpha, np.sqrt(h11 / determinant)
+        self.ratio = alpha - beta
         self.lag = best[0] * self._slice * self._dt
 
     def _left(self) -> Float:

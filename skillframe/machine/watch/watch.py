@@ -14,7 +14,7 @@ from skillframe.machine.law.hydraulic import Measured, Reference, Terms
 from skillframe.machine.law.hydraulic_compiled import CompiledLaw
 from skillframe.machine.law.vdc_actuator import Cylinders
 from skillframe.machine.sensors import RECENT, MachineSensors
-from skillframe.machine.watch.flow import FlowWatch, Knowledge
+from skillframe.machine.watch.flow import FlowWatch, knowledge
 from skillframe.machine.watch.readings import ReadingWatch, Suspicion
 from skillframe.machine.watch.tool import ToolWatch
 from skillframe.robot.driven import MachineNoise
@@ -40,7 +40,9 @@ class MachineWatch:
         speed = chain.minimal(chain.model.velocityLimit)
         names = (tuple(chain.independent), tuple(chain.actuated))
         self._readings = ReadingWatch(noise, speed, cylinders.return_pressure, moved, names, dt)
-        self._flow = FlowWatch(cylinders, names[1], count, period)
+        # white noise behind w^2 / (s + w)^2 has a variance w dt / 4 times as large
+        filtered = noise.encoder * float(np.sqrt(0.5 * np.pi * noise.corner_hz * dt))
+        self._flow = FlowWatch(cylinders, names[1], count, period, filtered)
         self._tool = ToolWatch(count, period)
         self._told: Float = np.zeros((count, len(names[1])))
 
@@ -71,8 +73,8 @@ class MachineWatch:
         raw = np.concatenate([last[turn:], last[:turn]])
         found = self._readings.look(raw, self._gauges.chambers, terms.piston_rate)
         if due:
-            knowledge = Knowledge(self._law.supply, self._law.deadband, self._valves.supply_deviation)
-            found += self._flow.look(self._told / RECENT, seen, terms, knowledge, swing)
+            known = knowledge(self._law, self._valves)
+            found += self._flow.look(self._told / RECENT, seen, terms, known, swing)
             if not swing:  # a machine that swings by itself there is told so at its end, with what to lower
                 found += self._tool.look(terms.tip_rate, reference.position - terms.tip, seen.force, reference)
             self._told[:] = 0.0
