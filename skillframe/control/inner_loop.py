@@ -20,6 +20,8 @@ from skillframe.robot.interface import LOOP_DAMPING, SERVO, Admittance
 
 REFRESH = 20
 """Ticks between two mass matrices: an arm hardly turns in 20 ms."""
+LATE, STIFF = 2.0 * SERVO, SERVO**2
+"""2 s and s^2."""
 
 
 class InnerLoop:
@@ -34,7 +36,9 @@ class InnerLoop:
 
     def __init__(self, arm: Admittance, start: Float, mass_matrix: Callable[[], Float], dt: float) -> None:
         self._of_position = arm.kind == "position"
-        self._bandwidth, self._mass_matrix = arm.bandwidth, mass_matrix
+        w, self._mass_matrix = arm.bandwidth, mass_matrix
+        # of (1): q_f'' and the servo's share in q_f' together
+        self._back, self._fade = (-w * w, LATE - 2.0 * LOOP_DAMPING * w) if self._of_position else (w, LATE - w)
         self._place, self._speed = start.copy(), np.zeros_like(start)
         still = start if self._of_position else self._speed
         self._line = np.tile(still, (arm.delay_ticks + 1, 1, 1))
@@ -56,25 +60,24 @@ class InnerLoop:
             self._mass = self._mass_matrix()
         self._tick += 1
         heard = self._line[self._tick % length]  # the oldest: sent `delay_ticks` ago
-        w, late = self._bandwidth, 2.0 * SERVO
+        off = self._place - heard
         if self._of_position:
-            rate = w * w * (heard - self._place) - 2.0 * LOOP_DAMPING * w * self._speed
+            rate = self._back * off + self._fade * self._speed
         else:
-            rate = w * (heard - self._speed)
-        asked = rate + late * (self._speed - velocity) + SERVO**2 * (self._place - position)
+            rate = self._back * heard + self._fade * self._speed
+        asked = rate - LATE * velocity + STIFF * (self._place - position)
         torque: Float = (self._mass @ asked[..., None])[..., 0] + bias
-        self._move(heard)
+        self._move(heard, off)
         return torque
 
-    def _move(self, heard: Float) -> None:
+    def _move(self, heard: Float, off: Float) -> None:
         """The filter a tick on."""
         (a, b, u), (c, d, v) = self._step
+        speed = self._speed
         if self._of_position:
-            off, self_speed = self._place - heard, self._speed
-            self._place, self._speed = heard + a * off + b * self_speed, c * off + d * self_speed
+            self._place, self._speed = heard + a * off + b * speed, c * off + d * speed
         else:
-            self._place = self._place + b * self._speed + u * heard
-            self._speed = d * self._speed + v * heard
+            self._place, self._speed = self._place + b * speed + u * heard, d * speed + v * heard
 
 
 def _exact_step(arm: Admittance, dt: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:

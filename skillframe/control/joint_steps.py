@@ -84,7 +84,7 @@ class JointSteps:
         ahead = command - measured
         far = np.abs(ahead) > self._leash
         if np.count_nonzero(far):
-            speed[(far & (ahead * speed > 0.0)).any(-1)] = 0.0
+            speed = np.where((far & (ahead * speed > 0.0)).any(-1)[:, None], 0.0, speed)
         return speed, (jacobian @ speed[..., None])[..., 0]
 
     def _inverted(self, scaled: Float) -> Float:
@@ -96,8 +96,10 @@ class JointSteps:
 
     def _held_to_speed(self, speed: Float) -> Float:
         """Rows scaled so that no joint is above its limit."""
-        share = (np.abs(speed) / self._limits.velocity).max(-1)
-        result: Float = speed / np.maximum(share, 1.0)[:, None]
+        share = np.abs(speed) / self._limits.velocity
+        if share.max() <= 1.0:
+            return speed
+        result: Float = speed / np.maximum(share.max(-1), 1.0)[:, None]
         return result
 
     def _at_end(self, command: Float, speed: Float) -> NDArray[np.bool_]:

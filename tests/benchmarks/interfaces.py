@@ -7,6 +7,8 @@ import numpy as np
 
 from skillframe.execution.executor import begin
 from skillframe.robot.interface import Control
+from skillframe.world.sensors import SensorSettings
+from tests.benchmarks.timing import timed_run
 from tests.laws.pushing import Push, impedance
 from tests.laws.runs import generators, setup
 
@@ -34,6 +36,20 @@ def ratios(show, counts=(1, 96)):
         for name, value in least.items():
             bound = BOUND if name.startswith("position") else None
             show(f"a tick of {count}, {name}, over torque ({1e6 * value:.0f} us)", value / least["torque"], "x", bound)
+
+
+def real_time(show, bound=6.0):
+    """One run of the UR5e told positions, with the peg and a rather fine trace, in contact for nearly all of it."""
+    setting = replace(setup("ur5e_position", "peg_in_hole"), sensors=SensorSettings())
+    skill, tilt = (
+        Push((0.0, 0.0, -1.0), impedance("x", "y"), speed=0.02, stall=False),
+        {"start.tilt_y": np.array([0.1])},
+    )
+    cpu, _, result = timed_run(skill, setting, tilt, 1, 2.0)
+    touching = 100 * np.mean(np.abs(result.traces[0].wrench_true[:, :3]).sum(-1) > 0.0)
+    pace = setting.robot.spec.control.pace  # the loop tells of its progress by the skill's clock
+    what = f"UR5e told positions, one run, in contact {touching:.0f} % of the time: real time"
+    show(what, pace / cpu, "x", bound, below=False)
 
 
 def _loop(control, count):

@@ -224,6 +224,7 @@ def main():
     single("arm with the peg", 4.0)
     two_arms()
     interfaces.ratios(show)
+    interfaces.real_time(show)
     crane.rows(show)
     segmenter.measure(show)
     memory()

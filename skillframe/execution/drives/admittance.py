@@ -29,6 +29,9 @@ from skillframe.world.plant import Draws, Kinematics, Plant
 BLEED = 1.0
 """[1/s] at which a velocity's integral follows the measured joints: errors of the arm's loop do not pile up (ours)."""
 
+SKEW = skew(np.eye(3)).reshape(3, 9)
+"""Of the unit vectors: a sum of them is exact in any order."""
+
 
 class AdmittanceDrive(TorqueDrive):
     """One arm told velocities or positions.
@@ -46,6 +49,7 @@ class AdmittanceDrive(TorqueDrive):
         self.arm, self._pace = setup.robot.spec.control.admittance, setup.robot.spec.control.pace
         self._limits = _range(setup, self.plant)
         self._dofs, self._dt_command = self.plant.dofs, self.arm.ticks * self.dt
+        self._all = np.array_equal(self._dofs, np.arange(self.limb.joint_positions().shape[1]))
         self._lever = float(norm(np.array(setup.scene.tool.frames["tip"]) - limb.point))
         self._begin()
 
@@ -89,13 +93,21 @@ class AdmittanceDrive(TorqueDrive):
         pose = moved(self._tool.at(self.limb.point), jacobian, joints - measured)
         self._law = law.step(paced, pose, self._wrench, ramp)
         speed, law.twist = self._steps.velocities(law.twist, jacobian, joints, measured)
-        self._joints = self._joints.copy()
-        self._joints[:, dofs] = joints + self._dt_command * speed
-        self._sent = self._joints
+        step = self._dt_command * speed
         if self.arm.kind == "velocity":
-            self._joints[:, dofs] += (self._dt_command * BLEED) * (measured - joints)
-            self._sent = np.zeros_like(self._joints)
-            self._sent[:, dofs] = speed
+            step += (self._dt_command * BLEED) * (measured - joints)
+            self._sent = self._spread(np.zeros_like(self._joints), speed)
+        self._joints = self._spread(self._joints, joints + step)
+        if self.arm.kind == "position":
+            self._sent = self._joints
+
+    def _spread(self, whole: Float, part: Float) -> Float:
+        """Joints (N, nv), those of the arm replaced by (N, n)."""
+        if self._all:
+            return part
+        whole = whole.copy()
+        whole[:, self._dofs] = part
+        return whole
 
     def _read(self, kinematics: Kinematics, measured: Pose) -> Reading:
         self._tool = kinematics.pose
@@ -112,7 +124,7 @@ class AdmittanceDrive(TorqueDrive):
 def moved(pose: Pose, jacobian: Float, step: Float) -> Pose:
     """A pose after small steps (N, n) of the joints, by their Jacobian: a lag of 1 mrad bends it by less than 1 um."""
     way = (jacobian @ step[..., None])[..., 0]
-    turn = skew(way[:, 3:])  # 1 + K + K^2 / 2: exact to 1e-10 for milliradians
+    turn = (way[:, 3:] @ SKEW).reshape(-1, 3, 3)  # 1 + K + K^2 / 2: exact to 1e-10 for milliradians
     rotation = pose.rotation + turn @ (pose.rotation + 0.5 * (turn @ pose.rotation))
     return Pose(pose.position + way[:, :3], rotation)
 
