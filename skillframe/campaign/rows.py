@@ -24,10 +24,13 @@ MEASURES = ("duration_s", "peak_force_n", "final_error_m", "final_error_rad")
 OUTCOME = ("success", "failure", *MEASURES)
 JUDGED_MEASURES = (
     "peak_force_filtered_n", "peak_torque_share", "peak_speed_share", "peak_force_10ms_n", "peak_range_share",
+    "distance_to_collision_m",
 )  # fmt: skip
 ENDS = ("goal_reached", "ended_itself")
 """The two halves of an end: the goal held, and the skill itself ended the trial."""
-JUDGED = (*JUDGED_MEASURES[:3], "ended_by", *JUDGED_MEASURES[3:], *SHARE_JOINTS, *ENDS)
+JUDGED = (
+    *JUDGED_MEASURES[:3], "ended_by", *JUDGED_MEASURES[3:5], *SHARE_JOINTS, *ENDS, *JUDGED_MEASURES[5:],
+)  # fmt: skip
 """What came after version 0.1: what the estimate read, what motors were asked for, and what ended the trial."""
 EXTRA = ("status", "reason")
 TRUTH = {"1": True, "true": True, "1.0": True, "0": False, "false": False, "0.0": False}

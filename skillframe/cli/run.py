@@ -17,6 +17,7 @@ from skillframe.cli.output import note, quiet_option
 from skillframe.config.of_runs import DURATION, TRACE_RATE
 
 FORCES = ("peak_force_filtered_n", "peak_force_10ms_n", "ended_by", "goal_reached", "ended_itself")
+APART = "distance_to_collision_m"
 QUIET_S = 5.0  # a run that is over by then needs no progress
 
 
@@ -132,7 +133,7 @@ def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) ->
 
     keys = ["success", "failure", "reason", "duration_s", "peak_force_n", "final_error_m", "final_error_rad"]
     outcome = {key: _known(meta[key]) for key in keys}
-    judged = {key: _known(meta[key]) for key in (*FORCES, *SHARES, *SHARE_JOINTS)}
+    judged = {key: _known(meta[key]) for key in (*FORCES, *SHARES, *SHARE_JOINTS, APART)}
     notes = list(meta.get("notes") or [])
     for text in notes:
         note(f"note: {text}")

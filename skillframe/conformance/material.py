@@ -98,6 +98,7 @@ def _outcome(success: bool, duration_s: float, force: float) -> dict[str, Any]:
         "peak_torque_share": 0.3, "peak_speed_share": 0.1, "ended_by": "skill",
         "peak_force_10ms_n": force, "peak_range_share": 0.6, "peak_torque_joint": "joint2",
         "peak_speed_joint": "joint6", "peak_range_joint": "joint4", "goal_reached": success, "ended_itself": True,
+        "distance_to_collision_m": 0.06,
     }  # fmt: skip
 
 

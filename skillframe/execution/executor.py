@@ -31,6 +31,8 @@ from skillframe.world.rates import ratio
 __all__ = ["QUANTITIES", "Loop", "Result", "Setup", "begin", "simulate"]
 
 RAMP_S = 0.05
+APART_TICKS = 100
+"""Between two measurements of how far bodies are apart that may not touch; one costs about what a tick does (ours)."""
 
 
 def simulate(
@@ -160,6 +162,8 @@ class Loop:
 
     def _stop_where_due(self, tick: int, time: float, command: Command) -> None:
         slow, ending = tick % SLOW_TICKS == 0, np.count_nonzero(command.status)
+        if tick % APART_TICKS == 0:
+            self.collisions.measure(self.plant, self.active)
         self._end_broken([Broken(row, Ended.COMMAND, cause) for row, cause in self.faults], time)
         broken = self.drive.violations(tick, self.active)
         if broken or slow or ending:
@@ -206,6 +210,7 @@ class Loop:
         """Close trials: judge them as they stand now, and stop stepping them."""
         if not len(rows):
             return
+        self.collisions.measure(self.plant, rows)
         self.outcomes.close(rows, time, reason, code, limit)
         self.active = np.setdiff1d(self.active, rows)
         self.drive.end(rows)
@@ -214,5 +219,5 @@ class Loop:
 
     def result(self) -> Result:
         """The outcome of every trial."""
-        result = self.outcomes.result(self.recorder, self.skill.journal, self.collisions.note, self.interrupted)
+        result = self.outcomes.result(self.recorder, self.skill.journal, self.collisions, self.interrupted)
         return self.drive.outcome(result)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from skillframe.execution.result import Result
 from skillframe.execution.setup import Setup
 from skillframe.execution.tracemeta import SHARE_JOINTS, SHARES
 from skillframe.skill import Status, no_reasons
+from skillframe.world.collisions import Collisions
 
 Journal = Callable[[int], list[tuple[float, str]]]
 
@@ -78,13 +80,15 @@ class Outcomes:
         for i in rows:
             self.reason[i], self.ended_by[i] = reason, code.value
 
-    def result(self, recorder: TrialRecorder | None, journal: Journal, note: str, interrupted: bool) -> Result:
+    def result(
+        self, recorder: TrialRecorder | None, journal: Journal, collisions: Collisions, interrupted: bool
+    ) -> Result:
         """The outcome of every trial.
 
         Args:
             recorder: what holds the traces, or None.
             journal: what the skill notes of a trial.
-            note: a sentence about all trials, or "".
+            collisions: how far bodies were apart, and what there is to say of that.
             interrupted: Ctrl-C came before the end.
         """
         success = self.goal & ~self.limited & (self.status != Status.FAILURE)
@@ -93,7 +97,8 @@ class Outcomes:
             failure[i] = self._failure(int(i))
         traces = None
         if recorder is not None:
-            metas = (self._meta(i, bool(success[i]), str(failure[i]), journal, note) for i in range(self.count))
+            told = partial(self._meta, journal=journal, collisions=collisions)
+            metas = (told(i, bool(success[i]), str(failure[i])) for i in range(self.count))
             traces = [recorder.trace(i, meta) for i, meta in enumerate(metas)]
         return Result(
             success=success, failure=failure, status=self.status, reason=self.reason, duration_s=self.duration,
@@ -102,6 +107,7 @@ class Outcomes:
             ended_by=self.ended_by, **dict(zip(SHARES, self.shares, strict=True)),
             **dict(zip(SHARE_JOINTS, self.joints, strict=True)),
             goal_reached=self.goal, ended_itself=self.ended_by == Ended.SKILL.value,
+            distance_to_collision_m=collisions.distance,
             traces=traces, interrupted=interrupted,
         )  # fmt: skip
 
@@ -117,7 +123,7 @@ class Outcomes:
         mark = over(float(self.contact.peak[i]), self.setup.robot.spec.limits.force_n) if success else ""
         return [*(text for text in (mark, note) if text), *self.drive.notes(i)]
 
-    def _meta(self, i: int, success: bool, failure: str, journal: Journal, note: str) -> dict[str, Any]:
+    def _meta(self, i: int, success: bool, failure: str, *, journal: Journal, collisions: Collisions) -> dict[str, Any]:
         scene, actuators = self.setup.scene, list(self.drive.actuators)
         return {
             "robot": self.setup.robot.spec.name, "world": scene.name, "params": scene.params,
@@ -131,7 +137,8 @@ class Outcomes:
             **{name: _known(share) for name, share in zip(SHARES, self.shares[:, i], strict=True)},
             **dict(zip(SHARE_JOINTS, self.joints[:, i], strict=True)),
             "goal_reached": bool(self.goal[i]), "ended_itself": self.ended_by[i] == Ended.SKILL,
-            "notes": self._notes(i, success, note), "final_error_m": float(self.errors[i, 0]),
+            "distance_to_collision_m": _known(float(collisions.distance[i])),
+            "notes": self._notes(i, success, collisions.note), "final_error_m": float(self.errors[i, 0]),
             "final_error_rad": float(self.errors[i, 1]), "analytic": scene.analytic,
             "progress": None if scene.way is None else scene.way.told(_known(self.way[i])),
             "events": [[time, text] for time, text in journal(i)],

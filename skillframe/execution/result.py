@@ -43,6 +43,7 @@ class Result:
         ended_by: code of what ended the trial (`Ended`).
         goal_reached: the scene's goal held when the trial ended, whatever ended it.
         ended_itself: the skill itself ended the trial, not the clock, a limit or a fault.
+        distance_to_collision_m: smallest distance of bodies that may not touch, as `Collisions.distance` says.
         traces: one per trial if asked for.
         interrupted: Ctrl-C came before the end; what was running is closed as it stood.
     """
@@ -67,6 +68,7 @@ class Result:
     ended_by: Reasons = field(default_factory=lambda: no_reasons(0))
     goal_reached: NDArray[np.bool_] = field(default_factory=_never)
     ended_itself: NDArray[np.bool_] = field(default_factory=_never)
+    distance_to_collision_m: Float = field(default_factory=_none)
     traces: list[Trace] | None = None
     interrupted: bool = False
 

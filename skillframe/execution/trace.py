@@ -60,9 +60,9 @@ class Trace:
             (T,), `energy_supply` and `energy_pistons` (T,) since the start [J].
         meta: `robot`, `world`, `params`, `seed`, `trial`, `draws`, `success`, `failure`, `status`, `reason`,
             `duration_s`, `peak_force_n`, `peak_force_filtered_n`, `peak_force_10ms_n`, `peak_torque_share`,
-            `peak_speed_share`, `ended_by`, `goal_reached`, `ended_itself`, `final_error_m`, `final_error_rad`,
-            `center_of_compliance`, `skill`, `progress` (`word`, `of_m`, `reached_m`; null in a world without a depth),
-            `events` ([[t, text]]),
+            `peak_speed_share`, `ended_by`, `goal_reached`, `ended_itself`, `distance_to_collision_m`,
+            `final_error_m`, `final_error_rad`, `center_of_compliance`, `skill`, `events` ([[t, text]]),
+            `progress` (`word`, `of_m`, `reached_m`; null in a world without a depth),
             `scores` ({name: {`value`, `unit`, `summary`}}, null for a trial without that figure; where asked for),
             `actuators` (joints with one of their own), `notes` (sentences about what stood in for what), `touched`
             (names of two bodies, where that ended it), and `bodies`:

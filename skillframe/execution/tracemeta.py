@@ -20,7 +20,7 @@ KINDS: dict[str, type | tuple[type, ...]] = {
     **dict.fromkeys(("analytic", "draws", "frames", "interface", "limits", "params", "progress", "scores"), dict),
     **dict.fromkeys(("actuators", "bodies", "center_of_compliance", "events", "notes", "touched"), list),
     **dict.fromkeys(("duration_s", "peak_force_n", "final_error_m", "final_error_rad"), (int, float)),
-    **dict.fromkeys(("peak_force_filtered_n", "peak_force_10ms_n"), (int, float)),
+    **dict.fromkeys(("peak_force_filtered_n", "peak_force_10ms_n", "distance_to_collision_m"), (int, float)),
     **dict.fromkeys(SHARES, (int, float)),
     **dict.fromkeys(("ended_by", *SHARE_JOINTS), str),
     **dict.fromkeys(("goal_reached", "ended_itself"), bool),

@@ -104,10 +104,6 @@ class RobotFile:
     Attributes:
         urdf: file of the robot, from the folder of robot.toml.
         summary: one line for people.
-        arm: what holds tools: one of it, or several.
-        control: what the arm takes, and how often a second.
-        limits: what stops a run.
-        workspace: where a world's fixture stands.
     """
 
     urdf: str

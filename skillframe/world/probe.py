@@ -7,8 +7,9 @@ time, from the poses of the bodies alone, so that its answer depends on nothing 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
+from itertools import combinations
 from typing import NamedTuple
 
 import mujoco
@@ -17,10 +18,12 @@ import numpy as np
 from skillframe.errors import InputError
 from skillframe.frames import Float
 from skillframe.world.convert import add_geom
-from skillframe.world.parts import BITS, OBSTACLE, STANDING, Pair, Solid
+from skillframe.world.parts import BITS, OBSTACLE, STANDING, Pair, Solid, compared
 
 TOLERANCE = 1e-3
 """Depth that is let pass [m]; ours: the resolution of drawn primitives."""
+FAR = 1.0
+"""[m] beyond which a distance is not worked out (ours)."""
 _POINT = "point"
 _ARENA = 4 * 1024 * 1024  # bytes; room for some thousand contacts
 
@@ -67,6 +70,17 @@ class Probe:
         self._data = mujoco.MjData(self._model)
         self._point = int(self._model.geom(_POINT).id)
         self._index(parts)
+        self._pairs = np.array([*self._convex_pairs(parts, skip)], dtype=np.int64).reshape(-1, 2)
+        planes = self._model.geom_type[self._pairs] == mujoco.mjtGeom.mjGEOM_PLANE
+        self._reach = np.where(planes.any(axis=1), np.inf, self._model.geom_rbound[self._pairs].sum(axis=1))
+
+    def _convex_pairs(self, parts: Sequence[Solid], skip: Collection[Pair]) -> Iterator[tuple[int, int]]:
+        """Pairs of geoms that are looked at and both convex."""
+        solid = [g for g in range(self._model.ngeom) if self._part[g] >= 0 and g not in self._surface]
+        for one, two in combinations(solid, 2):
+            i, k = sorted((int(self._part[one]), int(self._part[two])))
+            if i != k and (i, k) not in skip and compared(parts[i].role, parts[k].role):
+                yield one, two
 
     def _add(self, spec: mujoco.MjSpec, part: Solid, index: int) -> None:
         body = spec.worldbody.add_body(name=_body(index), mocap=part.role == STANDING)
@@ -103,13 +117,36 @@ class Probe:
             position: (P, 3) of those that each trial puts somewhere.
             quaternion: (P, 4) of the same.
         """
+        self._pose(free, position, quaternion)
+        mujoco.mj_collision(self._model, self._data)
+        return self._depths() if self._data.ncon else []
+
+    def _pose(self, free: Float, position: Float, quaternion: Float) -> None:
         data = self._data
         data.qpos[:] = free
         if self.posed:
             data.mocap_pos[:], data.mocap_quat[:] = position, quaternion
         mujoco.mj_kinematics(self._model, data)
-        mujoco.mj_collision(self._model, data)
-        return self._depths() if data.ncon else []
+
+    def distance(self, free: Float, position: Float, quaternion: Float, known: float = FAR) -> float:
+        """The smallest distance of two convex shapes that may not touch [m], or `known` if none is nearer.
+
+        Negative is the depth of one in the other. Pairs are asked in the order of the distance that the spheres around
+        them leave at least, until that is no less than what was found. Meshes that are not convex are left out, since
+        their hulls are nearer than they are. Without any pair it is NaN. The other arguments are those of `overlaps`.
+        """
+        if not len(self._pairs):
+            return float("nan")
+        self._pose(free, position, quaternion)
+        at = self._data.geom_xpos[self._pairs]
+        least = np.sqrt(np.square(at[:, 0] - at[:, 1]).sum(axis=-1)) - self._reach
+        found = known
+        for index in np.argsort(least).tolist():
+            if least[index] >= found:
+                break
+            one, two = self._pairs[index].tolist()
+            found = min(found, float(mujoco.mj_geomDistance(self._model, self._data, one, two, max(found, 0.0), None)))
+        return found
 
     def _depths(self) -> list[Overlap]:
         deepest: dict[Pair, float] = {}

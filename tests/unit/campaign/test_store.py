@@ -41,7 +41,7 @@ def test_results_have_the_contracts_columns_in_order(out):
         "trial,skill,seed,start.tilt_y,start.offset_x,world.friction,"
         "success,failure,duration_s,peak_force_n,final_error_m,final_error_rad,"
         "peak_force_filtered_n,peak_torque_share,peak_speed_share,ended_by,peak_force_10ms_n,"
-        "peak_range_share,peak_torque_joint,peak_speed_joint,peak_range_joint,goal_reached,ended_itself"
+        "peak_range_share,peak_torque_joint,peak_speed_joint,peak_range_joint,goal_reached,ended_itself,distance_to_collision_m"
     )
     keys = [tuple(line.split(",")[:2]) for line in lines[1:]]
     assert keys == [(str(t), label) for t in range(6) for label in ("a.skill.json", "replay:demo.npz")]

@@ -95,6 +95,7 @@ def test_a_link_that_comes_to_touch_ends_the_trial_within_a_hundredth_of_a_secon
     assert "inside the fixture" not in free.failure[0]
     assert "is 1 mm inside the fixture" in result.failure[0] or "is 2 mm inside the fixture" in result.failure[0]
     assert 0.05 < result.duration_s[0] < 1.0
+    assert -0.003 < result.distance_to_collision_m[0] < -0.001 < free.distance_to_collision_m[0]
 
 
 def test_a_trial_among_others_ends_with_the_same_words_as_alone():
@@ -107,12 +108,14 @@ def test_a_trial_among_others_ends_with_the_same_words_as_alone():
 
     def ended(rows):
         rngs = [np.random.default_rng([1, i]) for i in rows]
-        return simulate(skill, now, {"fixture.tilt_z": tilt[rows]}, rngs, duration_s=0.05).failure
+        found = simulate(skill, now, {"fixture.tilt_z": tilt[rows]}, rngs, duration_s=0.05)
+        return list(zip(found.failure, found.distance_to_collision_m, strict=True))
 
     together = ended([0, 1, 2, 3])
-    assert {bool(text) for text in together} == {True, False}
-    assert [ended([i])[0] for i in range(4)] == list(together)
-    assert list(ended([3, 1, 0, 2])) == [together[i] for i in (3, 1, 0, 2)]
+    assert {bool(text) for text, _ in together} == {True, False}
+    assert [ended([i])[0] for i in range(4)] == together
+    assert ended([3, 1, 0, 2]) == [together[i] for i in (3, 1, 0, 2)]
+    assert all((distance < 0.0) == ("inside" in text) for text, distance in together)
 
 
 # --- depths ---
@@ -123,6 +126,47 @@ def test_the_depth_of_a_sphere_in_a_box_is_that_of_the_shortest_way_out(slide, q
     """r + a - |q|. Half a millimetre is within the tolerance."""
     found = causes(slide(SPHERE, [q], BOX))
     assert found == ([] if depth is None else [(0, f"link 'carriage' is {depth} mm inside the fixture")])
+
+
+def measured(plant, *more):
+    """Smallest distances in mm, where the robot is and then at more positions (N,)."""
+    from skillframe.world.collisions import Collisions
+
+    looked, rows = Collisions(plant), np.arange(plant.count)
+    looked.measure(plant, rows)
+    for q in more:
+        plant.reset(np.array(q, dtype=float)[:, None])
+        looked.measure(plant, rows)
+    return (1000.0 * looked.distance).tolist()
+
+
+@pytest.mark.parametrize(("q", "distance"), [(0.2, 50), (-0.4, 250), (0.14, -10), (2.0, 1000)])
+def test_the_distance_of_a_sphere_and_a_box_is_what_parts_them_up_to_a_metre(slide, q, distance):
+    """|q| - r - a; at 2 m it would be 1.85 m."""
+    assert measured(slide(SPHERE, [q], BOX)) == pytest.approx([distance], abs=1e-2)  # mm; MuJoCo's tolerance is 1e-6 m
+
+
+def test_the_distance_of_a_trial_is_its_own_smallest_so_far_over_all_pairs(slide):
+    """The ball comes nearer in the first trial and goes away in the second. A table's plane, which has no middle to go
+    by, is 300 mm under it, a wall 400 mm beside it."""
+    around = (
+        '[[obstacle]]\nname = "table"\nkind = "plane"\nposition = [3.0, -4.0, {down}]\n'
+        '[[obstacle]]\nname = "wall"\nsize = [2.0, 0.2, 2.0]\nposition = [0.0, 0.6, 0.0]\n'
+    )
+    near = [[0.35, 0.4], [0.2, 0.7], [0.3, 0.2]]
+    place = {"down": -0.4}
+    plant = slide(SPHERE, near[0], BOX, toml=around.format(**place))
+    assert measured(plant, *near[1:]) == pytest.approx([50, 50], abs=1e-2)
+    plant = slide(SPHERE, near[0], BOX, toml=around.format(**place))
+    assert measured(plant, near[1]) == pytest.approx([50, 250], abs=1e-2)
+    assert measured(slide(SPHERE, [0.9, 0.9], BOX, toml=around.format(**place))) == pytest.approx([300, 300], abs=1e-2)
+
+
+def test_what_is_not_looked_at_and_a_robot_without_pairs_have_no_distance(slide, plant):
+    off = slide(SPHERE, [0.2], BOX, toml="[collisions]\nenabled = false\n")
+    assert np.isnan(measured(off)).all()
+    assert np.isnan(measured(slide(SPHERE, [0.2]))).all()
+    assert np.isnan(measured(plant("free_tool", "valley"))).all()
 
 
 def test_every_kind_of_geom_of_a_fixture_is_seen(slide):
