@@ -150,6 +150,28 @@ def test_boundaries_of_quasi_static_demonstrations():
     assert max(peg.worst) <= 0.20 and peg.total.false == 0
 
 
+class Found(NamedTuple):
+    """What docs/evidence/segmentation.md says of 12 groups of one task in contact simulation: never worse than that.
+
+    Right number of phases, one story, changes missed, false boundaries, largest error [s], groups within 0.10 s.
+    """
+
+    right: int
+    alike: int
+    missed: int
+    false: int
+    largest: float
+    quick: int
+
+
+FOUND = {
+    "valley 45": Found(12, 12, 0, 0, 0.11, 10),
+    "valley 30": Found(12, 12, 0, 0, 0.05, 12),
+    "corner": Found(12, 12, 0, 0, 0.15, 0),
+    "hose coupler": Found(12, 11, 0, 1, 0.15, 0),
+}
+
+
 def test_boundaries_of_demonstrations_from_contact_simulation():
     line("contact simulation, wrench_hmm", *HEAD)
     rows = {}
@@ -158,15 +180,16 @@ def test_boundaries_of_demonstrations_from_contact_simulation():
         show(f"{task}, 3 demonstrations", rows[task])
     for task in staged.TASKS:
         show(f"hard: {task}, 2 demonstrations", offline(Group(task, count=2), [2]))
-    assert sum(row.total.missed for row in rows.values()) <= 0.05 * sum(row.total.changes for row in rows.values())
-    met = [bar(f"{t}: no change missed", rows[t].total.missed == 0) for t in rows]
-    met += [bar(f"{t}: two phases in 11 of 12", rows[t].right >= 11) for t in rows]
-    met += [
-        bar(f"{t}: 0.10 s in 11 of 12", sum(e <= 0.1 for e in rows[t].worst) >= 11) for t in ("valley 45", "valley 30")
-    ]
-    met += [bar(f"{t}: largest error 0.15 s", rows[t].total.largest <= 0.15) for t in ("corner", "hose coupler")]
-    if not all(met):
-        pytest.xfail("thresholds of quasi-static demonstrations, missed in contact simulation; see segmentation.md")
+    for task, row in rows.items():
+        bar(f"{task}: no change missed", row.total.missed == 0)
+        bar(f"{task}: two phases in 11 of 12", row.right >= 11)
+        bar(f"{task}: 0.10 s in 11 of 12", sum(e <= 0.1 for e in row.worst) >= 11)
+        bar(f"{task}: largest error 0.15 s", row.total.largest <= 0.15)
+        known = FOUND[task]  # each bar by itself: none hides what another has lost
+        assert row.right >= known.right and row.alike >= known.alike, task
+        assert row.total.missed <= known.missed and row.total.false <= known.false, task
+        assert row.total.largest < known.largest + 0.005, task  # the page gives hundredths of a second
+        assert sum(e <= 0.1 for e in row.worst) >= known.quick, task
 
 
 def touched(demonstration: Demonstration) -> float:
@@ -229,6 +252,15 @@ def online(group: Group, segmenter: str, by: str, moves: Sequence[Float] = ()) -
     return total
 
 
+FOLLOWED = {
+    "valley": ((36, 0), (36, 0)), "ls": ((36, 0), (36, 0)), "hose": ((36, 0), (36, 0)), "peg": ((72, 0), (72, 0)),
+    "valley 45": ((35, 1), (34, 2)), "valley 30": ((34, 0), (35, 1)), "corner": ((36, 0), (36, 0)),
+    "hose coupler": ((36, 0), (30, 7)),
+}  # fmt: skip
+"""By docs/evidence/segmentation.md, of the filter and of the wrench gate with tables askew: changes within 0.3 s, and
+switches elsewhere. Never worse than that, task by task."""
+
+
 def told(s: Score) -> str:
     return f"{s.near}/{s.changes}, {s.false} f, {s.percentile(95):.2f} s"
 
@@ -246,19 +278,16 @@ def test_following_new_demonstrations_and_the_gate_where_tables_have_moved(famil
         )  # fmt: skip
         print(f"{task:<34}" + "".join(f"{told(s):>28}" for s in rows[task]), flush=True)
     gated = [rows[t] for t in ("valley", "ls", "hose") if t in rows] or list(rows.values())
-    known = True
     for task, (watched, wrench, pose, upright) in rows.items():
-        near = watched.near >= 0.95 * watched.changes, wrench.near >= 0.9 * wrench.changes
-        met = [bar(f"{task}: filter, 95 % near", near[0]), bar(f"{task}: wrench gate, 90 % near", near[1])]
+        bar(f"{task}: filter, 95 % near", watched.near >= 0.95 * watched.changes)
+        bar(f"{task}: wrench gate, 90 % near", wrench.near >= 0.9 * wrench.changes)
         bar(f"{task}: filter, none false", watched.false == 0)
-        assert family != "quasi-static" or task == "peg" or all(met)
-        known = known and all(met)
+        for seen, (near, false) in zip((watched, wrench), FOLLOWED[task], strict=True):
+            assert seen.near >= near and seen.false <= false, task
         bar(f"{task}: pose gate, askew, under 20 % near", pose.near < 0.2 * pose.changes)
         bar(f"{task}: pose gate, up or down, under 20 % near", upright.near < 0.2 * upright.changes)
     for column in (2, 3):  # all worlds together; of one world alone, a dozen seeds may be lucky
         assert sum(row[column].near for row in gated) < 0.2 * sum(row[column].changes for row in gated)
-    if not known:
-        pytest.xfail("thresholds of quasi-static demonstrations, missed in contact simulation; see segmentation.md")
 
 
 def bar(what: str, met: bool) -> bool:
