@@ -119,7 +119,8 @@ class AdmittanceLaw:
             self._damping = raised_damping(damping, floor)
         h = self._dt
         self._gain, self._calm = (
-            np.linalg.inv(MASS / h + share * self._damping + h * stiffness) for share in (1.0, CALMING)
+            np.linalg.inv(MASS / h + share * self._damping + h * stiffness).astype(np.float64, copy=False)
+            for share in (1.0, CALMING)
         )
 
     def _require_soft(self, stiffness: Float) -> None:
@@ -139,7 +140,8 @@ def felt(wrench: Float) -> Float:
     """Wrenches (N, 6), none where no contact is felt."""
     halves = wrench.reshape(-1, 2, 3)
     touching = (np.vecdot(halves, halves) > QUIET).any(-1)
-    return wrench * touching[:, None]
+    result: Float = wrench * touching[:, None]
+    return result
 
 
 def _times(matrix: Float, vector: Float) -> Float:

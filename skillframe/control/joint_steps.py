@@ -84,7 +84,7 @@ class JointSteps:
         ahead = command - measured
         far = np.abs(ahead) > self._leash
         if np.count_nonzero(far):
-            speed = np.where((far & (ahead * speed > 0.0)).any(-1)[:, None], 0.0, speed)
+            speed[(far & (ahead * speed > 0.0)).any(-1)] = 0.0
         return speed, (jacobian @ speed[..., None])[..., 0]
 
     def _inverted(self, scaled: Float) -> Float:
