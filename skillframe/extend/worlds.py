@@ -8,7 +8,19 @@ from typing import Any
 from skillframe.config import build
 from skillframe.extend.records import WorldType
 from skillframe.world.scene import Scene
-from skillframe.world.worlds import corner, edge, free, funnel, hose_coupler, pallets, peg_in_hole, socket, valley
+from skillframe.world.worlds import (
+    corner,
+    edge,
+    free,
+    funnel,
+    hose_coupler,
+    hump,
+    pallets,
+    peg_in_hole,
+    pit,
+    socket,
+    valley,
+)
 
 
 def world_types() -> Iterable[WorldType]:
@@ -32,6 +44,13 @@ def world_types() -> Iterable[WorldType]:
     yield WorldType(
         name="corner", summary="a box to set down and push into a corner", params=corner.CornerParams,
         build=corner.build,
+    )  # fmt: skip
+    yield WorldType(
+        name="hump", summary="a floor, a ramp to pass and a pocket behind it, in any attitude", params=hump.HumpParams,
+        build=hump.build,
+    )  # fmt: skip
+    yield WorldType(
+        name="pit", summary="two or three faces that meet, in any attitude", params=pit.PitParams, build=pit.build,
     )  # fmt: skip
     yield WorldType(
         name="pallets", summary="a stack of pallets and a stop, for machines", params=pallets.PalletsParams,

@@ -1,0 +1,67 @@
+"""A scene turned as a whole about the fixture's origin, so that no axis of base or fixture means anything in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+
+from skillframe.frames import Float, Pose, matrix_from_quaternion, quaternion_from_matrix, rotate, rotation_matrix
+from skillframe.world.scene import Geom, Scene, State, Task, Vector
+
+_T = TypeVar("_T")
+
+
+def turned(scene: Scene, vector: Vector) -> Scene:
+    """The scene with fixture, starts, goal and push turned by a rotation vector [rad] about the fixture's origin.
+
+    The tool starts in the same attitude to the parts as before. A scene with a start lift, a holder, sprung parts or
+    stages is not for this function.
+    """
+    if not any(vector):
+        return scene
+    turn = rotation_matrix(np.array(vector))
+    return replace(
+        scene,
+        fixture=tuple(_geom(geom, turn) for geom in scene.fixture),
+        start_tip=_vector(turn @ np.array(scene.start_tip)),
+        start_quaternion=_quaternion(turn, scene.start_quaternion),
+        goal=_seen(scene.goal, turn),
+        goal_error=_seen(scene.goal_error, turn),
+        task=_task(scene.task, turn),
+    )
+
+
+def _geom(geom: Geom, turn: Float) -> Geom:
+    place = _vector(turn @ np.array(geom.position))
+    return replace(geom, position=place, quaternion=_quaternion(turn, geom.quaternion))
+
+
+def _task(task: Task, turn: Float) -> Task:
+    starts = []
+    for start in task.starts:
+        offset = turn @ np.array([start.get(f"start.offset_{a}", 0.0) for a in "xyz"])
+        starts.append({f"start.offset_{a}": float(offset[i]) for i, a in enumerate("xyz")})
+    return replace(task, direction=_vector(turn @ np.array(task.direction)), starts=tuple(starts))
+
+
+def _seen(look: Callable[[State], _T], turn: Float) -> Callable[[State], _T]:
+    """A predicate or error of the unturned scene, asked of a state of the turned one."""
+
+    def asked(state: State) -> _T:
+        tip = Pose(rotate(turn.T, state.tip.position), turn.T @ state.tip.rotation)
+        wrench = np.concatenate([rotate(turn.T, state.wrench[..., :3]), rotate(turn.T, state.wrench[..., 3:])], axis=-1)
+        return look(State(tip, wrench))
+
+    return asked
+
+
+def _vector(values: Float) -> Vector:
+    return (float(values[0]), float(values[1]), float(values[2]))
+
+
+def _quaternion(turn: Float, given: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    x, y, z, w = quaternion_from_matrix(turn @ matrix_from_quaternion(given))
+    return (float(x), float(y), float(z), float(w))

@@ -1,0 +1,72 @@
+"""Worlds that can be turned as a whole: a hump to pass and a pit of several faces."""
+
+from __future__ import annotations
+
+from math import atan, cos, pi, radians, sin
+
+import numpy as np
+import pytest
+
+from skillframe.errors import InputError
+from skillframe.extend.worlds import make_scene, world_types
+from skillframe.frames import Pose, rotation_matrix
+from skillframe.world.scene import State
+
+RECORDS = {record.name: record for record in world_types()}
+TURN = (0.7, -1.9, 1.1)
+STEPS, SKEW = {"steps": radians(18.0), "friction": 0.2, "slope": radians(48.0)}, {"skew": radians(16.0)}
+
+
+def scene(world, **params):
+    return make_scene(RECORDS[world], params)
+
+
+def at(*tips):
+    count = len(tips)
+    return State(Pose(np.array(tips), np.broadcast_to(np.eye(3), (count, 3, 3))), np.zeros((count, 6)))
+
+
+@pytest.mark.parametrize(("world", "params"), [("hump", {}), ("hump", STEPS), ("hump", SKEW), ("pit", {})])
+def test_a_turned_scene_is_the_same_scene_seen_from_elsewhere(world, params):
+    plain, turned, turn = scene(world, **params), scene(world, **params, turn=TURN), rotation_matrix(np.array(TURN))
+    np.testing.assert_allclose(turned.task.direction, turn @ plain.task.direction, atol=1e-12)
+    np.testing.assert_allclose(turned.start_tip, turn @ plain.start_tip, atol=1e-12)
+    for a, b in zip(plain.fixture, turned.fixture, strict=True):
+        np.testing.assert_allclose(b.position, turn @ a.position, atol=1e-12)
+    tips = np.random.default_rng(0).uniform(-0.03, 0.05, (50, 3))
+    np.testing.assert_array_equal(turned.goal(at(*(tips @ turn.T))), plain.goal(at(*tips)))
+    np.testing.assert_allclose(turned.goal_error(at(*(tips @ turn.T)))[0], plain.goal_error(at(*tips))[0], atol=1e-12)
+
+
+@pytest.mark.parametrize(("world", "params"), [("hump", {}), ("hump", STEPS), ("hump", SKEW), ("pit", {})])
+def test_no_start_in_a_turned_fixture_touches_anything_and_none_is_a_goal(plant, world, params):
+    for start in scene(world, **params, turn=TURN).task.starts:
+        now = plant("free_tool", world, start, **params, turn=TURN)
+        np.testing.assert_array_equal(now.contact_force(), 0.0)
+        assert not now.scene.goal(now.tip_state())[0]
+
+
+def test_the_hump_s_push_is_in_the_middle_of_the_pushes_that_pass():
+    """They lie between atan(mu) and 90 degrees - atan(mu) - r below the floor; the middle knows nothing of friction."""
+    for friction in (0.05, 0.1, 0.2):
+        found = scene("hump", friction=friction, slope=radians(50.0))
+        below = atan(-found.task.direction[2] / found.task.direction[0])
+        assert below == pytest.approx(0.5 * (atan(friction) + 0.5 * pi - atan(friction) - radians(50.0)))
+        assert found.analytic["push_half_width_rad"] == pytest.approx(below - atan(friction))
+
+
+def test_a_hump_that_no_push_passes_is_refused():
+    with pytest.raises(InputError, match="slope < 90 degrees - 2 atan"):
+        scene("hump", slope=radians(70.0), friction=0.3)
+
+
+def test_the_pit_s_goal_is_the_ball_on_every_face():
+    """With three faces it is one point: n_i . c = radius for all three normals, solved here by Cramer's rule."""
+    slopes, azimuths = (0.4, 0.7, 1.0), (0.0, 2.0, 4.2)
+    found = scene("pit", slopes=slopes, azimuths=azimuths)
+    n = np.array([[-sin(s) * cos(a), -sin(s) * sin(a), cos(s)] for s, a in zip(slopes, azimuths, strict=True)])
+    swapped = [np.where(np.arange(3) == i, 0.005, n) for i in range(3)]
+    centre = np.array([np.linalg.det(m) for m in swapped]) / np.linalg.det(n)
+    assert found.goal(at(centre))[0] and found.goal_error(at(centre))[0][0] < 1e-12
+    assert not found.goal(at(centre + 0.002 * n[0], centre + 0.002 * n[1], centre + 0.002 * n[2])).any()
+    np.testing.assert_allclose(found.goal_error(at(centre + 0.002 * n[2]))[0], 0.002, rtol=1e-6)
