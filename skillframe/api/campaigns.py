@@ -119,7 +119,7 @@ class CampaignResults:
 
     def __repr__(self) -> str:
         lines = [f"  {label}: {_said(rate)}" for label, rate in self.skills.items()]
-        where = f"{self.spec.name}, {self.spec.robot_name} in {self.spec.world}"
+        where = f"{self.spec.name}, {self.spec.robot_name} in {self.spec.world_name}"
         return "\n".join([f"CampaignResults({where})", *lines])
 
 
@@ -203,7 +203,7 @@ class Campaign:
         Raises:
             InputError: the folder holds something, or skill, robot and world do not fit together.
         """
-        prepare(self.spec, Path(out), evaluate.describe, registry().world(self.spec.world).params)
+        prepare(self.spec, Path(out), evaluate.describe, registry().world(self.spec.world_place).params)
         return Path(out)
 
     def run(
@@ -239,9 +239,8 @@ class Campaign:
 
     def __repr__(self) -> str:
         spec = self.spec
-        return (
-            f"Campaign({spec.name}: {', '.join(spec.labels)}; {spec.trials} trials, {spec.robot_name} in {spec.world})"
-        )
+        where = f"{spec.robot_name} in {spec.world_name}"
+        return f"Campaign({spec.name}: {', '.join(spec.labels)}; {spec.trials} trials, {where})"
 
 
 @contextmanager

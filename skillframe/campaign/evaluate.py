@@ -147,7 +147,9 @@ def _check_quantity(robot: RobotModel, name: str, value: Value) -> None:
 
 def _scene(spec: CampaignSpec, varied: Mapping[str, Value]) -> Scene:
     settings = {**spec.fixed, **varied}
-    return load_world(spec.world, {n.removeprefix("world."): v for n, v in settings.items() if n.startswith("world.")})
+    return load_world(
+        spec.world_place, {n.removeprefix("world."): v for n, v in settings.items() if n.startswith("world.")}
+    )
 
 
 def _report(before: int, group: int, trials: int, duration_s: float, now: float) -> None:
@@ -165,7 +167,7 @@ def _simulate(
     with needed(f"the skill {spec.labels[job.skill]}"):
         _, document = load_skill(spec.skills[job.skill], spec.folder)
     with needed(f"the world {spec.world}"):
-        registry().world(spec.world)
+        registry().world(spec.world_place)
     # a drawn scene may be one that the world or the skill refuses; the nominal one was accepted before the campaign
     with nullcontext() if scene else needed("the scene or the skill"):
         skill, setup = prepare(robot, _scene(spec, scene), document, spec.coc)

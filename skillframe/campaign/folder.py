@@ -1,7 +1,7 @@
 """A campaign's folder: all that the campaign needs is copied in. Reports, resumes and replays need nothing else.
 
     campaign.toml   as run: world parameters in full, paths into this folder
-    skills/ robots/ copies of what ran
+    skills/ robots/ copies of what ran; worlds/ too, if the world is a fixture file
     scene.json      geometry of the scene and its analytic figures
     rows.jsonl      see `store`
     results.csv summary.json traces/
@@ -30,11 +30,12 @@ from skillframe.document.source import parse_source
 from skillframe.errors import InputError
 from skillframe.files import remove_temporary, sync_folder, write_whole
 from skillframe.files.documents import read_json
+from skillframe.parts.declared import mesh_files
 from skillframe.robot.meshes import LARGEST_FILE, mesh_names, resolve_mesh
 from skillframe.robot.spec import robot_folder
 
 CAMPAIGN, SCENE = "campaign.toml", "scene.json"
-COPIES = ("skills", "robots")
+COPIES = ("skills", "robots", "worlds")
 Describe = Callable[[CampaignSpec], dict[str, Any]]
 
 
@@ -59,7 +60,7 @@ def prepare(spec: CampaignSpec, out: Path, describe: Describe, params: type) -> 
         temporary.mkdir(parents=True)
         ready = replace(
             spec, folder=temporary, skills=_copy_skills(spec, temporary), robot=_copy_robot(spec, temporary),
-            fixed=_all_fixed(spec, params),
+            world=_copy_world(spec, temporary), fixed=_all_fixed(spec, params),
         )  # fmt: skip
         write_whole(temporary / CAMPAIGN, to_toml(ready).encode())
         write_whole(temporary / SCENE, json.dumps(describe(ready), sort_keys=True).encode())
@@ -134,6 +135,18 @@ def _copy_skills(spec: CampaignSpec, target: Path) -> tuple[str, ...]:
         return f"skills/{source.name}"
 
     return tuple(parse_source(text, spec.folder).moved(place).text for text in spec.skills)
+
+
+def _copy_world(spec: CampaignSpec, target: Path) -> str:
+    """Copy a fixture file with its meshes. The name of any other world stays."""
+    if not spec.world.endswith(".toml"):
+        return spec.world
+    source = Path(spec.world_place)
+    place = target / "worlds" / source.resolve().parent.name
+    for name, file in {source.name: source, **mesh_files(source)}.items():
+        (place / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(file, place / name)
+    return (place / source.name).relative_to(target).as_posix()
 
 
 def _copy_robot(spec: CampaignSpec, target: Path) -> str:

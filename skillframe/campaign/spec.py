@@ -86,7 +86,7 @@ class CampaignSpec:
         seed: of every draw; trial i of a seed is the same whatever else runs.
         trials: total number per skill.
         robot: a robot's name or a path to a robot.toml or its folder, relative to `folder`.
-        world: a world's name.
+        world: a world's name, or a path to a fixture.toml, relative to `folder`.
         skills: "FILE.skill.json" or "TYPE:DEMO,..." (see `document.source`), relative to `folder`.
         vary: what varies, by quantity.
         fixed: quantities at one other value than the default, `[set]` in the file.
@@ -120,6 +120,18 @@ class CampaignSpec:
     def robot_name(self) -> str:
         """The robot's name, also where `robot` is the path of its files."""
         return name_of(self.robot)
+
+    @property
+    def world_name(self) -> str:
+        """The world's name, also where `world` is the path of a fixture file."""
+        if not self.world.endswith(".toml"):
+            return self.world
+        return name_of(self.world.removesuffix("/fixture.toml")).removesuffix(".toml")
+
+    @property
+    def world_place(self) -> str:
+        """The world as the registry knows it: a name, or the path of a fixture file from here."""
+        return place_of(self.world, self.folder)
 
     @property
     def cells(self) -> int:
@@ -180,7 +192,7 @@ class CampaignSpec:
             InputError, UnknownName: as `from_toml`.
         """
         file = build(_File, table, f"{path}: campaign")
-        params = params or _world_params(file.world)
+        params = params or _world_params(place_of(file.world, path.parent))
         _check_numbers(file, path)
         _check_skills(file, path)
         _check_scores(file, path)
@@ -201,6 +213,11 @@ class CampaignSpec:
 def name_of(robot: str) -> str:
     """A robot's name from what a campaign file calls it: a name, a folder, or the robot.toml in it."""
     return robot.removesuffix("/robot.toml").rsplit("/", 1)[-1]
+
+
+def place_of(world: str, folder: Path) -> str:
+    """What a campaign file in a folder calls a world, as the registry knows it."""
+    return str(folder / world) if world.endswith(".toml") else world
 
 
 def flatten(table: Mapping[str, Any], where: str) -> dict[str, Any]:

@@ -39,7 +39,7 @@ def status_of(folder: Path, params: type | None = None) -> dict[str, Any]:
     return {
         "name": spec.name,
         "robot": spec.robot_name,
-        "world": spec.world,
+        "world": spec.world_name,
         "rows": len(rows),
         "planned_rows": planned,
         "complete": complete,

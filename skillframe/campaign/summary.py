@@ -143,7 +143,7 @@ def summarize(
         "name": spec.name,
         "seed": spec.seed,
         "robot": spec.robot,
-        "world": spec.world,
+        "world": spec.world_name,
         "planned_trials": spec.trials,
         "complete": complete,
         "stopped_after_trial": stop_after,

@@ -26,7 +26,7 @@ def conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any], as_json:
     from skillframe.robot.spec import load_robot
 
     if as_json:
-        where = {"robot": spec.robot_name, "world": spec.world, "results": str(folder / "results.csv")}
+        where = {"robot": spec.robot_name, "world": spec.world_name, "results": str(folder / "results.csv")}
         emit_json({**summary, **where})
     else:
         _tell(folder, spec, summary)
@@ -44,7 +44,7 @@ def conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any], as_json:
 
 
 def _tell(folder: Path, spec: CampaignSpec, summary: dict[str, Any]) -> None:
-    click.echo(f"{spec.robot_name} in {spec.world}, {summary['planned_trials']} trials planned")
+    click.echo(f"{spec.robot_name} in {spec.world_name}, {summary['planned_trials']} trials planned")
     show_rates(summary["skills"])
     for pair in summary["comparisons"]:
         click.echo(f"{pair['first']} against {pair['second']} on the same {pair['trials']} draws:")

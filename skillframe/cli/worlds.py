@@ -1,30 +1,33 @@
-"""`skillframe worlds`: which worlds there are, and what one of them is."""
+"""`skillframe worlds`: which worlds there are, what one of them is, and new ones of two meshes."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import click
 
 from skillframe.cli import names
 from skillframe.cli.output import LIST_WIDTH, emit_json, table
+from skillframe.errors import InputError
 
 
 @click.group()
 def command() -> None:
-    """List and show worlds.
+    """List and show worlds, and make one of two meshes.
 
     \b
     Example:
       skillframe worlds list
       skillframe worlds show peg_in_hole
+      skillframe worlds new plug.stl socket.stl --units mm --out fixture.toml
     """
 
 
 @command.command("list")
 @click.option("--json", "as_json", is_flag=True, help="JSON alone on stdout.")
 def list_(as_json: bool) -> None:
-    """Worlds that --world takes.
+    """Worlds that --world takes by name. It takes the path of a fixture file as well (skillframe worlds new).
 
     \b
     Example:
@@ -43,13 +46,15 @@ def list_(as_json: bool) -> None:
 
 @command.command()
 @click.argument("world", shell_complete=names.worlds)
+@click.option("--picture", type=click.Path(path_type=Path), help="PNG to draw: the scene at its start, cut open.")
 @click.option("--json", "as_json", is_flag=True, help="JSON alone on stdout.")
-def show(world: str, as_json: bool) -> None:
+def show(world: str, picture: Path | None, as_json: bool) -> None:
     """What a world is: its parameters, where a run starts, and the points of its tool.
 
     \b
     Example:
       skillframe worlds show peg_in_hole
+      skillframe worlds show parts/fixture.toml --picture parts.png
     """
     from skillframe.api.settings import of_world
     from skillframe.cli.settings import typed
@@ -57,17 +62,20 @@ def show(world: str, as_json: bool) -> None:
     from skillframe.extend.worlds import make_scene
 
     record = registry().world(world)
+    origin = world if world.endswith(".toml") else registry().provider("world", world).distribution
     scene, settings = make_scene(record, {}), list(of_world(record))
     found: dict[str, Any] = {
-        "name": world, "summary": record.summary, "distribution": registry().provider("world", world).distribution,
+        "name": world, "summary": record.summary, "distribution": origin,
         "settings": settings, "start_tip_m": list(scene.start_tip), "frames": scene.tool.frames,
         "depth_m": None if scene.way is None else scene.way.of_m, "sprung": [part.name for part in scene.sprung],
         "second_arm_holds_it": scene.holder is not None,
     }  # fmt: skip
+    if picture is not None:
+        _draw(scene, picture)
     if as_json:
         emit_json(found)
         return
-    click.echo(f"{world} ({found['distribution']}): {record.summary}")
+    click.echo(f"{scene.name} ({found['distribution']}): {record.summary}")
     click.echo(f"  the tip starts at {_point(scene.start_tip)} mm in the fixture frame, z up")
     for name, point in scene.tool.frames.items():
         click.echo(f"  {name} at {_point(point)} mm in the tool frame")
@@ -81,3 +89,81 @@ def show(world: str, as_json: bool) -> None:
 
 def _point(point: tuple[float, ...]) -> str:
     return ", ".join(f"{1000.0 * each:g}" for each in point)
+
+
+@command.command()
+@click.argument("plug", type=click.Path(path_type=Path))
+@click.argument("socket", type=click.Path(path_type=Path))
+@click.option("--units", help='Of both files, as "mm"; needed for all but GLB.')
+@click.option(
+    "--out", default="fixture.toml", show_default=True, type=click.Path(path_type=Path), help="File to write."
+)
+@click.option(
+    "--friction", default=0.2, show_default=True, type=click.FloatRange(0.0, 5.0), help="Coulomb coefficient."
+)
+@click.option("--axis", default="[0, 0, -1]", show_default=True, help='Of insertion, as "[0, 0, -1]", or "auto".')
+def new(plug: Path, socket: Path, units: str | None, out: Path, friction: float, axis: str) -> None:
+    """Make a world of two meshes, PLUG (held) and SOCKET (standing), assembled as they were exported.
+
+    Writes a fixture file and prints what is found: depth, clearance, way out, contact error. The meshes have to lie in
+    the file's folder.
+
+    \b
+    Example:
+      skillframe worlds new plug.stl socket.stl --units mm
+    """
+    from skillframe.files import write_whole
+    from skillframe.parts.found import lines, new_text, relative
+    from skillframe.parts.load import load
+
+    if out.suffix != ".toml":
+        raise InputError(out, "is to be named .toml, as --world knows such files by", "choose another --out")
+    if out.exists():
+        raise InputError(out, "exists", "choose another --out, or edit it")
+    said = '"auto"' if axis == "auto" else axis
+    text = new_text(out.name, relative(plug, out), relative(socket, out), units, friction, said)
+    write_whole(out, text.encode())
+    try:
+        found = lines(load(out))
+    except BaseException:
+        out.unlink(missing_ok=True)  # nobody wants a file of parts that are refused
+        raise
+    click.echo("\n".join([f"{out} written", *found]))
+
+
+@command.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="JSON alone on stdout.")
+def check(file: Path, as_json: bool) -> None:
+    """What is found in the two parts of a fixture FILE, or why they are refused (exit code 2).
+
+    \b
+    Example:
+      skillframe worlds check fixture.toml
+    """
+    from skillframe.parts.found import lines, values
+    from skillframe.parts.load import load
+
+    loaded = load(file)
+    if as_json:
+        emit_json(values(loaded))
+    else:
+        click.echo("\n".join(lines(loaded)))
+
+
+def _draw(scene: Any, picture: Path) -> None:
+    import numpy as np
+
+    from skillframe.files import write_whole
+    from skillframe.frames import Pose, matrix_from_quaternion
+    from skillframe.reports.still import scene_picture
+    from skillframe.world.drawing import geom_json
+
+    if picture.suffix.lower() != ".png":
+        raise InputError(f"--picture {picture}", "is no PNG", "name it .png")
+    tip = Pose(np.array(scene.start_tip), matrix_from_quaternion(scene.start_quaternion))
+    sprung = (geom for part in scene.sprung for geom in part.geoms)
+    fixture, tool = (
+        [geom_json(geom) for geom in geoms if geom.visible] for geoms in ((*scene.fixture, *sprung), scene.tool.geoms)
+    )
+    write_whole(picture, scene_picture(fixture, tool, tip.at(-np.array(scene.tool.frames["tip"]))))

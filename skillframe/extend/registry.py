@@ -22,6 +22,7 @@ from skillframe.extend import hookspecs
 from skillframe.extend.contract import ATTRIBUTE, GROUP, contract_problem, requirement_problem
 from skillframe.extend.discovery import installed
 from skillframe.extend.homes import where_to_get
+from skillframe.extend.part_worlds import FILE_ENDING, world_of_file
 from skillframe.extend.plugin import KINDS as KINDS
 from skillframe.extend.plugin import RECORDS as RECORDS
 from skillframe.extend.plugin import BadPlugin as BadPlugin
@@ -165,7 +166,12 @@ class Registry:
         return self.coordinator(name) if name in self._records["coordinator"] else self.skill(name)
 
     def world(self, name: str) -> WorldType:
-        """The world of that name. Raises as `skill` does."""
+        """The world of that name, or of that fixture file, "path/fixture.toml". Raises as `skill` does.
+
+        A fixture file that cannot be used raises `InputError`.
+        """
+        if name.endswith(FILE_ENDING):
+            return world_of_file(name)
         record: WorldType = self._get("world", name)
         return record
 

@@ -68,4 +68,4 @@ def make_scene(record: WorldType, params: Mapping[str, Any]) -> Scene:
 
     values: Any = build(record.params, params, f"world.{record.name}")
     scene = record.build(values)
-    return dataclasses.replace(scene, params=dataclasses.asdict(values))
+    return dataclasses.replace(scene, params={**scene.params, **dataclasses.asdict(values)})

@@ -56,6 +56,7 @@ def test_an_error_is_what_sticks_out_and_what_is_missing():
         assert error_of([hull_of(vertices)], solid) == pytest.approx(1e-3 * error, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_round_hole_of_too_many_sides_is_thinned_within_what_is_allowed_and_its_error_measured(monkeypatch):
     """40 sides take 41 pieces. With half of the sides the middle of one is r (1 - cos(pi / 20)) inside the corners."""
     monkeypatch.setattr("skillframe.parts.pieces.MOST_PIECES", 25)

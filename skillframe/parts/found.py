@@ -1,0 +1,84 @@
+"""What is found in a user's two parts, in sentences and as plain values, and a first fixture file for them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from skillframe.errors import InputError
+from skillframe.parts.checks import SHARE
+from skillframe.parts.load import CutPart, LoadedParts
+
+FILE = """\
+# Two parts that are put together. skillframe worlds check {name} says what is found in them.
+[fixture]                # stands still
+mesh = {socket}
+{socket_units}table = true             # a table under its lowest point
+[tool]                   # what the robot holds
+mesh = {plug}
+{plug_units}density = 2700           # kg/m3; or mass = "0.12kg"
+[contact]
+friction = {friction!r}
+[task]
+axis = {axis}            # of insertion; "auto" takes the first of -z, z, -x, x, -y, y that is free
+"""
+
+
+def new_text(name: str, plug: str, socket: str, units: str | None, friction: float, axis: str) -> str:
+    """The text of a fixture file for two meshes, named relative to it."""
+    lines = [f"units = {_quoted(units)}\n" if units and not m.lower().endswith(".glb") else "" for m in (socket, plug)]
+    return FILE.format(
+        name=name, socket=_quoted(socket), plug=_quoted(plug), socket_units=lines[0], plug_units=lines[1],
+        friction=friction, axis=axis,
+    )  # fmt: skip
+
+
+def relative(mesh: Path, file: Path) -> str:
+    """A mesh's path as the fixture file is to say it.
+
+    Raises:
+        InputError: it lies outside the file's folder.
+    """
+    try:
+        return mesh.resolve().relative_to(file.resolve().parent).as_posix()
+    except ValueError:
+        what = f"lies outside {file.resolve().parent}"
+        raise InputError(mesh, what, "put both meshes into one folder, and the fixture file there") from None
+
+
+def _quoted(text: str | None) -> str:
+    return '"' + str(text).replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def values(loaded: LoadedParts) -> dict[str, Any]:
+    """What was found, as plain JSON values in SI."""
+    found = loaded.fit
+    return {
+        "name": loaded.name, "axis": list(found.axis), "depth_m": found.depth, "clearance_m": found.clearance,
+        "least_clearance_m": float(found.gaps.min()), "backend": "pieces",
+        "contact_error_m": max(loaded.plug.pieces.error, loaded.socket.pieces.error),
+        "pieces": {"tool": len(loaded.plug.pieces.hulls), "fixture": len(loaded.socket.pieces.hulls)},
+        "mass_kg": loaded.mass, "notes": list(loaded.notes), "sha256": dict(loaded.hashes),
+    }  # fmt: skip
+
+
+def lines(loaded: LoadedParts) -> list[str]:
+    """What was found, a sentence each."""
+    found = loaded.fit
+    out = ", ".join(f"{-x + 0.0:g}" for x in found.axis)
+    least, play = (1000.0 * x for x in (float(found.gaps.min()), found.clearance))
+    error = 1e6 * max(loaded.plug.pieces.error, loaded.socket.pieces.error)
+    plug, socket = loaded.file.tool.mesh, loaded.file.fixture.mesh
+    return [
+        f"{plug} goes {1000.0 * found.depth:.3g} mm deep into {socket} and comes out along ({out})",
+        f"clearance along the way {play:.3g} mm (median; least {least:.3g} mm)",
+        f"contact by convex pieces: {_pieces(loaded.plug)} of {plug}, {_pieces(loaded.socket)} of {socket}; "
+        f"contact error {error:.2g} um (at most {1e6 * SHARE * found.clearance:.3g} um is let pass)",
+        f"{plug} weighs {1000.0 * loaded.mass:.3g} g",
+        *(f"note: {note}" for note in loaded.notes),
+    ]  # fmt: skip
+
+
+def _pieces(side: CutPart) -> str:
+    more = " (of what the other part can reach)" if side.rest is not None else ""
+    return f"{len(side.pieces.hulls)}{' after thinning' if side.pieces.thinned else ''}{more}"

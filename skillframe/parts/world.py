@@ -1,0 +1,175 @@
+"""A loaded fixture file as a scene: pieces that collide, the goal "seated", and what a person who sees it knows.
+
+What the robot holds is the part and a light gripper of 0.5 kg between wrist and part (ours), its mass half way. The
+fixture frame is `fit`'s: origin in the middle of the mouth, z out of it, so that robots find it where they find a hole.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.config.fields import require_ranges
+from skillframe.frames import Float, norm
+from skillframe.parts.declared import FixtureFile, read_fixture
+from skillframe.parts.fit import corners, lowest
+from skillframe.parts.load import CutPart, LoadedParts, load
+from skillframe.parts.solid import arrays_of
+from skillframe.world.scene import Geom, Scene, State, Task, Tool, Vector
+from skillframe.world.shapes import FIXTURE_COLOUR, TOOL_COLOUR, shaft
+from skillframe.world.worlds.common import TOOL_DOWN, insertion, tilt_of
+
+GRIPPER = 0.5
+_TABLE = (0.06, 0.005)  # least half width and half thickness [m]
+_FLIP = np.array([1.0, -1.0, -1.0])  # fixture axes to tool axes of a tool that points down
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartsParams:
+    """Parameters of a world of a fixture file.
+
+    Attributes:
+        friction: Coulomb coefficient [0 to 5].
+        above_mouth: nominal height of the tip over the mouth at the start [m, 0m to 200mm].
+        height: distance along the axis from the assembled pose that counts as seated [m, 1um to 100mm].
+        sideways: distance across the axis, likewise [m, 1um to 100mm].
+        tilt: of the axis, likewise [rad, 0.1deg to 90deg].
+    """
+
+    friction: float = 0.2
+    above_mouth: float = 0.001
+    height: float = 0.001
+    sideways: float = 0.002
+    tilt: float = 0.035
+
+
+def params_of(path: Path) -> type:
+    """The parameters of a fixture file's world: those of `PartsParams`, with the file's values as defaults.
+
+    Raises:
+        InputError: as `read_fixture`.
+    """
+    given = defaults(read_fixture(path))
+    fields = [(name, float, dataclasses.field(default=value)) for name, value in given.items()]
+    made: type = dataclasses.make_dataclass(
+        PartsParams.__name__, fields, bases=(PartsParams,), frozen=True, kw_only=True,
+        namespace={"__doc__": PartsParams.__doc__},
+    )  # fmt: skip
+    return made
+
+
+def defaults(file: FixtureFile) -> dict[str, float]:
+    """The values of `PartsParams` that a file gives."""
+    seated = file.task.seated
+    return {
+        "friction": file.contact.friction, "above_mouth": file.task.start.above_mouth, "height": seated.height,
+        "sideways": seated.sideways, "tilt": seated.tilt,
+    }  # fmt: skip
+
+
+def build_world(path: Path, params: PartsParams) -> Scene:
+    """The scene of a fixture file.
+
+    Raises:
+        InputError: the file, its meshes or the parameters cannot be used.
+    """
+    loaded = load(path)
+    require_ranges(params, f"world {loaded.name}")
+    found, depth = loaded.fit, loaded.fit.depth
+    points = corners(found)
+
+    def lift(offset: Float, tilt: Float) -> Float:
+        return -lowest(points, tilt)
+
+    def seated(state: State) -> NDArray[np.bool_]:
+        there: NDArray[np.bool_] = np.abs(state.tip.position[..., 2] + depth) < params.height
+        return there & (norm(state.tip.position[..., :2]) < params.sideways) & (tilt_of(state) < params.tilt)
+
+    return Scene(
+        name=loaded.name,
+        fixture=(*_geoms(loaded.socket, np.eye(3), np.zeros(3), FIXTURE_COLOUR), *_table(loaded)),
+        tool=_tool(loaded),
+        friction=params.friction,
+        start_tip=(0.0, 0.0, params.above_mouth),
+        start_quaternion=TOOL_DOWN,
+        start_lift=lift,
+        goal=seated,
+        goal_error=lambda state: (norm(state.tip.position - np.array([0.0, 0.0, -depth])), tilt_of(state)),
+        way=insertion(depth, found.radius),
+        task=Task(
+            direction=(0.0, 0.0, -1.0), aligned=TOOL_DOWN, hand="aligning",
+            starts=tuple(_start(height, tilt, params, points) for height, tilt in loaded.starts),
+        ),
+        params=stated(loaded),
+    )  # fmt: skip
+
+
+def stated(loaded: LoadedParts) -> dict[str, Any]:
+    """What every result says of a world of a file besides its parameters: figures [m] and hashes."""
+    sides = (loaded.plug, loaded.socket)
+    return {
+        "depth": loaded.fit.depth, "clearance": loaded.fit.clearance, "backend": "pieces",
+        "contact_error": max(side.pieces.error for side in sides),
+        "pieces": sum(len(side.pieces.hulls) for side in sides),
+        **{f"sha256 of {name}": value for name, value in loaded.hashes.items()},
+    }  # fmt: skip
+
+
+def _start(height: float, tilt: Float, params: PartsParams, points: Float) -> dict[str, float]:
+    """A demonstration's start by the quantities that move the nominal one."""
+    beyond = height - params.above_mouth + float(lowest(points, tilt[None])[0])
+    turned = {f"start.tilt_{axis}": float(angle) for axis, angle in zip("xyz", tilt, strict=True) if angle}
+    return {"start.offset_z": beyond, **turned}
+
+
+def _geoms(side: CutPart, turn: Float, shift: Float, rgba: tuple[float, float, float, float]) -> tuple[Geom, ...]:
+    """The pieces of a part, which collide, and its rest, which is drawn."""
+    shapes = [(hull.vertices, hull.faces, True) for hull in side.pieces.hulls]
+    if side.rest is not None and not side.rest.is_empty():
+        shapes.append((*arrays_of(side.rest), False))
+    return tuple(
+        Geom(kind="mesh", vertices=vertices @ turn.T + shift, faces=faces, rgba=rgba, collide=collide)
+        for vertices, faces, collide in shapes
+    )
+
+
+def _tool(loaded: LoadedParts) -> Tool:
+    """The held part in the tool frame: its tip at `grip` along z."""
+    grip, turn = loaded.file.tool.grip, np.diag(_FLIP)
+    shift = turn @ np.array([0.0, 0.0, loaded.fit.depth]) + np.array([0.0, 0.0, grip])
+    top = grip - float(np.ptp(corners(loaded.fit)[:, 2])) - 0.012
+    mass = loaded.mass + GRIPPER
+    own, light = turn @ loaded.center + np.array([0.0, 0.0, grip]), np.array([0.0, 0.0, 0.5 * grip])
+    center = (loaded.mass * own + GRIPPER * light) / mass
+    inertia = loaded.inertia + GRIPPER * grip**2 / 12.0 * np.array([1.0, 1.0, 0.01])
+    for weight, place in ((loaded.mass, own), (GRIPPER, light)):
+        away = place - center
+        inertia = inertia + weight * (away @ away - away**2)
+    handle = (shaft(0.012, 0.012, top),) if top > 0.03 else ()
+    return Tool(
+        geoms=(*_geoms(loaded.plug, turn, shift, TOOL_COLOUR), *handle), mass=mass, center_of_mass=_vector(center),
+        inertia=_vector(inertia),
+        frames={"wrist": (0.0, 0.0, 0.0), "tip": (0.0, 0.0, grip), "grip": (0.0, 0.0, max(grip - 0.04, 0.0))},
+    )  # fmt: skip
+
+
+def _table(loaded: LoadedParts) -> tuple[Geom, ...]:
+    """A table under the lowest point of the standing part."""
+    if not loaded.file.fixture.table:
+        return ()
+    low, high = np.reshape(loaded.fit.socket.bounding_box(), (2, 3))
+    middle, half = 0.5 * (low + high), np.maximum(0.75 * (high - low), _TABLE[0])
+    place = (float(middle[0]), float(middle[1]), float(low[2]) - _TABLE[1])
+    return (
+        Geom(kind="box", size=(float(half[0]), float(half[1]), _TABLE[1]), position=place, rgba=(0.8, 0.78, 0.74, 1.0)),
+    )
+
+
+def _vector(values: Float) -> Vector:
+    x, y, z = (float(v) for v in values)
+    return (x, y, z)
