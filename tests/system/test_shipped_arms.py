@@ -9,8 +9,13 @@ from skillframe.cli.main import run
 pytestmark = [pytest.mark.slow, pytest.mark.needs_plugins]
 
 
-@pytest.mark.parametrize("world", ["peg_in_hole", "valley", "hose_coupler"])
-@pytest.mark.parametrize("robot", ["ur5e", "fr3", "kuka_iiwa14"])
+WORLDS, ARMS = ("peg_in_hole", "valley", "hose_coupler"), ("ur5e", "fr3", "kuka_iiwa14")
+PAIRS = [(robot, world) for robot in ARMS for world in WORLDS]
+
+
+@pytest.mark.parametrize(
+    ("robot", "world"), [*PAIRS, ("ur5e_position", "hose_coupler"), ("ur5e_velocity", "peg_in_hole")]
+)
 def test_a_shipped_arm_is_taught_and_does_what_it_was_taught(robot, world, tmp_path, capsys):
     on = ["--world", world, "--robot", robot]
     recorded = ["demonstration", "record", *on, "--count", "2", "--seed", "1", "--out", str(tmp_path / "d.npz")]
