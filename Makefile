@@ -15,7 +15,7 @@ EXAMPLES := $(wildcard examples/*.py)
 GALLERY := docs/gallery/pictures
 PICTURES := $(EXAMPLES:examples/%.py=$(GALLERY)/%.png)
 
-.PHONY: demo install wheels test test-core test-rest test-beside test-slow figures bench docs gallery lint clean
+.PHONY: demo install wheels test test-core test-rest test-beside test-slow mutants figures bench docs gallery lint clean
 
 demo: install
 	$(BIN)/skillframe quickstart --out $(OUT)
@@ -62,6 +62,10 @@ test-beside: $(VENV)/.test
 
 test-slow: $(VENV)/.test
 	$(PYTEST) $(SIDE_BY_SIDE) -m "slow and not figures"
+
+# Single changes of the core mathematics: does the everyday test that is named beside each notice it?
+mutants: $(VENV)/.test
+	$(BIN)/python -m tests.mutants.run --jobs 2 --page docs/evidence/mutants.md
 
 figures: $(VENV)/.test
 	$(PYTEST) -s -m figures

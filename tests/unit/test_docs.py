@@ -89,7 +89,7 @@ def test_every_evidence_page_names_its_command_and_is_linked_both_ways_with_an_e
     assert pages
     for page in pages:
         text = page.read_text(encoding="utf-8")
-        assert re.search(r"make (figures|bench)|pytest", text), page.name
+        assert re.search(r"make (figures|bench|mutants)|pytest", text), page.name
         sources = re.findall(r"\.\./((?:explanation|how-to)/[\w-]+\.md)", text)
         assert any(f"../evidence/{page.name}" in explained[source] for source in sources), page.name
 
