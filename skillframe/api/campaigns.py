@@ -25,7 +25,7 @@ from skillframe.campaign.folder import campaign_hash, load, prepare
 from skillframe.campaign.replay import pick_label
 from skillframe.campaign.rows import columns
 from skillframe.campaign.runner import Options, Progress, run_campaign, trace_path
-from skillframe.campaign.spec import CampaignSpec
+from skillframe.campaign.spec import CampaignSpec, place_of
 from skillframe.campaign.store import ordered, read_content
 from skillframe.campaign.summary import read_summary
 from skillframe.config import read_toml
@@ -147,7 +147,7 @@ class Campaign:
 
     Args:
         plan: a campaign.toml, or a dict with its keys; None where keywords say it all.
-        world: a world's name.
+        world: a world's name, or its fixture file.
         skills: learned skills, skill files, "TYPE:DEMONSTRATION", or a dict of these by the names they get in results.
         **keys: the other keys of campaign.toml: `robot` ("panda" if nothing says otherwise), `trials` (100), `seed`
             (0), `vary` {"fixture.tilt_y": {"uniform": [-0.1, 0.1]}}, `set`, `coc`, `duration_s`, `stop`, `expect`,
@@ -159,11 +159,13 @@ class Campaign:
     """
 
     def __init__(
-        self, plan: File | Mapping[str, Any] | None = None, *, world: str | None = None,
+        self, plan: File | Mapping[str, Any] | None = None, *, world: File | None = None,
         skills: Skills | Sequence[Skills] | Mapping[str, Skills] | None = None, robot: Robot | None = None, **keys: Any,
     ) -> None:  # fmt: skip
         given: dict[str, Any] = {"world": world, "skills": skills, "robot": robot, **keys}
         given = {key: value for key, value in given.items() if value is not None}
+        if world is not None:
+            given["world"] = place_of(os.fspath(world), Path.cwd())
         if isinstance(plan, str | os.PathLike) and not given:
             self.spec = CampaignSpec.from_toml(Path(plan))
             return
@@ -268,9 +270,11 @@ def _table(plan: File | Mapping[str, Any] | None) -> dict[str, Any]:
     table, folder = read_toml(Path(plan)), Path(plan).absolute().parent
     if isinstance(table.get("skills"), list):
         table["skills"] = [_absolute(text, folder) if isinstance(text, str) else text for text in table["skills"]]
-    robot = table.get("robot")
+    robot, world = table.get("robot"), table.get("world")
     if isinstance(robot, str) and (folder / robot).exists():
         table["robot"] = str(folder / robot)
+    if isinstance(world, str):
+        table["world"] = place_of(world, folder)
     return table
 
 

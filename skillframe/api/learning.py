@@ -105,7 +105,7 @@ class LearnedSkill:
         """The skill that steps itself, for a world and a robot: a part of a sequence, or to be called by other loops.
 
         Args:
-            world: a name, or a scene of your own.
+            world: a name, a fixture file, or a scene of your own.
             robot: a name, a robot.toml or its folder, or a loaded robot.
             coc: centre of compliance, "x,y,z" [m] in the tool frame or a frame's name; None as learned.
             set: what differs from the nominal in the world.

@@ -34,7 +34,7 @@ def record(
     `count=2` shows the valley from both sides.
 
     Args:
-        world: a name, or a scene of your own.
+        world: a name, a fixture file, or a scene of your own.
         robot: a name, a robot.toml or its folder, or a loaded robot.
         teacher: "kinesthetic", "teleoperation" or "blind" as they are by default, or how the person is in detail:
             `TeacherSettings`, `BlindSettings` or, for a hydraulic machine, `OperatorSettings`. None: somebody whose

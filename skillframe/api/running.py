@@ -183,7 +183,7 @@ def run(
 
     Args:
         skill: what `learn` gave, a skill file, "TYPE:DEMONSTRATION", a document, or an object that steps itself.
-        world: a name, or a scene of your own.
+        world: a name, a fixture file, or a scene of your own.
         robot: a name, a robot.toml or its folder, or a loaded robot.
         coc: centre of compliance, "x,y,z" [m] in the tool frame or a frame's name; None as learned.
         set: what differs from the nominal, {"start.offset_x": 0.008, "fixture.tilt_y": "5deg"}.
@@ -265,9 +265,9 @@ def _command(
 ) -> str:  # fmt: skip
     """What to type to get the same run again, without where it goes. "" where objects of Python cannot be typed."""
     named = robot if isinstance(robot, str | os.PathLike) else None
-    if skill.source is None or named is None or not isinstance(world, str):
+    if skill.source is None or named is None or isinstance(world, Scene):
         return ""
-    words = ["run", skill.source, "--world", world, "--robot", os.fspath(named)]
+    words = ["run", skill.source, "--world", os.fspath(world), "--robot", os.fspath(named)]
     words += [] if coc is None else ["--coc", coc]
     words += [word for key, value in (settings or {}).items() for word in ("--set", f"{key}={_typed(value)}")]
     words += ["--seed", f"{seed}"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,8 +18,8 @@ from skillframe.world.scene import Scene
 
 Robot = File | RobotSpec | RobotModel
 """A name, a robot.toml or its folder, or a robot that was loaded before."""
-World = str | Scene
-"""A registered name, or a scene of one's own."""
+World = File | Scene
+"""A registered name, a fixture file of two parts, or a scene of one's own."""
 Settings = Mapping[str, Any]
 """What differs from the nominal, by the names of `skillframe settings`: SI numbers, or text with a unit, "5deg"."""
 
@@ -40,7 +41,7 @@ def scene_of(world: World, settings: Settings | None, depth: int) -> tuple[Scene
     Bare numbers that look like millimetres or degrees are warned of.
 
     Args:
-        world: a name or a scene.
+        world: a name, a fixture file or a scene.
         settings: what differs from the nominal.
         depth: how many calls above this one the user's line stands, for warnings.
 
@@ -52,6 +53,7 @@ def scene_of(world: World, settings: Settings | None, depth: int) -> tuple[Scene
     if isinstance(world, Scene):
         _, draws = split_settings(None, given)
         return world, draws
+    world = os.fspath(world)
     params, draws = split_settings(world, given)
     for text in doubts(world, given):
         warnings.warn(text, SkillframeWarning, stacklevel=depth + 1)

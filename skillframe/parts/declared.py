@@ -120,7 +120,7 @@ class ShownKeys:
         deep: how far the lowest corner is in the mouth at the start, or less where it does not fit [m, 0m to 50mm].
     """
 
-    tilt: float = 0.12217304763960307
+    tilt: float = 0.13962634015954636
     deep: float = 0.0007
 
 

@@ -75,6 +75,7 @@ def test_a_body_inside_another_that_is_turned_inwards_is_a_cavity(tmp_path):
 def test_a_size_that_no_part_has_is_refused_with_the_unit_that_was_meant(tmp_path):
     export(CUBE, tmp_path / "part.stl")
     refused(lambda: read_part(tmp_path / "part.stl", "m"), "is 10 m long in m", 'units = "mm"')
+    refused(lambda: read_part(tmp_path / "part.stl", "um"), "is 1e-05 m long in um", 'units = "mm"')
 
 
 def test_an_empty_file_is_refused(tmp_path):
