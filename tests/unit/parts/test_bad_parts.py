@@ -161,6 +161,7 @@ def test_parts_without_play_are_refused(tmp_path):
     refused(pair(tmp_path, box((-5, -5, -12), (5, 5, 8)), block), "the play along the way is 0 mm")
 
 
+@pytest.mark.slow
 def test_a_part_that_pieces_do_not_hold_is_refused_with_how_many_it_takes(tmp_path, monkeypatch):
     for module in ("checks", "load", "pieces"):
         monkeypatch.setattr(f"skillframe.parts.{module}.MOST_PIECES", 5)
@@ -168,6 +169,7 @@ def test_a_part_that_pieces_do_not_hold_is_refused_with_how_many_it_takes(tmp_pa
     refused(pair(tmp_path, *round_pair()), *words)
 
 
+@pytest.mark.slow
 def test_a_heavy_part_is_asked_about(tmp_path):
     plug, socket = round_pair()
     loaded = load(write(tmp_path, plug.scale([9] * 3), socket.scale([9] * 3), FILE))
@@ -197,6 +199,7 @@ def test_a_mesh_outside_the_files_folder_is_refused(tmp_path):
     refused(lambda: read_fixture(path), "lies outside", "into one folder")
 
 
+@pytest.mark.slow
 def test_a_key_stays_a_key(tmp_path):
     """Two bodies that share a part of their volume, as CAD exports them, are one part of the volume of both."""
     plug = keyed(5.0, 3.0, 1.5, -10.0, 8.0)

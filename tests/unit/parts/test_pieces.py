@@ -32,7 +32,12 @@ EXACT = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", EXACT)
+QUICK = ("a blind hole", "a chamfered hole", "a keyed shaft", "a cone")
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in EXACT]
+)
 def test_what_plane_faces_bound_is_held_exactly(name):
     solid, most = EXACT[name]
     solid = in_metres(solid)
@@ -43,6 +48,7 @@ def test_what_plane_faces_bound_is_held_exactly(name):
         assert is_convex(hull.vertices, hull.faces, hull)
 
 
+@pytest.mark.slow
 def test_pieces_of_an_extrusion_do_not_overlap():
     """So their volumes add up to the part's."""
     solid = in_metres(hole(5.2, 12.0))
