@@ -14,6 +14,7 @@ contract. The same checks, as functions, are in `skillframe.conformance`; `skill
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import deepcopy
 from typing import Any, ClassVar
 
 import numpy as np
@@ -67,6 +68,7 @@ class SkillConformance:
     skill_type: ClassVar[str] = ""
     document: ClassVar[Document | None] = None
     demonstrations: ClassVar[Sequence[Demonstration] | None] = None
+    _made: ClassVar[dict[tuple[str, str], tuple[SkillType, Document]]] = {}
 
     def _type(self) -> SkillType:
         record: SkillType = getattr(registry(), self.kind)(self.skill_type)
@@ -79,7 +81,10 @@ class SkillConformance:
             return self.document
         if self.demonstrations is not None:
             return learned(self._type(), self.demonstrations)
-        return example_document(self._type())
+        record, key = self._type(), (self.kind, self.skill_type)
+        if key not in self._made or self._made[key][0] is not record:  # once for all tests, as in `check_skill`
+            self._made[key] = record, example_document(record)
+        return deepcopy(self._made[key][1])
 
     def _check(self, check: Callable[[SkillType, Document], object]) -> None:
         _demand(list(check(self._type(), self._document())))  # type: ignore[call-overload]
