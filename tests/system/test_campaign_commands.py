@@ -70,7 +70,7 @@ def test_run_status_and_replay_tell_one_story(campaign, tmp_path, capsys):
     assert status["complete"]
     assert status["skills"] == summary["skills"]
     assert status["skills"]["replay:demo.npz"]["successes"] == successes
-    for trial in range(12):
+    for trial in (0, 5, 11):  # tests/laws/test_identity.py compares the rows of all trials
         trace = tmp_path / f"{trial}.npz"
         assert run(["campaign", "replay", str(out), str(trial), "--out", str(trace)]) == 0
         meta = Trace.load(trace).meta
