@@ -15,7 +15,7 @@ EXAMPLES := $(wildcard examples/*.py)
 GALLERY := docs/gallery/pictures
 PICTURES := $(EXAMPLES:examples/%.py=$(GALLERY)/%.png)
 
-.PHONY: demo install wheels test test-core test-rest test-beside test-slow mutants figures bench docs gallery lint clean
+.PHONY: demo install wheels test test-core test-rest test-beside test-slow mutants figures reproduced bench docs gallery lint clean
 
 demo: install
 	$(BIN)/skillframe quickstart --out $(OUT)
@@ -94,3 +94,11 @@ lint: $(VENV)/.dev
 
 clean:
 	rm -rf $(VENV) build dist docs/_build docs/gallery
+
+# The papers' results, computed again and put into the committed tables and the page of the docs. `make reproduced
+# ROWS="3 5"` does some of them, QUICK=--quick the quick ones. A verdict that changes is told, and is no error here.
+ROWS ?=
+QUICK ?=
+reproduced: $(VENV)/.installed
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/skillframe reproduce $(ROWS) $(QUICK) --fresh --out build/reproduced || [ $$? -eq 1 ]
+	$(BIN)/python -m skillframe_papers.refresh build/reproduced

@@ -7,6 +7,8 @@ Where a full run has few groups, too, a share that misses its threshold while it
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from skillframe.campaign.statistics import clopper_pearson
 from skillframe.extend.records import Verdict
 
@@ -24,6 +26,27 @@ def judged(hits: int, count: int, bar: float, *, quick: bool) -> Verdict:
     if reached(hits, count, bar, quick=quick):
         return "pass"
     return "reported" if undecided(hits, count, bar, quick=quick) else "fail"
+
+
+def counted(hits: int, count: int) -> str:
+    """A count with its exact 95 % interval: "9 of 12 (43 to 95 %)"."""
+    low, high = clopper_pearson(hits, count)
+    return f"{hits} of {count} ({100.0 * low:.0f} to {100.0 * high:.0f} %)"
+
+
+def ahead(hits: int, other: int, count: int, *, quick: bool) -> bool:
+    """Whether one count of as many trials is above another: by 95 % intervals that do not touch, quick by the count."""
+    if quick:
+        return hits > other
+    return clopper_pearson(hits, count).low > clopper_pearson(other, count).high
+
+
+def together(shares: Iterable[Verdict], beside: bool) -> Verdict:
+    """Verdict on several shares, and on whether the nulls are behind: fail if one fails or they are not."""
+    found = set(shares)
+    if "fail" in found or not beside:
+        return "fail"
+    return "reported" if "reported" in found else "pass"
 
 
 def undecided(hits: int, count: int, bar: float, *, quick: bool) -> str:

@@ -1,4 +1,4 @@
-"""The published results, rows 1 to 23, and what ours must reach. The modules of `rows` compute them."""
+"""The published results, by number, and what ours must reach. The modules of `rows` compute them."""
 
 from __future__ import annotations
 
@@ -14,21 +14,17 @@ PHASES = "Hagos, Suomalainen, Kyrki, IROS 2018 (abstract), and the overview pape
 CRANE = "HydraulicManipulatorVDC"
 
 NOISE = {"teacher.aim_noise_deg": 8.0, "world.friction": 0.2}
-VALLEY = {**NOISE, "world.slope_deg": 45.0}
 INSERTION = {"robot.joint_friction": 0.5, "world.friction": 0.2, "lead_force_n": 30.0, "speed": 0.02}
 SEARCHED = {
     "time": 20.0, "push": 10.0, "speed": 0.015, "stiffness": 2000.0, "world.fillet": 0.0008, "world.friction": 0.2,
 }  # fmt: skip
 MOVED = {**NOISE, "table.moved": 0.03}
-IGNORED = (
-    "the mean direction of the motions, and minus the mean force, which know nothing of sectors, reach it in 20 of 20 "
-    "pairs too, because starts and aim are symmetric about the valley"
-)
+UNEVEN = {"teacher.aim_noise_deg": 8.0, "teacher.bias_deg": 10.0}
 
 
 def row_types() -> Iterable[RowType]:
     """All rows, by number."""
-    subjects = (_learning_from_force(), _two_arms(), _search(), _phases(), _crane())
+    subjects = (_learning_from_force(), _executed(), _two_arms(), _search(), _phases(), _crane())
     return sorted(chain.from_iterable(subjects), key=lambda row: int(row.name))
 
 
@@ -52,9 +48,11 @@ def _learning_from_force() -> Iterable[RowType]:
     yield RowType(
         name="3", topic=topic,
         summary="the intersection of pyramids is robust to a wavering hand", published="robust to noise",
-        source=OVERVIEW, bar="a feasible direction from two demonstrations in 95 % of the pairs", weak=IGNORED,
-        settings=VALLEY,
-        run=Lazy("skillframe_papers.rows.lmc:noise"),
+        source=OVERVIEW,
+        bar="valley of uneven slopes and friction, turned at random, uneven starts, an aim that is off: a feasible "
+        "direction in 90 % of 20 sets (by count), and by 95 % intervals more often than mean motion and straight down",
+        settings=UNEVEN,
+        run=Lazy("skillframe_papers.rows.uneven:noise"),
     )  # fmt: skip
     yield RowType(
         name="4", topic=topic,
@@ -76,6 +74,18 @@ def _learning_from_force() -> Iterable[RowType]:
         summary="levering teaches that translation is the environment's", published="3-DoF compliance",
         source=OVERVIEW, bar="translation fully compliant, rotation not, in every demonstration", settings=NOISE,
         run=Lazy("skillframe_papers.rows.lmc:levering"),
+    )  # fmt: skip
+
+
+def _executed() -> Iterable[RowType]:
+    yield RowType(
+        name="27", topic="learning from force",
+        summary="one learned push works from any start of the convergence region",
+        published="from anywhere within the region", source=OVERVIEW,
+        bar="starts within 60 mm of the valley's bottom: it is reached in 90 % of the runs (by count), and by 95 % "
+        "intervals more often than the same push without compliance",
+        settings=NOISE, group="executed",
+        run=Lazy("skillframe_papers.rows.skills:region"),
     )  # fmt: skip
 
 
@@ -162,7 +172,8 @@ def _crane() -> Iterable[RowType]:
     )  # fmt: skip
     yield RowType(
         name="20", summary="contact force from chamber pressures while moving", published="4.1 % at 8000 N",
-        source="Koivumäki and Mattila, T-RO 2015 (abstract)", bar="largest error while sliding at most 5 % of the load",
+        source="Koivumäki and Mattila, T-RO 2015 (abstract)",
+        bar="masses 10 % and friction 20 % off: largest error while sliding at most the published 4.1 % of the load",
         settings={"press.depth": 0.12, "duration": 14.0}, group="crane",
         run=Lazy("skillframe_papers.rows.crane:force"),
     )  # fmt: skip
@@ -174,8 +185,10 @@ def _crane() -> Iterable[RowType]:
         run=Lazy("skillframe_papers.rows.crane:holding"),
     )  # fmt: skip
     yield RowType(
-        name="22", summary="diamond path of 30 s with model errors of 10 % and friction errors of 20 %",
-        published="no figure found", source=CRANE, bar="bounded: no trial stops, no error above 0.1 m",
+        name="22", summary="diamond path of 30 s with model errors of 10 % and friction errors of 20 %, and with the "
+        "data set's own",
+        published="no figure found", source=CRANE,
+        bar="no trial stops, no error above 10 mm, which a tool that is 50 ms late exceeds",
         settings={"duration": 30.0}, group="crane",
         run=Lazy("skillframe_papers.rows.crane:diamond"),
     )  # fmt: skip

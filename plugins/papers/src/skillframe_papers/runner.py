@@ -152,7 +152,8 @@ class _Session:
                 entry = None if job.row in self.told else store.kept(group.folder, job)
                 if entry is not None:
                     self.told.add(job.row)
-                    self.tell(f"row {job.row}: {entry['verdict']} after {entry['wall_s']:.0f} s: {entry['ours']}")
+                    took = f"{entry['wall_s']:.0f} s ({entry['cpu_s']:.0f} s of processor time)"
+                    self.tell(f"row {job.row}: {entry['verdict']} after {took}: {entry['ours']}")
 
     def _note(self, group: Group, answer: Answer) -> None:
         """Say of a group's other rows what became of them."""

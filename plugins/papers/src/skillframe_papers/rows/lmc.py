@@ -1,4 +1,4 @@
-"""Rows 1 to 6 of the papers' results: what LMC learns from two demonstrations in simulated contact, and what it does.
+"""Rows 1, 2 and 4 to 6 of the papers' results: what LMC learns from demonstrations in simulated contact, and does.
 
 Demonstrations come from the simulated teacher, `free_tool` holds the part, and each group of demonstrations has a seed
 of its own. The aim noise, the friction and the geometry are ours; the papers print none of them.
@@ -72,7 +72,7 @@ def _along(part: dict[str, Any], axis: Float) -> bool:
     return len(axes) == 1 and abs(np.dot(axes[0], axis)) > np.cos(radians(20.0))
 
 
-def _pictures(document: Document) -> list[Illustration]:
+def pictures(document: Document) -> list[Illustration]:
     """Figures 13 and 14, and who did the work, drawn from the skill file."""
     from skillframe_lmc.explain import explain
 
@@ -153,31 +153,6 @@ def valley_boundary(job: RowRun) -> RowResult:
     )  # fmt: skip
 
 
-def noise(job: RowRun) -> RowResult:
-    """Row 3: pairs of noisy demonstrations that give a feasible direction."""
-    params = {"slope": radians(float(job.settings["world.slope_deg"])), "friction": job.settings["world.friction"]}
-    limit = degrees(params["slope"] - atan(float(params["friction"])))
-    given = float(job.settings["teacher.aim_noise_deg"])
-    pairs, rows, feasible, shown = job.count(20, 6), [], 0, None
-    for noise in (given,) if job.quick else (3.0, given, 15.0):
-        groups, failed = _taught(job, "valley", params, pairs, noise_deg=noise)
-        documents = _documents(groups)
-        parts = _parts(documents, "translation")
-        errors = [_angle(part["desired_direction"], DOWN) for part in parts]
-        good, one = sum(e < limit for e in errors), sum(_along(part, X) for part in parts)
-        if noise == given:
-            feasible, shown = good, documents[0]
-        spread = f"{np.median(errors):.1f}, at most {max(errors):.1f}"
-        rows.append((f"{noise:g}", f"{good} of {pairs}", spread, f"{one} of {pairs}", failed))
-    return RowResult(
-        ours=f"feasible in {feasible} of {pairs} pairs at {given:g} degrees of aim noise",
-        verdict="pass" if reached(feasible, pairs, SHARE, quick=job.quick) else "fail",
-        values={"feasible_share": feasible / pairs},
-        head=("aim noise [degrees]", "feasible direction", "off the middle [degrees]", "one axis along x", "redrawn"),
-        rows=rows, pictures=_pictures(shown) if shown else [],
-    )  # fmt: skip
-
-
 def hose(job: RowRun) -> RowResult:
     """Row 4: what is learned for the hose coupler, and whether it aligns."""
     params, pairs = {"friction": job.settings["world.friction"]}, job.count(20, 4)
@@ -201,7 +176,7 @@ def hose(job: RowRun) -> RowResult:
     return RowResult(
         ours=f"as published in {as_told} of {pairs} pairs; both starts aligned with {both[None]} of {len(run)} steered "
         f"at the flange, {both['tip']} at the tip",
-        verdict="pass" if passed else "fail", head=("", "ours"), rows=rows, pictures=_pictures(documents[0]),
+        verdict="pass" if passed else "fail", head=("", "ours"), rows=rows, pictures=pictures(documents[0]),
         difference="" if both[None] == len(run) else LEVER,
         values={"as_published": as_told / pairs, "aligned": both[None] / len(run), "tip": both["tip"] / len(run)},
     )  # fmt: skip
@@ -232,7 +207,7 @@ def peg(job: RowRun) -> RowResult:
     return RowResult(
         ours=f"identical in {together} of {pairs} pairs; push {np.median(errors):.1f} degrees from z (median)",
         verdict="pass" if reached(together, pairs, SHARE, quick=job.quick) else "fail",
-        pictures=_pictures(documents[0]), head=("", "ours"),
+        pictures=pictures(documents[0]), head=("", "ours"),
         rows=[*((text, f"{sum(values)} of {pairs}") for text, values in facts), (REDRAWN, failed)],
         values={"identical_share": together / pairs, "median_error_deg": float(np.median(errors))},
     )  # fmt: skip
@@ -251,7 +226,7 @@ def levering(job: RowRun) -> RowResult:
         verdict="pass" if good == count else "fail", values={"share": good / count},
         head=("", "by the environment [J]", "by the teacher [J]"),
         rows=[(name, *(f"{w:.2f}" for w in each)) for name, each in zip(("translation", "rotation"), work, strict=True)]
-        + [(REDRAWN, failed, "")], pictures=_pictures(documents[0]),
+        + [(REDRAWN, failed, "")], pictures=pictures(documents[0]),
     )  # fmt: skip
 
 

@@ -1,0 +1,150 @@
+"""Row 27 of the papers' results: learned skills executed.
+
+Each skill runs from starts spread over what was shown, beside the same push with what the row claims taken away. Draws
+of one set of demonstrations share their learned push and mostly stand or fall together: sets are counted, too.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from functools import cache
+from math import radians
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.document.file import new_document
+from skillframe.document.source import learned
+from skillframe.execution.executor import simulate
+from skillframe.execution.prepare import load_robot_model, load_world, prepare
+from skillframe.extend.records import Document, LearnOptions, RowResult, RowRun
+from skillframe.extend.registry import registry
+from skillframe.teaching.sessions import record
+from skillframe.teaching.teacher import TeacherSettings
+from skillframe_papers.bars import ahead, counted, judged, together
+
+SEED = 64_000
+SETS, QUICK_SETS = 6, 2
+SHARE = 0.9
+REACH_M = 0.06
+WRIST, TIP = [0.0, 0.0, 0.0], [0.0, 0.0, 0.2]
+STIFF_N_M, STIFF_NM_RAD = 1000.0, 20.0
+
+
+class Ran(NamedTuple):
+    """Successes of trials, by set and start."""
+
+    success: NDArray[np.bool_]
+
+    @property
+    def hits(self) -> int:
+        """Of all trials."""
+        return int(self.success.sum())
+
+    @property
+    def trials(self) -> int:
+        """How many."""
+        return int(self.success.size)
+
+    @property
+    def sets(self) -> str:
+        """Sets whose every trial succeeded."""
+        return f"{int(self.success.all(axis=1).sum())} of {len(self.success)}"
+
+
+Key = tuple[tuple[str, float], ...]
+
+
+@cache
+def _learned(key: Key, seed: int, sets: int, world: str, each: int) -> tuple[Document, ...]:
+    """A skill from each set of `each` demonstrations, from the world's starts in turn."""
+    values = dict(key)
+    scene = load_world(world, {"friction": values["world.friction"]})
+    person = TeacherSettings(aim_noise=radians(values["teacher.aim_noise_deg"]))
+    given = record(load_robot_model("free_tool"), scene, person, count=2 * sets, seed=seed).demonstrations
+    kind = registry().skill("lmc")
+    return tuple(learned(kind, given[2 * i : 2 * i + each], LearnOptions()) for i in range(sets))
+
+
+def _skills(job: RowRun, world: str, each: int = 2) -> tuple[Document, ...]:
+    key = tuple(sorted(job.settings.items()))
+    return _learned(key, SEED + job.seed, job.count(SETS, QUICK_SETS), world, each)
+
+
+def _run(
+    job: RowRun, world: str, documents: Sequence[Document], starts: Mapping[str, Sequence[float]], robot: str,
+    center: str | None = None,
+) -> Ran:  # fmt: skip
+    """Every document from every start."""
+    scene = load_world(world, {"friction": job.settings["world.friction"]})
+    draws = {name: np.array(values) for name, values in starts.items()}
+    count = len(next(iter(draws.values())))
+    found = []
+    for document in documents:
+        skill, setup = prepare(load_robot_model(robot), scene, document, center)
+        rngs = [np.random.default_rng([job.seed, i]) for i in range(count)]
+        found.append(simulate(skill, setup, draws, rngs, duration_s=15.0).success)
+    return Ran(np.array(found))
+
+
+def stiff(document: Document, part: str, stiffness: float) -> Document:
+    """The document with one part ("translation", "rotation") as stiff in every direction."""
+    made = copy.deepcopy(dict(document))
+    for phase in made["phases"]:
+        phase[part] |= {
+            "stiffness": (stiffness * np.eye(3)).tolist(), "compliant_axes": [], "fully_compliant": False,
+        }  # fmt: skip
+    return made
+
+
+def _judged(job: RowRun, found: Mapping[str, Ran], null: str, words: str, difference: str) -> RowResult:
+    """The first method's share against the bar, and its lead over a null."""
+    ours = next(iter(found.values()))
+    share = judged(ours.hits, ours.trials, SHARE, quick=job.quick)
+    beside = ahead(ours.hits, found[null].hits, ours.trials, quick=job.quick)
+    return RowResult(
+        ours=f"{counted(ours.hits, ours.trials)} {words}; null: {null}, {found[null].hits}",
+        verdict=together([share], beside), difference=difference, head=("skill", "trials", "sets without a failure"),
+        rows=[(name, counted(each.hits, each.trials), each.sets) for name, each in found.items()],
+        values={"share": ours.hits / ours.trials},
+    )  # fmt: skip
+
+
+def region(job: RowRun) -> RowResult:
+    """Row 27: learned pushes from starts all over the valley."""
+    offsets = np.linspace(-REACH_M, REACH_M, job.count(13, 5)).tolist()
+    skills, starts = _skills(job, "valley"), {"start.offset_x": offsets}
+    none = "the same pushes, stiff"
+    found = {
+        "learned": _run(job, "valley", skills, starts, "free_tool"),
+        none: _run(job, "valley", [stiff(s, "translation", STIFF_N_M) for s in skills], starts, "free_tool"),
+        "by hand: straight down, free across": _run(job, "valley", [by_hand()], starts, "free_tool"),
+    }
+    return _judged(
+        job, found, none, f"runs from {len(offsets)} starts within {1e3 * REACH_M:g} mm of the bottom reach it",
+        "Demonstrations start 40 mm to either side. The push by hand shows that here compliance does it, and that "
+        "whoever knows the valley needs no demonstration.",
+    )  # fmt: skip
+
+
+def by_hand(axes: str = "x", turn: str = "", at: Sequence[float] = TIP) -> Document:
+    """An LMC document: straight down, free along some axes, turning freely about some, at a point of the tool."""
+
+    def part(direction: Any, free: str, stiffness: float, speed: float) -> dict[str, Any]:
+        held = np.array([0.0 if axis in free else stiffness for axis in "xyz"])
+        return {
+            "desired_direction": direction, "speed": speed, "fully_compliant": False,
+            "compliant_axes": [np.eye(3)["xyz".index(axis)].tolist() for axis in free],
+            "stiffness": np.diag(held).tolist(), "damping": np.diag([40.0 if speed else 0.3] * 3).tolist(),
+            "evidence": {},
+        }  # fmt: skip
+
+    phase = {
+        "translation": part([0.0, 0.0, -1.0], axes, STIFF_N_M, 0.02), "rotation": part(None, turn, STIFF_NM_RAD, 0.0),
+        "pitch": None, "stop": {"stall_s": 0.6, "lead_force_n": 20.0},
+    }  # fmt: skip
+    frame = {"work_at": list(at), "learned_at": list(at), "center_of_compliance": list(at), "axes": "base",
+             "frames": {"tip": TIP, "wrist": WRIST}}  # fmt: skip
+    return new_document(registry().skill("lmc"), {"frame": frame, "phases": [phase]})

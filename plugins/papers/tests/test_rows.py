@@ -1,0 +1,121 @@
+"""What rows are judged by: closed forms, nulls, and verdicts on insertions and switches made up here."""
+
+import json
+from math import atan, degrees, radians
+
+import numpy as np
+import pytest
+from skillframe_papers import bars, committed, document, refresh, store
+from skillframe_papers.rows import crane, nulls
+from skillframe_papers.rows.uneven import Valley, valley_scene
+
+from skillframe.demonstration.record import Demonstration
+from skillframe.frames import Pose
+from skillframe.world.scene import State
+
+UNEVEN = Valley(radians(65.0), radians(6.0), 0.1, 0.22, -1.0)
+
+
+def slides(valley, push):
+    """Statics, written out for each face: the push's part along it is downhill and beats friction."""
+    for angle, mu, side in (
+        (valley.steep, valley.rough_steep, valley.side),
+        (valley.flat, valley.rough_flat, -valley.side),
+    ):
+        normal = np.array([-side * np.sin(angle), 0.0, np.cos(angle)])
+        downhill = np.array([-side * np.cos(angle), 0.0, -np.sin(angle)])
+        if not push @ downhill > mu * -(push @ normal) or push @ normal > 0.0:
+            return False
+    return True
+
+
+def test_a_push_is_allowed_where_coulomb_friction_lets_it_slide_down_both_slopes():
+    tilts = np.radians(np.arange(-89.5, 89.5, 0.5))  # away from the limits, which are no multiples of that
+    pushes = [np.array([np.sin(t), 0.0, -np.cos(t)]) for t in tilts]
+    found = [UNEVEN.allows(push) for push in pushes]
+    assert found == [slides(UNEVEN, push) for push in pushes]
+    assert 80 < sum(found) < 140 and not UNEVEN.allows(np.array([0.0, 0.0, -1.0]))
+
+
+def test_an_even_valley_has_the_limits_of_row_2():
+    even = Valley(radians(45.0), radians(45.0), 0.2, 0.2, 1.0)
+    assert np.allclose(np.degrees(even.limits), [degrees(atan(0.2)) - 45.0, 45.0 - degrees(atan(0.2))])
+
+
+def test_the_uneven_valley_s_ball_rests_on_both_slopes_and_starts_above_them():
+    scene = valley_scene(UNEVEN)
+    rest = np.array(scene.start_tip) - [0.0, 0.0, 0.004]
+    left, right = UNEVEN.steep, UNEVEN.flat  # the steep one is at -x
+    for angle, side in ((right, 1.0), (left, -1.0)):
+        normal = np.array([-side * np.sin(angle), 0.0, np.cos(angle)])
+        assert rest @ normal == pytest.approx(0.005, abs=1e-12)  # the ball's radius
+        offset = np.array([[side * 0.02, 0.0, 0.0]])
+        start = np.array(scene.start_tip) + offset[0] + [0.0, 0.0, scene.start_lift(offset, None)[0]]
+        assert start @ normal == pytest.approx(0.005 + 0.004 * np.cos(angle), abs=1e-12)
+    places = rest + np.array([[0.0, 0.0, 0.0], [0.002, 0.0, 0.0]])
+    state = State(Pose(places, np.tile(np.eye(3), (2, 1, 1))), np.zeros((2, 6)))
+    assert scene.goal(state).tolist() == [True, False]
+
+
+def shown(direction, force, length=0.1):
+    """A straight motion of the tip in contact."""
+    time = np.linspace(0.0, 5.0, 2501)
+    position = np.outer(time / 5.0 * length, direction)
+    wrench = np.tile([*force, 0.0, 0.0, 0.0], (len(time), 1))
+    meta = {"frames": {"tip": [0.0, 0.0, 0.0]}, "hand": "tip", "contact": True,
+            "sensor": {"force_noise": 0.3, "torque_noise": 0.01}}  # fmt: skip
+    quaternion = np.tile([0.0, 0.0, 0.0, 1.0], (len(time), 1))
+    return Demonstration(time=time, position=position, quaternion=quaternion, wrench=wrench, meta=meta)
+
+
+def test_nulls_are_means_of_motion_and_of_force_and_what_lies_between():
+    group = [shown([1.0, 0.0, 0.0], [0.0, 0.0, 8.0]), shown([0.0, 1.0, 0.0], [0.0, 0.0, 4.0])]
+    found = nulls.pushes(group)
+    half = np.sqrt(0.5)
+    assert np.allclose(found["mean motion"], [half, half, 0.0], atol=0.01)  # as many intervals of either, within one
+    assert np.allclose(found["minus mean force"], [0.0, 0.0, -1.0]) and np.allclose(found[nulls.BY_HAND], [0, 0, -1])
+    assert np.allclose(found["bisector"], [0.5, 0.5, -half], atol=0.01)
+    assert np.allclose(found["mean chord"], [half, half, 0.0], atol=1e-6)
+    uneven = nulls.pushes([shown([1.0, 0.0, 0.0], [0, 0, 8.0], 0.15), shown([0.0, 1.0, 0.0], [0, 0, 8.0], 0.05)])
+    assert uneven["mean motion"][0] > 0.9 and np.allclose(uneven["mean chord"], [half, half, 0.0], atol=1e-6)
+
+
+def test_a_count_has_its_interval_and_is_ahead_only_if_intervals_do_not_touch():
+    assert bars.counted(9, 12) == "9 of 12 (43 to 95 %)"  # Clopper and Pearson: 0.4281 to 0.9451
+    assert bars.ahead(20, 12, 20, quick=False) and not bars.ahead(20, 13, 20, quick=False)  # 0.832; 0.809, 0.846
+    assert bars.ahead(3, 2, 3, quick=True) and not bars.ahead(3, 3, 3, quick=True)
+
+
+def test_a_verdict_on_several_shares_is_the_worst_of_them_and_fails_beside_a_null():
+    assert bars.together(["pass", "pass"], True) == "pass" and bars.together(["pass"], False) == "fail"
+    assert bars.together(["pass", "reported"], True) == "reported"
+    assert bars.together(["reported", "fail"], True) == "fail"
+
+
+def test_a_tool_that_is_late_is_off_by_the_path_s_largest_speed():
+    # legs of sqrt(0.5) m in 5 s from rest to rest by a quintic, whose largest rate is 1.875 over its time
+    assert crane._late_mm() == pytest.approx(1e3 * 1.875 * np.sqrt(0.5) / 5.0 * 0.05, rel=2e-3)
+
+
+def test_the_data_set_s_factors_are_the_last_trials_cylinder_by_cylinder():
+    draws = crane._draws(((1.0, 1.0), (0.9, 0.8)), (-1.0, 1.0))
+    assert draws["robot.mass_scale"].tolist() == pytest.approx([1.0, 0.9, 1.0 / 0.9, 0.9])
+    assert draws["actuator.valve_scale_2"].tolist() == pytest.approx([1.0, 1.0, 1.0 / 1.05, 1.05])
+    assert draws["actuator.friction_scale"].tolist() == [1.0, 0.8, 1.0, 1.0]
+    assert draws["actuator.bulk_scale_3"].tolist() == pytest.approx([1.0, 1.0, 1.0 / 1.1, 1.1])
+
+
+def test_rows_computed_again_replace_their_own_number_and_leave_the_others(tmp_path):
+    old = json.loads((committed.FOLDER / "reproduce.json").read_text(encoding="utf-8"))
+    folder, out, root = tmp_path / "package", tmp_path / "out", tmp_path / "root"
+    for place in (folder, out, (root / refresh.PAGE).parent):
+        place.mkdir(parents=True)
+    (folder / "reproduce.json").write_text(json.dumps(old), encoding="utf-8")
+    new = [{**each, "ours": "another", "cpu_s": 7.0} for each in old if each["row"] == "9"]
+    (out / store.TABLE).write_text(json.dumps(new), encoding="utf-8")
+    said = refresh.refresh(out, root, folder)
+    rows = {each["row"]: each for each in json.loads((folder / "reproduce.json").read_text(encoding="utf-8"))}
+    assert list(rows) == [each["row"] for each in old] and rows["9"]["ours"] == "another"
+    assert all(rows[each["row"]] == each for each in old if each["row"] != "9")
+    assert "row 9: fail, 7 s of processor time" in said[0] and f"all {len(old)} rows" in said[1]
+    assert (root / refresh.PAGE).read_text(encoding="utf-8") == document.render(list(rows.values()))
