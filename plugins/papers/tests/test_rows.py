@@ -6,7 +6,7 @@ from math import atan, degrees, radians
 import numpy as np
 import pytest
 from skillframe_papers import bars, committed, document, refresh, store
-from skillframe_papers.rows import crane, nulls
+from skillframe_papers.rows import crane, nulls, skills
 from skillframe_papers.rows.uneven import Valley, valley_scene
 
 from skillframe.demonstration.record import Demonstration
@@ -103,6 +103,12 @@ def test_the_data_set_s_factors_are_the_last_trials_cylinder_by_cylinder():
     assert draws["actuator.valve_scale_2"].tolist() == pytest.approx([1.0, 1.0, 1.0 / 1.05, 1.05])
     assert draws["actuator.friction_scale"].tolist() == [1.0, 0.8, 1.0, 1.0]
     assert draws["actuator.bulk_scale_3"].tolist() == pytest.approx([1.0, 1.0, 1.0 / 1.1, 1.1])
+
+
+def test_the_largest_tilt_is_that_up_to_which_both_signs_insert():
+    tilts = [4.0, -4.0, 8.0, -8.0, 12.0, -12.0]
+    assert skills._largest(tilts, np.array([1, 1, 1, 0, 1, 1], dtype=bool)) == 4.0
+    assert skills._largest(tilts, np.array([0, 1, 1, 1, 1, 1], dtype=bool)) == 0.0
 
 
 def test_rows_computed_again_replace_their_own_number_and_leave_the_others(tmp_path):

@@ -87,6 +87,13 @@ def _executed() -> Iterable[RowType]:
         settings=NOISE, group="executed",
         run=Lazy("skillframe_papers.rows.skills:region"),
     )  # fmt: skip
+    yield RowType(
+        name="30", topic="learning from force",
+        summary="rotation alone aligns a peg about its tip, and jams about the wrist",
+        published="tip aligns, wrist jams", source=TWO_ARMS,
+        bar="both signs: up to 12 degrees about the tip, not even 4 about the wrist", settings=NOISE, group="executed",
+        run=Lazy("skillframe_papers.rows.skills:centre"),
+    )  # fmt: skip
 
 
 def _two_arms() -> Iterable[RowType]:

@@ -1,4 +1,4 @@
-"""Row 27 of the papers' results: learned skills executed.
+"""Rows 27 and 30 of the papers' results: pushes executed, and about which point a peg turns.
 
 Each skill runs from starts spread over what was shown, beside the same push with what the row claims taken away. Draws
 of one set of demonstrations share their learned push and mostly stand or fall together: sets are counted, too.
@@ -29,6 +29,7 @@ SEED = 64_000
 SETS, QUICK_SETS = 6, 2
 SHARE = 0.9
 REACH_M = 0.06
+TILTS_DEG = (4.0, 8.0, 12.0)
 WRIST, TIP = [0.0, 0.0, 0.0], [0.0, 0.0, 0.2]
 STIFF_N_M, STIFF_NM_RAD = 1000.0, 20.0
 
@@ -148,3 +149,39 @@ def by_hand(axes: str = "x", turn: str = "", at: Sequence[float] = TIP) -> Docum
     frame = {"work_at": list(at), "learned_at": list(at), "center_of_compliance": list(at), "axes": "base",
              "frames": {"tip": TIP, "wrist": WRIST}}  # fmt: skip
     return new_document(registry().skill("lmc"), {"frame": frame, "phases": [phase]})
+
+
+def centre(job: RowRun) -> RowResult:
+    """Row 30: rotation alone aligns a peg about its tip, and not about the wrist."""
+    tilts = [sign * tilt for tilt in TILTS_DEG for sign in (1.0, -1.0)]
+    starts = {"start.tilt_y": np.radians(tilts).tolist()}
+    cases = {
+        "tip, rotation alone": ("", "tip"), "wrist, rotation alone": ("", "wrist"),
+        "tip, and free along x": ("x", "tip"), "wrist, and free along x": ("x", "wrist"),
+    }  # fmt: skip
+    found = {
+        name: _run(job, "peg_in_hole", [by_hand(axes, turn="y")], starts, "free_tool", at).success[0]
+        for name, (axes, at) in cases.items()
+    }
+    reach = {name: _largest(tilts, success) for name, success in found.items()}
+    tip, wrist = reach["tip, rotation alone"], reach["wrist, rotation alone"]
+    return RowResult(
+        ours=f"rotation alone inserts up to {tip:g} degrees about the tip, and up to {wrist:g} about the wrist; with x "
+        f"free, {reach['wrist, and free along x']:g} about the wrist",
+        verdict="pass" if tip >= TILTS_DEG[-1] and wrist < TILTS_DEG[0] else "fail",
+        head=("centre of compliance", "largest tilt, both signs [degrees]", *(f"{tilt:+g}" for tilt in tilts)),
+        rows=[(name, f"{reach[name]:g}", *("in" if good else "no" for good in found[name])) for name in cases],
+        difference=f"Null: the wrist in the tip's place. Tilts of {', '.join(f'{t:g}' for t in TILTS_DEG)} degrees. "
+        "The push is made by hand; nothing is learned.",
+        values={"tip_deg": tip, "wrist_deg": wrist},
+    )  # fmt: skip
+
+
+def _largest(tilts: Sequence[float], success: NDArray[np.bool_]) -> float:
+    """Largest tilt up to which both signs insert. 0: not even the smallest."""
+    reach = 0.0
+    for tilt in sorted({abs(t) for t in tilts}):
+        if not all(good for t, good in zip(tilts, success, strict=True) if abs(t) == tilt):
+            break
+        reach = tilt
+    return reach
