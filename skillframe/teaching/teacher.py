@@ -182,8 +182,7 @@ class Teacher(Skill):
         if self._direction is None:
             self._position = self._position - error * (dt / hand.relaxation)
             return np.zeros_like(error)
-        self._aim += -self._aim * (dt / AIM_TIME) + settings.aim_noise * np.sqrt(2.0 * dt / AIM_TIME) * noise
-        direction = unit(self._direction + self._aim)
+        direction = self._aimed(noise, seen, dt)
         along = (error * direction).sum(-1, keepdims=True)
         sideways = error - along * direction
         excess = np.maximum(along - settings.force_max / hand.stiffness, 0.0)
@@ -193,6 +192,13 @@ class Teacher(Skill):
             velocity, excess = np.clip(left, 0.0, 1.0) * velocity, np.zeros_like(excess)
         self._position = self._position + velocity * dt - sideways * (dt / hand.relaxation) - excess * direction
         return velocity
+
+    def _aimed(self, noise: Float, seen: Float, dt: float) -> Float:
+        """Where the person pushes now (N, 3), who sees the hand at (N, 3)."""
+        assert self._direction is not None
+        self._aim += -self._aim * (dt / AIM_TIME) + self._settings.aim_noise * np.sqrt(2.0 * dt / AIM_TIME) * noise
+        result: Float = unit(self._direction + self._aim)
+        return result
 
     def _turn_hand(self, seen: Float, dt: float) -> Float:
         """Advance the hand's attitude. Returns its angular velocity (N, 3)."""
