@@ -35,6 +35,7 @@ from skillframe_lmc.directions import Choice, choose
 from skillframe_lmc.gains import gains
 from skillframe_lmc.heading import heading
 from skillframe_lmc.intervals import Motion, Track
+from skillframe_lmc.modes import contact_modes, mean_pushes, one_sided
 from skillframe_lmc.phase import Stop
 from skillframe_lmc.press import Press, presses
 from skillframe_lmc.sectors import Sectors, sectors
@@ -100,8 +101,9 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     frame = frame_of(demonstrations, options)
     at, hand = np.array(frame["learned_at"]), np.array(frame["work_at"])
     tracks = [intervals.track(d, at, hand, options.axes) for d in demonstrations]
-    translation = _learn_part("translation", tracks, intervals.translation, settings)
     rotation = _learn_part("rotation", tracks, intervals.rotation, settings)
+    modes = settings.contact_modes and rotation.held
+    translation = _learn_part("translation", tracks, intervals.translation, settings, modes)
     return {
         "frame": frame,
         "phases": [_phase(translation, rotation, settings)],
@@ -110,8 +112,9 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
 
 
 def _learn_part(
-    name: Name, tracks: Sequence[Track], cut: Callable[[Track, Settings], Motion], settings: Settings
-) -> Learned:
+    name: Name, tracks: Sequence[Track], cut: Callable[[Track, Settings], Motion], settings: Settings,
+    by_modes: bool = False,
+) -> Learned:  # fmt: skip
     motions = [cut(blocks, settings) for blocks in tracks]
     if settings.contact_only:
         motions = [intervals.touching(motion) for motion in motions]
@@ -119,23 +122,32 @@ def _learn_part(
     moving = [m for m in motions if m.excursion >= least and len(m.displacement)]
     means = np.array([unit(m.displacement).mean(axis=0) for m in moving]).reshape(-1, 3)
     done = work(moving) if moving else None
-    choice, given, axes = None, [sectors(m) for m in moving], None
+    choice, given, modes, axes = None, [sectors(m) for m in moving], list[Sectors](), None
     if done is not None and not done.environment_drove:
         given = [sectors(m, teacher_driven_only=name == "rotation") for m in moving]
         if all(len(g.contact) >= min(FEWEST_INTERVALS, len(m.work)) for g, m in zip(given, moving, strict=True)):
             choice = choose(given, settings, heading(moving))
+            modes = _modes(moving, choice) if by_modes else []
+            choice = choose(modes, settings) if modes else choice
     stood = _standing(name, tracks, motions, moving, settings) if choice is None or choice.direction is None else None
     if stood is not None:
         done, given, choice = stood.work, [p.sectors for p in stood.presses], stood.choice
     if done is not None and not done.environment_drove:
         direction = None if choice is None else choice.direction
-        rows = means if stood is None else stood.means(least)
+        rows = np.concatenate([means, mean_pushes(modes)]) if stood is None else stood.means(least)
         axes = compliant_axes(rows, direction, _straightness(name, moving, means, choice, settings))
     path, time = sum(m.path for m in moving), sum(m.duration for m in moving)
     return Learned(
         name=name, motions=motions, moving=moving, given=given, work=done, choice=choice, axes=axes, means=means,
         speed=path / time if time > 0.0 else 0.0, pressed=() if stood is None else stood.presses,
     )  # fmt: skip
+
+
+def _modes(moving: Sequence[Motion], choice: Choice) -> list[Sectors]:
+    """The contact modes, if they are to choose the direction in place of the intervals: faces of one side."""
+    modes = contact_modes(moving)
+    way = sum(unit(m.displacement.sum(axis=0)) for m in moving) if choice.direction is None else choice.direction
+    return modes if one_sided(modes, unit(np.asarray(way))) else []
 
 
 class _Standing(NamedTuple):

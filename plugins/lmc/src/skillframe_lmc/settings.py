@@ -23,6 +23,8 @@ class Settings:
             the forces of the recording are large).
         contact_only: leave out the motion before the tool touches and between touches; for machines, whose wrench is
             only an estimate and whose approach says little about the push.
+        contact_modes: count contact modes for the translation, whatever the time that each was slid on; false weighs by
+            intervals, demonstration by demonstration.
         quantile: share of a demonstration's intervals that must accept a direction; the rest may be outliers.
         pyramid_min_rad, pyramid_max_rad: least half-opening of the pyramids, and the largest at which a direction is
             still said to exist.
@@ -46,6 +48,7 @@ class Settings:
     force_min_n: float = 1.0
     torque_min_nm: float = 0.08
     contact_only: bool = False
+    contact_modes: bool = True
     quantile: float = 0.8
     pyramid_min_rad: float = radians(8.0)
     pyramid_max_rad: float = radians(25.0)
