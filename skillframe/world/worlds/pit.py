@@ -86,7 +86,7 @@ def build(params: PitParams) -> Scene:
 
 
 def _resting(normals: Float, radius: float) -> Float:
-    """The centre (3,) of a ball that touches all faces; of those on the line of two, the nearest to the origin."""
+    """The centre (3,) of a ball that touches all faces, or of two the one nearest to the origin."""
     centre: Float = np.linalg.lstsq(normals, np.full(len(normals), radius), rcond=None)[0]
     return centre
 
