@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from skillframe.frames import Float, Pose, norm, rotate, unit
+from skillframe.frames import Float, Pose, cross, norm, rotate, unit
 from skillframe.skill import Observation
 from skillframe.teaching.teacher import AIM_TIME, Teacher, TeacherSettings
 from skillframe.world.scene import Task, Vector
@@ -51,7 +51,7 @@ def off_by(direction: Vector, angle: float, azimuth: float) -> Vector:
     given = np.array(direction)
     least = np.eye(3)[np.argmin(np.abs(given))]
     first = unit(least - (least @ given) * given)
-    aside = np.cos(azimuth) * first + np.sin(azimuth) * np.cross(given, first)
+    aside = np.cos(azimuth) * first + np.sin(azimuth) * cross(given, first)
     x, y, z = np.cos(angle) * given + np.sin(angle) * aside
     return (float(x), float(y), float(z))
 
