@@ -45,33 +45,33 @@ def of(draws, rows):
     return {name: values[rows] for name, values in draws.items()}
 
 
+def run_of(rows):
+    """Calibrated, then half a second of the diamond."""
+    return simulate(Follow(diamond, MOVING), setup(), of(DRAWS, rows), rngs(rows), duration_s=0.5, trace_hz=100.0)
+
+
 @pytest.fixture(scope="module")
-def runs():
-    """Both trials at once, and each alone: calibrated, then half a second of the diamond."""
-
-    def run(rows):
-        return simulate(Follow(diamond, MOVING), setup(), of(DRAWS, rows), rngs(rows), duration_s=0.5, trace_hz=100.0)
-
-    return run([0, 1]), [run([0]), run([1])]
+def together():
+    return run_of([0, 1])
 
 
 @pytest.mark.slow
-def test_a_trial_is_the_same_to_the_last_bit_alone_and_beside_another(runs):
-    together, alone = runs
-    for i, single in enumerate(alone):
+def test_a_trial_is_the_same_to_the_last_bit_alone_and_beside_another(together):
+    for i in range(2):
+        single = run_of([i])
         for name in ("position", "wrench", "q"):
             assert np.array_equal(getattr(together.traces[i], name), getattr(single.traces[0], name))
         for name, column in together.traces[i].machine.items():
             assert np.array_equal(column, single.traces[0].machine[name]), name
 
 
-def test_trials_that_differ_in_their_machines_differ_in_their_runs(runs):
-    one, two = runs[0].traces
+def test_trials_that_differ_in_their_machines_differ_in_their_runs(together):
+    one, two = together.traces
     assert np.abs(one.machine["pressure_a"] - two.machine["pressure_a"]).max() > 1e5
 
 
-def test_a_trace_says_which_actuators_it_shows_and_reads_back_whole(runs, tmp_path):
-    trace = runs[0].traces[0]
+def test_a_trace_says_which_actuators_it_shows_and_reads_back_whole(together, tmp_path):
+    trace = together.traces[0]
     assert trace.meta["actuators"] == ["lift_piston", "tilt_piston", "extension"]
     assert all(len(column) == len(trace.time) for column in trace.machine.values())
     trace.save(tmp_path / "run.npz")
@@ -80,9 +80,9 @@ def test_a_trace_says_which_actuators_it_shows_and_reads_back_whole(runs, tmp_pa
     assert np.array_equal(read.machine["valve"], trace.machine["valve"])
 
 
-def test_pistons_pass_on_what_the_machine_gains_and_the_pump_gives_more(runs):
+def test_pistons_pass_on_what_the_machine_gains_and_the_pump_gives_more(together):
     """From a rest, energy is height and motion: W = m g dh + 1/2 m v^2, friction being inside the cylinders' force."""
-    trace, chain = runs[0].traces[0], ClosedChain(load_robot_model("hiab_xs031"))
+    trace, chain = together.traces[0], ClosedChain(load_robot_model("hiab_xs031"))
     z = trace.q[:, [list(chain.model.names).index(name) - 1 for name in chain.independent]]
     rate = np.gradient(z, trace.time, axis=0)
     energy = [_mechanical(chain, *row) for row in zip(z, rate, strict=True)]
@@ -243,9 +243,9 @@ def test_a_crane_that_is_told_to_stand_in_the_air_stands():
         assert np.sqrt(np.mean(rates**2, axis=0)).max() < 1e-3  # 3 mm/s of the tool; swinging it was 2e-2
 
 
-def test_the_record_holds_the_force_as_it_is_now_and_the_law_gets_the_late_one(runs):
+def test_the_record_holds_the_force_as_it_is_now_and_the_law_gets_the_late_one(together):
     """Fed back, a force that looks ahead made the crane bounce to its force limit."""
-    trace = runs[0].traces[0]
+    trace = together.traces[0]
     loop = begin(Follow(diamond, MOVING), setup(), of(DRAWS, [0]), rngs([0]), 100.0)
     force, feedback, answered = (np.array([row]) for row in ([3.0, 4.0], [1.0, 2.0], [0.5, 1.0]))
     loop.drive.estimate = loop.drive.estimate._replace(force=force, feedback=feedback, answered=answered)
