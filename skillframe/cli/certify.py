@@ -12,8 +12,8 @@ from skillframe.cli.numbers import COUNT, NATURAL
 from skillframe.cli.output import emit_json, note, quiet_option
 
 if TYPE_CHECKING:
-    from skillframe.certify.certificate import Outcome
-    from skillframe.certify.procedure import Engine
+    from skillframe.campaign.claims.certificate import Outcome
+    from skillframe.campaign.claims.procedure import Engine
 
 _PATH = click.Path(path_type=Path)
 
@@ -47,7 +47,7 @@ def certify(
       skillframe campaign certify certified
       skillframe campaign check certified
     """
-    from skillframe.certify.certificate import CERTIFICATE, write_certificate
+    from skillframe.campaign.claims.certificate import CERTIFICATE, write_certificate
 
     folder = source if out is None else out
     with terminable() as code:
@@ -71,8 +71,8 @@ def certify(
 
 def _begin(source: Path, out: Path, rate: float, confidence: float, skill: str | None, look: int | None) -> None:
     from skillframe.campaign import evaluate
+    from skillframe.campaign.claims.question import begin
     from skillframe.campaign.spec import CampaignSpec
-    from skillframe.certify.question import begin
     from skillframe.extend.registry import registry
 
     spec = CampaignSpec.from_toml(source)
@@ -84,10 +84,10 @@ def _begin(source: Path, out: Path, rate: float, confidence: float, skill: str |
 
 def _engine(folder: Path, workers: int | None) -> Engine:
     from skillframe.campaign import evaluate
+    from skillframe.campaign.claims.procedure import Engine
+    from skillframe.campaign.claims.question import LOOK, read_question
     from skillframe.campaign.folder import load
     from skillframe.campaign.runner import Options
-    from skillframe.certify.procedure import Engine
-    from skillframe.certify.question import LOOK, read_question
     from skillframe.extend.registry import registry
 
     read_question(folder)
@@ -97,9 +97,9 @@ def _engine(folder: Path, workers: int | None) -> Engine:
 
 def _judged(folder: Path, engine: Engine, again: bool) -> Outcome | None:
     """Run what is missing, and judge. None if no box was worth claiming."""
-    from skillframe.certify import procedure
-    from skillframe.certify.certificate import outcome
-    from skillframe.certify.question import read_question
+    from skillframe.campaign.claims import procedure
+    from skillframe.campaign.claims.certificate import outcome
+    from skillframe.campaign.claims.question import read_question
     from skillframe.cli.campaign_words import progress
     from skillframe.errors import InputError
 
@@ -179,9 +179,9 @@ def check(folder: Path, replays: int) -> int:
       skillframe campaign check certified --replays 5
     """
     from skillframe.campaign import evaluate
+    from skillframe.campaign.claims import procedure
+    from skillframe.campaign.claims.certificate import check_certificate
     from skillframe.campaign.replay import replay_trial
-    from skillframe.certify import procedure
-    from skillframe.certify.certificate import check_certificate
 
     wrong = check_certificate(folder)
     for text in wrong:

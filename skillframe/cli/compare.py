@@ -10,7 +10,7 @@ import click
 from skillframe.cli.output import emit_json, note, table
 
 if TYPE_CHECKING:
-    from skillframe.comparison.compare import Judgement, Pair
+    from skillframe.campaign.claims.compare import Judgement, Pair
 
 
 @click.command(name="compare")
@@ -35,8 +35,8 @@ def command(file: Path, alpha: float, draws: str | None, as_json: bool) -> None:
       skillframe compare results/results.csv
       skillframe compare trials.csv --draws friction,tilt --json
     """
-    from skillframe.comparison.compare import compare
-    from skillframe.comparison.trials import read_trials
+    from skillframe.campaign.claims.compare import compare
+    from skillframe.campaign.claims.trials import read_trials
 
     found = compare(read_trials(file, [name.strip() for name in draws.split(",")] if draws else []), alpha)
     if as_json:

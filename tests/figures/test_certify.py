@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
+from skillframe.campaign.claims.box import Box
+from skillframe.campaign.claims.claim import certified, family, fresh_trials, judge
+from skillframe.campaign.claims.procedure import Looked, propose
+from skillframe.campaign.claims.question import LOOKS, Question
 from skillframe.campaign.statistics import clopper_pearson
-from skillframe.certify.box import Box
-from skillframe.certify.claim import certified, family, fresh_trials, judge
-from skillframe.certify.procedure import Looked, propose
-from skillframe.certify.question import LOOKS, Question
 from tests.figures.teaching import row
 
 pytestmark = pytest.mark.figures

@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from skillframe.comparison.compare import Evidence, holm_of_minima
+from skillframe.campaign.claims.compare import Evidence, holm_of_minima
 from tests.figures.teaching import row
 
 pytestmark = pytest.mark.figures

@@ -27,7 +27,7 @@ FLOORS = [
     {"document"},
     {"execution"},
     {"teaching", "campaign"},
-    {"reports", "conformance", "comparison", "certify"},
+    {"reports", "conformance"},
     {"api"},
     {"testing"},
     {"cli"},

@@ -62,7 +62,7 @@ def test_half_of_the_way_from_the_heading_is_held_against_a_push_up_to_0_15_rad(
 
 
 def test_among_pushes_that_explain_the_motion_alike_the_one_nearest_to_the_heading_is_taken() -> None:
-    """Free motions to both sides by 4 degrees leave everything between them as deep; the chords decide."""
+    """Free motions to both sides by 4 degrees leave everything between them as deep, so that the chords decide."""
     given, found = [free(*[-4.0] * 5), free(*[4.0] * 5)], {}
     for chords in (-3.0, 3.0):
         choice = choose(given, Settings(), Heading(leaning(chords)[0], None)).direction

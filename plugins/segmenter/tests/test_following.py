@@ -49,7 +49,7 @@ def test_a_motion_counts_two_and_a_half_times_and_a_wrench_a_third_of_that():
 
 
 def test_one_odd_window_makes_no_switch_and_two_alike_do():
-    """Two trials side by side; a window that is not sure starts the count again."""
+    """Two trials side by side. A window that is not sure starts the count again."""
     debounce = Debounce(SimpleNamespace(switch_posterior=0.8, switch_windows=2), 2)
     sure = [np.eye(2)[[k, 1 - k]] * 0.8 + 0.1 for k in (0, 1, 0, 0)]
     asked = [debounce.decide(posterior).tolist() for posterior in sure]

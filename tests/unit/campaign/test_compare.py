@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from skillframe.campaign.claims.compare import Evidence, compare, evidence_of, holm_of_minima, more_trials
+from skillframe.campaign.claims.letters import letters
+from skillframe.campaign.claims.trials import Trial, Trials, read_trials
 from skillframe.campaign.statistics import holm, mcnemar_sequential
 from skillframe.cli.main import run
-from skillframe.comparison.compare import Evidence, compare, evidence_of, holm_of_minima, more_trials
-from skillframe.comparison.letters import letters
-from skillframe.comparison.trials import Trial, Trials, read_trials
 from skillframe.errors import InputError
 
 

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from scipy.stats import binom, qmc
 
+from skillframe.campaign.claims import procedure
+from skillframe.campaign.claims.box import Box, peel
+from skillframe.campaign.claims.certificate import check_certificate, outcome, write_certificate
+from skillframe.campaign.claims.claim import certified, family, fresh_trials, judge, most_failures, passes
+from skillframe.campaign.claims.question import begin, read_question
+from skillframe.campaign.claims.surrogate import Surrogate, covariance
 from skillframe.campaign.folder import load
 from skillframe.campaign.rows import ChunkJob, rows_of
 from skillframe.campaign.runner import Options
 from skillframe.campaign.sampling import draws
 from skillframe.campaign.spec import CampaignSpec
-from skillframe.certify import procedure
-from skillframe.certify.box import Box, peel
-from skillframe.certify.certificate import check_certificate, outcome, write_certificate
-from skillframe.certify.claim import certified, family, fresh_trials, judge, most_failures, passes
-from skillframe.certify.question import begin, read_question
-from skillframe.certify.surrogate import Surrogate, covariance
 from skillframe.errors import InputError
 from skillframe.world.worlds.valley import ValleyParams
 

@@ -19,9 +19,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.campaign.claims.letters import letters
+from skillframe.campaign.claims.trials import Trials
 from skillframe.campaign.statistics import confidence_sequence, log_mixtures
-from skillframe.comparison.letters import letters
-from skillframe.comparison.trials import Trials
 from skillframe.frames import Float
 
 ALPHA = 0.05

@@ -14,13 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from skillframe import __version__
+from skillframe.campaign.claims.claim import Tested, certified, judge
+from skillframe.campaign.claims.procedure import CLAIM, FRESH, box_of, claims, looked, read_claim, rows_of_campaign
+from skillframe.campaign.claims.question import LOOK, QUESTION, Question, read_question
 from skillframe.campaign.folder import load
 from skillframe.campaign.provenance import file_hash
 from skillframe.campaign.rows import Row
 from skillframe.campaign.store import RESULTS
-from skillframe.certify.claim import Tested, certified, judge
-from skillframe.certify.procedure import CLAIM, FRESH, box_of, claims, looked, read_claim, rows_of_campaign
-from skillframe.certify.question import LOOK, QUESTION, Question, read_question
 from skillframe.errors import InputError
 from skillframe.files import write_whole
 from skillframe.files.documents import read_json
@@ -133,7 +133,7 @@ def _tested(question: Question, found: Outcome, rows: list[Row]) -> dict[str, An
 
 
 def check_certificate(folder: Path, params: type | None = None) -> list[str]:
-    """What no longer fits a certificate, in sentences; none if all does.
+    """What no longer fits a certificate, in sentences, or nothing if all does.
 
     Raises:
         InputError: there is no certificate, or the files that it names are damaged beyond reading.

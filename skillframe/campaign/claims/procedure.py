@@ -22,16 +22,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.campaign.axes import Axis
+from skillframe.campaign.claims.box import Box, peel
+from skillframe.campaign.claims.claim import family, fresh_trials
+from skillframe.campaign.claims.question import LOOK, Question, read_question
+from skillframe.campaign.claims.surrogate import Surrogate
 from skillframe.campaign.folder import COPIES, Describe, campaign_hash, load, prepare
 from skillframe.campaign.provenance import file_hashes
 from skillframe.campaign.rows import Row
 from skillframe.campaign.runner import Options, Progress, run_campaign
 from skillframe.campaign.store import ordered, read_content
 from skillframe.campaign.trouble import Evaluate
-from skillframe.certify.box import Box, peel
-from skillframe.certify.claim import family, fresh_trials
-from skillframe.certify.question import LOOK, Question, read_question
-from skillframe.certify.surrogate import Surrogate
 from skillframe.errors import InputError
 from skillframe.files import write_whole
 from skillframe.files.documents import read_json

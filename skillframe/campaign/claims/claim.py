@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.certify.box import Box
+from skillframe.campaign.claims.box import Box
 from skillframe.frames import Float
 
 SHARES = (0.7, 0.85, 1.0)
@@ -58,7 +58,7 @@ def passes(failures: int, trials: int, rate: float, alpha: float) -> bool:
 
 
 def most_failures(trials: int, rate: float, alpha: float) -> int:
-    """The largest number of failures that still passes; -1 if none does."""
+    """The largest number of failures that still passes, or -1 if none does."""
     from scipy.stats import binom
 
     most = int(binom.ppf(alpha, trials, 1.0 - rate))
