@@ -26,6 +26,8 @@ def test_every_world_builds_keeps_its_parameters_and_can_be_described(world):
 @pytest.mark.parametrize("world", RECORDS)
 @pytest.mark.parametrize("sign", [0.0, 1.0, -1.0])
 def test_no_start_of_a_demonstration_touches_anything_and_none_is_a_goal(plant, world, sign):
+    if world == "pit" and sign < 0.0:
+        pytest.skip("its faces differ, so the mirror image of a start lies inside the opposite one")
     for start in make_scene(RECORDS[world], {}).task.starts:
         now = plant("free_tool", world, {key: sign * value for key, value in start.items()})
         np.testing.assert_array_equal(now.contact_force(), 0.0)
