@@ -27,6 +27,7 @@ from skillframe.world.worlds.turned import turned
 
 WIDTH, THICK = 0.16, 0.02
 BEHIND = 0.004  # play in the pocket beyond the ball [m]
+LOWER = 0.022  # length of the lower ramp along its slope [m]
 LEAN = 0.15  # sideways share of the push towards the wall
 GAP = 0.002  # from the ball to the wall at the start [m]
 
@@ -41,7 +42,6 @@ class HumpParams:
         slope: angle r of the ramp from the floor [rad, 0.5deg to 80deg].
         height: of the ramp, from its own foot [m, 1mm to 100mm].
         steps: angle of a lower ramp before it [rad, 0deg to 60deg]; 0: there is none.
-        steps_length: of the lower ramp along its slope [m, 1mm to 200mm].
         skew: angle by which the ramp is turned about the floor's normal [rad, 0deg to 40deg]; above 0 there is a wall.
         friction: Coulomb coefficient [0 to 5].
         radius: of the ball at the tip [m, 0.1mm to 200mm].
@@ -52,7 +52,6 @@ class HumpParams:
     slope: float = 0.9250245035569946
     height: float = 0.008
     steps: float = 0.0
-    steps_length: float = 0.022
     skew: float = 0.0
     friction: float = 0.1
     radius: float = 0.005
@@ -112,7 +111,7 @@ def _foot(params: HumpParams) -> tuple[float, float]:
     """Where the ramp begins, x and z: at the origin, or at the end of the lower ramp."""
     if not params.steps:
         return 0.0, 0.0
-    return params.steps_length * cos(params.steps), params.steps_length * sin(params.steps)
+    return LOWER * cos(params.steps), LOWER * sin(params.steps)
 
 
 def _stop(params: HumpParams) -> float:
@@ -133,7 +132,7 @@ def _fixture(params: HumpParams, stop: float, wall: float) -> tuple[Geom, ...]:
         _box((0.5 * THICK, 0.5 * WIDTH, 0.03), (stop + 0.5 * THICK, 0.0, 0.03)),
     ]
     if params.steps:
-        parts.append(slope(params.steps, 0.0, params.steps_length, WIDTH))
+        parts.append(slope(params.steps, 0.0, LOWER, WIDTH))
     if params.skew:
         parts.append(_box((0.12, 0.5 * THICK, 0.03), (0.0, wall - 0.5 * THICK, 0.03)))
     return tuple(parts)

@@ -94,7 +94,7 @@ def test_what_a_skill_or_a_world_does_wrong_is_that_trials_failure(out, referenc
     (changed,) = [a for a, b in zip(mine, other, strict=True) if a != b]
     assert changed.startswith(b"37,a.skill.json,7,")
     assert b",0,error: " in changed or b',0,"error: ' in changed
-    assert changed.endswith(b",nan,nan,nan,nan,nan,nan,nan,lost,nan,nan,,,,0,0")
+    assert changed.endswith(b",nan,nan,nan,nan,nan,nan,nan,lost,nan,nan,,,,0,0,nan")
 
 
 def test_sys_exit_in_a_skill_ends_its_trial_and_not_the_campaign(out):
