@@ -45,7 +45,8 @@ PARTS = {
 def pressed(seeds=SEEDS, plate=1e6, damping=DAMPING):
     """Log, and the estimate of the full filter (replayed, the same as in the loop)."""
     log = Press(case(seeds, plate)._replace(damping=damping), seeds).run(SECONDS)
-    return log, *replay(log, ForceEstimator(crane(), cylinders(), len(seeds), DT))
+    estimate = replay(log, ForceEstimator(crane(), cylinders(), len(seeds), DT))
+    return log, estimate.force, estimate.sigma, estimate.valid
 
 
 def augmented(log, told):

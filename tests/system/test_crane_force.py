@@ -12,7 +12,8 @@ from tests.oracle.force_estimator import ForceEstimator
 def test_while_it_slides_the_estimate_is_good_to_two_and_a_half_percent_and_elsewhere_says_that_it_is_not():
     press = Press(case([1]), [1])
     log = press.run(LANDED + 4.0)
-    force, sigma, valid, *_ = replay(log, ForceEstimator(crane(), cylinders(), 1, DT))
+    estimate = replay(log, ForceEstimator(crane(), cylinders(), 1, DT))
+    force, sigma, valid = estimate.force, estimate.sigma, estimate.valid
     found = score(log, force, window(log, valid)[0])
     assert found.rms[0] < 2.5
     assert found.largest[0] < 6.0

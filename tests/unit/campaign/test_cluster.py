@@ -86,7 +86,7 @@ def test_exactly_the_guilty_trial_is_named(out, reference, misbehave, cause):
     summary = fakes.run(out, misbehave, **{**LIMITS, **patient})
     (line,) = changed(out, reference)
     assert line.startswith(b"37,a.skill.json,")
-    assert line.endswith(b",0," + cause + b",nan,nan,nan,nan,nan,nan,nan,lost,nan,nan,,,,0,0")
+    assert line.endswith(b",0," + cause + b",nan,nan,nan,nan,nan,nan,nan,lost,nan,nan,,,,0,0,nan")
     assert summary["complete"]
 
 
