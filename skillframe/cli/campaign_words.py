@@ -78,8 +78,8 @@ def show_rates(skills: dict[str, dict[str, Any]]) -> None:
     ]  # fmt: skip
     table(["skill", "trials", "successes", "rate", "95 % interval"], rows)
     for method in dict.fromkeys(s["method"] for s in skills.values()):
-        each = ", each 95 % by itself" if len(skills) > 1 else ""
-        click.echo(f"  {method}" if method.startswith("no interval") else f"  intervals: {method}{each}")
+        each = "intervals, each 95 % by itself" if len(skills) > 1 else "interval"
+        click.echo(f"  {method}" if method.startswith("no interval") else f"  {each}: {method}")
     for label, s in skills.items():
         if s["unended"]:
             click.echo(f"  {label}: {s['unended']} of its successes had reached the goal, but not ended by themselves")

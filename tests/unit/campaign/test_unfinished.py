@@ -155,7 +155,7 @@ def test_the_command_says_for_how_many_pairs_a_p_value_is_corrected(tmp_path, mo
     assert resumed(tmp_path, monkeypatch, three, 60) == 0
     said = capsys.readouterr().out
     assert said.count(" (Holm over 3 pairs), McNemar (exact") == 3
-    assert "fixed number of trials), each 95 % by itself\n" in said
+    assert "  intervals, each 95 % by itself: Clopper-Pearson (exact" in said
 
 
 def half_of_them_go_on(job):
