@@ -101,7 +101,13 @@ def mcnemar(only_first: int, only_second: int) -> float:
 
 def mcnemar_sequential(only_first: int, only_second: int) -> float:
     """p-value of "both skills are equally good" that may be looked at after every trial: min(1, 1/M_n(1/2))."""
-    return min(1.0, math.exp(-log_mixture(only_first, only_second, 0.5)))
+    return float(mcnemar_sequentials(only_first, only_second))
+
+
+def mcnemar_sequentials(only_first: ArrayLike, only_second: ArrayLike) -> Float:
+    """`mcnemar_sequential` of several counts, (n,) each. Counts that are expected need not be whole."""
+    result: Float = np.minimum(1.0, np.exp(-log_mixtures(only_first, only_second, 0.5)))
+    return result
 
 
 def holm(p_values: Sequence[float]) -> list[float]:

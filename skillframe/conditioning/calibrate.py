@@ -19,7 +19,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.conditioning.payload import LARGEST_CONDITION, LARGEST_MASS, LONGEST_LEVER, excitation_advice
+from skillframe.conditioning.payload import (
+    LARGEST_CONDITION,
+    LARGEST_MASS,
+    LEAST_RESIDUAL,
+    LONGEST_LEVER,
+    RESIDUAL_SHARE,
+    excitation_advice,
+    turned,
+)
 from skillframe.demonstration.calibration import Calibration
 from skillframe.demonstration.convention import GRAVITY
 from skillframe.errors import InputError
@@ -28,8 +36,6 @@ from skillframe.frames import Float, cross, norm, rotate, rotation_matrix, rotat
 LEAST_SAMPLES = 8
 KNOWN_WITHIN, LEAST_TURN = np.deg2rad(2.0), np.deg2rad(1.0)
 RARE = 1e-3
-LEAST_RESIDUAL, RESIDUAL_SHARE = 1.0, 0.1
-"""A fit may leave 1 N, or a tenth of the weight, rms per axis; contact leaves its own force. As in `payload`."""
 FAR, LEAST_FAR = 8.0, 0.5
 """A sample is an outlier at 8 times the others' residual and 0.5 N; our choice, beyond any noise of 1e6 samples."""
 MIRRORED = 0.5
@@ -115,7 +121,7 @@ def calibrate(wrench: Float, rotation: Float, source: str = "calibration") -> Ca
     _refuse_absurd(found, force.residual, source)
     return Calibrated(
         calibration=found, samples=len(wrench), independent=len(wrench) / _correlation(force.residual),
-        turned=_widest(seen), mounting=words.mounting, level=words.level, advice=advice,
+        turned=turned(seen), mounting=words.mounting, level=words.level, advice=advice,
     )  # fmt: skip
 
 
@@ -140,8 +146,8 @@ def _mounting_guess(force: Float, seen: Float, source: str) -> Float:
             source, "the weight turns as in a mirror: one of the force's axes has the wrong sign",
             "correct the order and signs of fx, fy, fz and tx, ty, tz",
         )  # fmt: skip
-    turned: Float = (u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt).T
-    return turned
+    rotation: Float = (u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt).T
+    return rotation
 
 
 class _Words(NamedTuple):
@@ -160,8 +166,8 @@ def _chosen(force: Float, rotation: Float, down: Float, start: Float) -> tuple[_
     }
     mount = _told(free["both"], slice(4, 7)) or _told(free["mounting"], slice(4, 7))
     level = _told(free["both"], slice(7, 9)) or _told(free["level"], slice(4, 6))
-    turned = free["mounting" if _told(free["both"], slice(4, 7)) is None else "both"].mounting
-    use_mount = mount is not None and _matters(mount, rotation_vector(turned))
+    alone = free["mounting" if _told(free["both"], slice(4, 7)) is None else "both"].mounting
+    use_mount = mount is not None and _matters(mount, rotation_vector(alone))
     use_level = level is not None and _matters(level, level.value)
     if use_mount and use_level and _told(free["both"], slice(4, 9)) is None:
         use_level = False  # the two cannot be told apart: a turned sensor is commoner than a leaning base
@@ -311,7 +317,7 @@ def _refuse_absurd(found: Calibration, residual: Float, source: str) -> None:
         raise InputError(
             source, f"the fit gives {wrong[0]}",
             "there is contact, or an axis, unit or attitude is wrong: leave it out, or name a stretch of free air "
-            "(--free-air FROM,TO)",
+            "(--from, --to)",
         )  # fmt: skip
 
 
@@ -321,11 +327,6 @@ def _rms(residual: Float) -> float:
 
 def _deviations(covariance: Float) -> list[float]:
     return [float(v) for v in np.sqrt(np.maximum(np.diag(covariance), 0.0))]
-
-
-def _widest(seen: Float) -> float:
-    far = seen[np.argmin(seen @ seen[0])]
-    return float(np.arccos(np.clip((seen @ far).min(), -1.0, 1.0)))
 
 
 def plain(found: Calibrated) -> dict[str, Any]:

@@ -130,9 +130,9 @@ def identify_payload(wrench: Float, gravity: Float) -> Payload:
     force = _solve(gravity[:, :, None], wrench[:, :3])
     torque = _solve(-skew(gravity), wrench[:, 3:])
     advice = excitation_advice(gravity, force.condition, torque.condition)
-    turned = _turned(gravity)
+    angle = turned(gravity)
     if force.condition > LARGEST_CONDITION or force.first[0] < LEAST_MASS:
-        return _bias_alone(wrench, force.condition, torque.condition, turned, advice)
+        return _bias_alone(wrench, force.condition, torque.condition, angle, advice)
     mass = float(force.first[0])
     moment = torque.first if torque.condition <= LARGEST_CONDITION else _damped_moment(wrench[:, 3:], gravity)
     left = wrench[:, 3:] + np.einsum("tij,j->ti", skew(gravity), moment)
@@ -140,7 +140,7 @@ def identify_payload(wrench: Float, gravity: Float) -> Payload:
     return Payload(
         bias=bias, mass=mass, com=moment / mass, residual_force=force.residual,
         residual_torque=float(np.sqrt(np.mean((left - bias[3:]) ** 2))), condition=force.condition,
-        condition_torque=torque.condition, turned=turned, advice=advice,
+        condition_torque=torque.condition, turned=angle, advice=advice,
     )  # fmt: skip
 
 
@@ -176,7 +176,7 @@ def _bias_alone(wrench: Float, condition: float, condition_torque: float, turned
     )  # fmt: skip
 
 
-def _turned(gravity: Float) -> float:
+def turned(gravity: Float) -> float:
     """Largest angle between the mean gravity direction and a sample's, both ways [rad]."""
     direction = gravity / norm(gravity)[:, None]
     far = direction[np.argmin(direction @ direction[0])]
@@ -193,7 +193,7 @@ def excitation_advice(gravity: Float, condition: float, condition_torque: float)
     if condition > LARGEST_CONDITION:
         axis = "xyz"[int(np.argmin(np.abs(middle)))]
         return (
-            f"the tool turned gravity by only {np.rad2deg(_turned(gravity)):.0f} degrees, so weight and bias cannot be "
+            f"the tool turned gravity by only {np.rad2deg(turned(gravity)):.0f} degrees, so weight and bias cannot be "
             f"told apart: turn it by 30 degrees or more about its {axis} axis, then about another horizontal one, in "
             "free air"
         )

@@ -10,7 +10,6 @@ arrival, which is valid since nothing of the outcomes decides it.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 
 from skillframe.campaign.claims.letters import letters
 from skillframe.campaign.claims.trials import Trials
-from skillframe.campaign.statistics import confidence_sequence, log_mixtures
+from skillframe.campaign.statistics import confidence_sequence, mcnemar_sequentials
 from skillframe.frames import Float
 
 ALPHA = 0.05
@@ -168,8 +167,7 @@ def holm_of_minima(evidence: Sequence[Evidence], rows: int) -> tuple[NDArray[np.
 
 def _p_values(wins: NDArray[np.int64]) -> Float:
     """(n,) p-values of "both are equally good" after each pair of trials."""
-    result: Float = np.minimum(1.0, np.exp(-log_mixtures(np.cumsum(wins == 1), np.cumsum(wins == -1), 0.5)))
-    return result
+    return mcnemar_sequentials(np.cumsum(wins == 1), np.cumsum(wins == -1))
 
 
 def _standing(policy: str, ended: Sequence[bool], marks: str) -> Ranked:
@@ -215,7 +213,7 @@ def more_trials(won: int, lost: int, pairs: int, level: float) -> int | None:
     while low < high:
         middle = (low + high) // 2
         share = 1.0 + middle / pairs
-        if math.exp(-float(log_mixtures(won * share, lost * share, 0.5))) <= level:
+        if float(mcnemar_sequentials(won * share, lost * share)) <= level:
             high = middle
         else:
             low = middle + 1

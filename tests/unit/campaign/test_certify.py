@@ -62,6 +62,9 @@ def test_the_sequence_ends_at_the_first_box_that_fails():
     tested = judge(boxes, points, works, 0.95, 0.05)
     assert [each.passed for each in tested] == [True, False]
     assert certified(tested) is tested[0]
+    every = judge(boxes, points, np.ones(len(points), dtype=bool), 0.95, 0.05)
+    assert certified(every) is every[-1]  # the largest that passed
+    assert certified(judge(boxes, points, np.zeros(len(points), dtype=bool), 0.95, 0.05)) is None
 
 
 def test_nested_boxes_have_their_shares_of_the_volume_about_one_centre():

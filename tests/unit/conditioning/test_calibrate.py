@@ -103,6 +103,7 @@ def test_what_cannot_be_a_calibration_is_refused_with_its_figure():
     assert re.search(r"sample 18 of 30 \d", refusal(touched, attitudes))
     assert "wrong sign" in refusal(mirrored, attitudes)
     assert "no tool explains" in refusal(pressed, attitudes)
+    assert "(--from, --to)" in refusal(pressed, attitudes)  # options that the command has
     assert "cannot be told apart" in refusal(good, still)
     assert "give 8 attitudes" in refusal(good[:7], attitudes[:7])
 
