@@ -193,11 +193,15 @@ def test_a_box_is_certified_and_lies_where_the_skill_works(tmp_path):
     assert check_certificate(out, ValleyParams) == []
 
 
-def test_only_fresh_draws_in_the_claimed_box_carry_a_claim(tmp_path):
+@pytest.mark.parametrize("edited", ["boxes", "seed", "trials"])
+def test_only_fresh_draws_as_the_claim_announced_them_carry_it(tmp_path, edited):
     out = asked(tmp_path)
     through(out)
     claim = json.loads((out / "claim1" / "claim.json").read_text())
-    claim["boxes"] = [{name: [2.0 * a, 2.0 * b] for name, (a, b) in each.items()} for each in claim["boxes"]]
+    if edited == "boxes":
+        claim["boxes"] = [{name: [2.0 * a, 2.0 * b] for name, (a, b) in each.items()} for each in claim["boxes"]]
+    else:
+        claim[edited] += 1
     (out / "claim1" / "claim.json").write_text(json.dumps(claim))
     with pytest.raises(InputError, match="not the trials that the claim announced"):
         outcome(out, ValleyParams)

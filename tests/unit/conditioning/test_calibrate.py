@@ -194,3 +194,12 @@ def test_a_real_sensors_24_poses_calibrate_it_and_explain_another_recording(tmp_
     from skillframe.conditioning.offline import smooth
 
     assert np.sqrt(np.mean(smooth(moving).wrench[:, :3] ** 2)) < 0.6  # its vibration alone reads 0.2 to 0.65 N
+
+
+@pytest.mark.parametrize(("degrees", "used"), [(0.5, False), (2.0, True)])
+def test_a_turn_of_less_than_a_degree_is_left_to_the_drawing_however_well_it_is_known(degrees, used):
+    """Known to some 0.04 degrees by 200 attitudes, so both are significant."""
+    rng = np.random.default_rng(8)
+    truth, attitudes = sensor((0.0, 0.0, np.deg2rad(degrees))), poses(np.random.default_rng(9), 200)
+    found = calibrate(readings(rng, truth, attitudes), attitudes).calibration
+    assert (not np.array_equal(found.mounting, np.eye(3))) == used
