@@ -6,7 +6,6 @@ import csv
 import json
 import math
 import re
-import resource
 import time
 import zipfile
 
@@ -316,7 +315,6 @@ def test_a_description_without_end_is_refused_before_it_is_read(said, tmp_path, 
     for more in (("check",), ("simulate", "--stop", 1, "--step", 0.1, "--out", tmp_path / "o.csv"), ("build",)):
         code, _, err = said(more[0], path, *more[1:])
         assert code == 2 and f"describes {count} variables, where 100000 are the most" in err, err
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < 700 * 1024  # kB; the text alone is 60 MB
 
 
 def test_a_large_description_is_read_in_a_child_and_its_names_are_there(said, tmp_path):
