@@ -152,18 +152,9 @@ def check(file: Path, as_json: bool) -> None:
 
 
 def _draw(scene: Any, picture: Path) -> None:
-    import numpy as np
-
+    from skillframe.api.pictures import picture_of
     from skillframe.files import write_whole
-    from skillframe.frames import Pose, matrix_from_quaternion
-    from skillframe.reports.still import scene_picture
-    from skillframe.world.drawing import geom_json
 
     if picture.suffix.lower() != ".png":
         raise InputError(f"--picture {picture}", "is no PNG", "name it .png")
-    tip = Pose(np.array(scene.start_tip), matrix_from_quaternion(scene.start_quaternion))
-    sprung = (geom for part in scene.sprung for geom in part.geoms)
-    fixture, tool = (
-        [geom_json(geom) for geom in geoms if geom.visible] for geoms in ((*scene.fixture, *sprung), scene.tool.geoms)
-    )
-    write_whole(picture, scene_picture(fixture, tool, tip.at(-np.array(scene.tool.frames["tip"]))))
+    write_whole(picture, picture_of(scene))

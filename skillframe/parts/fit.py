@@ -37,6 +37,7 @@ class PartsFit(NamedTuple):
         radius: half the longer side of what goes into the mouth, seen along the axis.
         turn: (3, 3) from the frame of `pose` and `assembled` to the fixture frame.
         axis: of insertion in that frame.
+        origin: (3,) of that frame, in the fixture frame.
     """
 
     plug: Any
@@ -48,6 +49,7 @@ class PartsFit(NamedTuple):
     radius: float
     turn: Float
     axis: Axis
+    origin: Float
 
 
 def fit(plug: MeshPart, socket: MeshPart, file: FixtureFile) -> PartsFit:
@@ -64,7 +66,8 @@ def fit(plug: MeshPart, socket: MeshPart, file: FixtureFile) -> PartsFit:
     one, two = (_turned(each, turn) for each in (one, two))
     mouth = _mouth(one, two)
     tip = _tip(one, mouth, turn, file)
-    one, two = (each.translate([-tip[0], -tip[1], -mouth]) for each in (one, two))
+    origin = -np.array([tip[0], tip[1], mouth])
+    one, two = (each.translate(list(origin)) for each in (one, two))
     depth = float(mouth - tip[2])
     if depth <= 0.0:
         what = f"{plug.name} does not go into {socket.name}: nothing of it lies below a mouth"
@@ -73,7 +76,7 @@ def fit(plug: MeshPart, socket: MeshPart, file: FixtureFile) -> PartsFit:
     gaps: Float = np.array([_lifted(one, lift).min_gap(two, _FAR) for lift in lifts])
     inside = np.reshape(one.trim_by_plane([0.0, 0.0, -1.0], 0.0).bounding_box(), (2, 3))
     radius = 0.5 * float(np.ptp(inside[:, :2], axis=0).max())
-    return PartsFit(one, two, depth, float(np.median(gaps)), gaps, lifts, radius, turn, axis)
+    return PartsFit(one, two, depth, float(np.median(gaps)), gaps, lifts, radius, turn, axis, origin)
 
 
 def moved(solid: Any, place: MeshPlace) -> Any:

@@ -115,7 +115,7 @@ def stated(loaded: LoadedParts) -> dict[str, Any]:
     return {
         "depth": loaded.fit.depth, "clearance": loaded.fit.clearance, "backend": "pieces",
         "contact_error": max(side.pieces.error for side in sides),
-        "pieces": sum(len(side.pieces.hulls) for side in sides),
+        "pieces": sum(len(side.pieces.hulls) for side in sides), "origin": [float(x) for x in loaded.fit.origin],
         **{f"sha256 of {name}": value for name, value in loaded.hashes.items()},
     }  # fmt: skip
 

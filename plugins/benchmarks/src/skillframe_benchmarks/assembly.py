@@ -1,0 +1,237 @@
+"""One assembly of the benchmark: two meshes become a world, two demonstrations, a skill a method, a campaign a level.
+
+Everything is kept in the assembly's folder. What is there is not made again, so that a run that was ended goes on.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import time
+import warnings
+from collections.abc import Callable
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from skillframe import Campaign, LearnedSkill, record
+from skillframe.api.inputs import demonstrations_of
+from skillframe.api.pictures import picture_of
+from skillframe.campaign import evaluate
+from skillframe.campaign.folder import load as load_campaign
+from skillframe.campaign.runner import Options, run_campaign
+from skillframe.demonstration.record import Demonstration
+from skillframe.errors import SkillframeError, SkillframeWarning
+from skillframe.extend.registry import registry
+from skillframe.extend.worlds import make_scene
+from skillframe.files import write_whole
+from skillframe.parts.found import values
+from skillframe.parts.load import load
+from skillframe_benchmarks.assets import Pair
+from skillframe_benchmarks.methods import METHODS
+
+FIXTURE = """\
+summary = "AutoMate {name}"
+[fixture]
+mesh = "asset_socket.obj"
+units = "m"
+[tool]
+mesh = "asset_plug.obj"
+units = "m"
+density = 8000             # as published
+[contact]
+friction = 0.5             # as published
+[task.start]
+above_mouth = 0.002
+"""
+SCORES = ("automate_height", "automate_distance")
+DONE, REFUSED = "done.json", "refused.json"
+
+
+class Level(NamedTuple):
+    """How far the socket is from where the robot believes it.
+
+    Attributes:
+        name: of its folder.
+        shift: largest shift along x and y [m].
+        tilt: largest turn about x, y and z [rad].
+        friction: Coulomb coefficient.
+    """
+
+    name: str
+    shift: float
+    tilt: float
+    friction: float
+
+    def vary(self) -> dict[str, Any]:
+        """`[vary]` of its campaigns: uniform."""
+        shifts = {f"fixture.offset_{axis}": {"uniform": [-self.shift, self.shift]} for axis in "xy"}
+        return shifts | {f"fixture.tilt_{axis}": {"uniform": [-self.tilt, self.tilt]} for axis in "xyz"}
+
+
+LEVELS = tuple(
+    Level(f"{1e3 * shift:g}mm-{degrees:g}deg-{friction:g}", shift, math.radians(degrees), friction)
+    for shift, degrees in ((0.001, 2.0), (0.002, 5.0))
+    for friction in (0.2, 0.5)
+)
+"""2 mm and 5 degrees is how exactly the socket is seen in the published work; friction there is 0.5."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """What is done with every assembly.
+
+    Attributes:
+        robot: name of a shipped robot, or a robot.toml.
+        trials: per level, the same draws for every method.
+        seed: of demonstrations and draws.
+        methods: names of `METHODS`.
+        levels: names of `LEVELS`.
+        duration_s: of a trial, at most.
+    """
+
+    robot: str = "panda"
+    trials: int = 20
+    seed: int = 1
+    methods: tuple[str, ...] = tuple(METHODS)
+    levels: tuple[str, ...] = tuple(level.name for level in LEVELS)
+    duration_s: float = 15.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AssemblyJob:
+    """An assembly, its folder and what is to be done: what a worker is handed."""
+
+    pair: Pair
+    folder: Path
+    plan: Plan
+
+    @property
+    def size(self) -> int:
+        """How many results it gives."""
+        return 1
+
+
+class Refused(Exception):
+    """An assembly that cannot be run, with the step that refused it and why."""
+
+    def __init__(self, step: str, why: str) -> None:
+        super().__init__(why)
+        self.step, self.why = step, why
+
+
+def run(job: AssemblyJob, tell: Callable[[str], None]) -> None:
+    """Everything that is missing of one assembly. What refuses it stands in refused.json, with the step."""
+    job.folder.mkdir(parents=True, exist_ok=True)
+    cost = _Cost(job.folder / "cost.json")
+    try:
+        _run(job, cost, tell)
+    except Refused as error:
+        _keep(job.folder / REFUSED, {"step": error.step, "why": error.why})
+        tell(f"{job.pair.name}: refused at {error.step}: {error.why}")
+    _keep(job.folder / DONE, asdict(job.plan))
+
+
+def _run(job: AssemblyJob, cost: _Cost, tell: Callable[[str], None]) -> None:
+    folder, plan = job.folder, job.plan
+    with cost.of("parts"), _refusing("parts"):
+        fixture = _world(job.pair, folder)
+    with cost.of("demonstrations"), _refusing("demonstrations"):
+        shown = _shown(fixture, folder, plan)
+    skills = {}
+    with cost.of("learning"), _refusing("learning"):
+        for name in plan.methods:
+            skills[name] = _learned(name, shown, folder)
+    for level in LEVELS:
+        if level.name in plan.levels:
+            with cost.of(level.name):
+                found = _campaign(level, fixture, skills, folder / level.name, plan)
+            tell(f"{job.pair.name}, {level.name}: " + ", ".join(f"{k} {v} of {plan.trials}" for k, v in found.items()))
+
+
+@contextmanager
+def _refusing(step: str) -> Any:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SkillframeWarning)  # of the recordings: the page counts what fails
+            yield
+    except SkillframeError as error:
+        raise Refused(step, str(error)) from None
+
+
+def _world(pair: Pair, folder: Path) -> Path:
+    """The fixture file beside copies of both meshes, and in parts.json what is found in them."""
+    fixture = folder / "fixture.toml"
+    for mesh in (pair.plug, pair.socket):
+        if not (folder / mesh.name).exists():
+            write_whole(folder / mesh.name, mesh.read_bytes())
+    if not fixture.exists():
+        write_whole(fixture, FIXTURE.format(name=pair.name).encode())
+    if not (folder / "parts.png").exists():
+        write_whole(folder / "parts.png", picture_of(make_scene(registry().world(str(fixture)), {})))
+    if not (folder / "parts.json").exists():
+        _keep(folder / "parts.json", values(load(fixture)) | {"way_out_m": pair.way_out})
+    return fixture
+
+
+def _shown(fixture: Path, folder: Path, plan: Plan) -> list[Demonstration]:
+    """Two demonstrations by the simulated person, from files."""
+    files = [folder / f"demonstration{i}.npz" for i in (1, 2)]
+    if not all(file.exists() for file in files):
+        record(fixture, plan.robot, count=2, seed=plan.seed).save(folder / "demonstration.npz")
+    return demonstrations_of(files)
+
+
+def _learned(name: str, shown: list[Demonstration], folder: Path) -> Path:
+    path = folder / f"{name}.skill.json"
+    if not path.exists():
+        skill: LearnedSkill = METHODS[name](shown)
+        skill.save(path)
+    return path
+
+
+def _campaign(level: Level, fixture: Path, skills: dict[str, Path], out: Path, plan: Plan) -> dict[str, int]:
+    """Runs what is missing of a level's campaign. Successes of each method."""
+    if out.exists() and not _whole(out):
+        shutil.rmtree(out)
+    if not out.exists():
+        Campaign(
+            world=str(fixture), robot=plan.robot, skills=[str(path) for path in skills.values()], trials=plan.trials,
+            seed=plan.seed, coc="tip", duration_s=plan.duration_s, set={"world.friction": level.friction},
+            vary=level.vary(), scores=list(SCORES), name=f"AutoMate {fixture.parent.name}, {level.name}",
+        ).prepare(out)  # fmt: skip
+    summary = run_campaign(out, evaluate.evaluate, Options(traces=2))
+    return {name: summary["skills"][path.name]["successes"] for name, path in skills.items()}
+
+
+def _whole(folder: Path) -> bool:
+    """Whether a campaign's folder was prepared to its end."""
+    try:
+        load_campaign(folder)
+    except SkillframeError:
+        return False
+    return True
+
+
+def _keep(path: Path, value: Any) -> None:
+    write_whole(path, (json.dumps(value, indent=1, sort_keys=True, ensure_ascii=False) + "\n").encode())
+
+
+class _Cost:
+    """Processor time of each step [s], kept in a file, added up over runs."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._spent: dict[str, float] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+
+    @contextmanager
+    def of(self, step: str) -> Any:
+        """Within this, time is the step's."""
+        began = time.process_time()
+        try:
+            yield
+        finally:
+            self._spent[step] = self._spent.get(step, 0.0) + time.process_time() - began
+            _keep(self._path, self._spent)

@@ -1,0 +1,142 @@
+"""What an assembly's folder says, and rates over many assemblies with intervals that know what the unit is.
+
+Trials of one assembly are alike, assemblies are not: an interval of a rate over assemblies is made by drawing
+assemblies again (percentile bootstrap, Efron 1979), never by counting trials as if they were independent.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from skillframe import CampaignResults
+from skillframe_benchmarks.assembly import DONE, REFUSED, Level
+from skillframe_benchmarks.scores import passes
+
+DRAWS, OFTEN, FEWEST = 4000, 0.8, 5
+"""Bootstrap samples; share of trials from which an assembly counts as done (published: success of 80 %); assemblies
+below which no interval is given, for drawing a few again says nothing (our choice)."""
+RIM_M = 0.001
+"""Who ends within this of the mouth has not entered [m]; our choice."""
+
+
+class Cell(NamedTuple):
+    """One method at one level on one assembly.
+
+    Attributes:
+        trials, seated: counts; seated is within 1 mm of the assembled height and 2 mm sideways.
+        checked: trials that pass the published check; None where its height is not known.
+        causes: of the trials that are not seated, how many by cause.
+        force: median peak force [N]; seconds: median duration of seated trials, NaN without one.
+    """
+
+    trials: int
+    seated: int
+    checked: int | None
+    causes: Mapping[str, int]
+    force: float
+    seconds: float
+
+
+class Found(NamedTuple):
+    """One assembly.
+
+    Attributes:
+        name: of the assembly.
+        refused: "step: why", or "" if it ran.
+        parts: what was found in its meshes; {} where they were refused.
+        cost: processor time of each step [s].
+        cells: by (level, method).
+        picture: file of a picture of the parts; it may be absent.
+    """
+
+    name: str
+    refused: str
+    parts: Mapping[str, Any]
+    cost: Mapping[str, float]
+    cells: Mapping[tuple[str, str], Cell]
+    picture: Path
+
+
+class Share(NamedTuple):
+    """A rate over assemblies, its 95 % interval by drawing assemblies again (None of too few), how many reach 80 %."""
+
+    rate: float
+    low: float | None
+    high: float | None
+    often: int
+    assemblies: int
+
+
+def read(folder: Path, levels: Iterable[Level]) -> Found | None:
+    """One assembly, or None while it is not done."""
+    if not (folder / DONE).exists():
+        return None
+    refused = _json(folder / REFUSED)
+    parts = _json(folder / "parts.json")
+    cells: dict[tuple[str, str], Cell] = {}
+    for level in levels:
+        if (folder / level.name / "summary.json").exists():
+            cells |= {(level.name, method): cell for method, cell in _cells(folder / level.name, parts).items()}
+    text = f"{refused['step']}: {refused['why']}" if refused else ""
+    return Found(folder.name, text, parts, _json(folder / "cost.json"), cells, folder / "parts.png")
+
+
+def _json(path: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    return found
+
+
+def _cells(folder: Path, parts: Mapping[str, Any]) -> dict[str, Cell]:
+    rows: dict[str, list[dict[str, Any]]] = {}
+    for row in CampaignResults(folder).rows:
+        rows.setdefault(row["skill"].removesuffix(".skill.json"), []).append(row)
+    return {method: _cell(each, parts) for method, each in rows.items()}
+
+
+def _cell(rows: Sequence[Mapping[str, Any]], parts: Mapping[str, Any]) -> Cell:
+    way_out, lost = parts.get("way_out_m"), [row for row in rows if not row["success"]]
+    checked = None if way_out is None else sum(passes(*_end(row), way_out) for row in rows)
+    times = [row["duration_s"] for row in rows if row["success"]]
+    return Cell(
+        trials=len(rows), seated=len(rows) - len(lost), checked=checked,
+        causes=Counter(cause(row, parts["depth_m"]) for row in lost),
+        force=float(np.median([row["peak_force_n"] for row in rows])),
+        seconds=float(np.median(times)) if times else float("nan"),
+    )  # fmt: skip
+
+
+def _end(row: Mapping[str, Any]) -> tuple[float, float]:
+    return row["score.automate_height"], row["score.automate_distance"]
+
+
+def cause(row: Mapping[str, Any], depth: float) -> str:
+    """Why a trial is not seated: what ended it, or where it stood when it ended."""
+    if row["ended_by"] not in ("skill", "time"):
+        return str(row["ended_by"]).replace("_", " ")
+    height = _end(row)[0]
+    if row["goal_reached"]:
+        return "seated, not ended"
+    if height > depth - RIM_M:
+        return "on the rim"
+    return "entered and stopped" if height > RIM_M else "beside or tilted"
+
+
+def share(cells: Sequence[Cell], checked: bool = False) -> Share:
+    """The mean of some assemblies' rates, seated or by the published check."""
+    rates = np.array([_rate(cell, checked) for cell in cells])
+    low = high = None
+    if len(rates) >= FEWEST:
+        rng = np.random.default_rng(0)  # of the interval alone
+        means = rng.choice(rates, (DRAWS, len(rates))).mean(axis=1)
+        low, high = (float(each) for each in np.quantile(means, (0.025, 0.975)))
+    return Share(float(rates.mean()), low, high, int((rates >= OFTEN).sum()), len(rates))
+
+
+def _rate(cell: Cell, checked: bool) -> float:
+    return float((cell.checked or 0) if checked else cell.seated) / cell.trials

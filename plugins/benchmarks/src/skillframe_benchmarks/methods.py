@@ -1,0 +1,67 @@
+"""What is compared on each assembly: a push that nobody taught, a replay, and what two demonstrations teach.
+
+A method makes a skill from the demonstrations of an assembly. All methods have the same settings on all assemblies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from skillframe import LearnedSkill, learn
+from skillframe.demonstration.record import Demonstration
+
+Method = Callable[[Sequence[Demonstration]], LearnedSkill]
+PUSH_N, STIFF_N_M, SPEED_M_S = 12.0, 1500.0, 0.02
+"""Of the hand-written push: largest push, stiffness along it, speed. Our choice, as light as a hand."""
+ACROSS, ALONG = 40.0, 120.0  # Ns/m
+TURN_NM_RAD, TURN_DAMPING = 3.0, 0.3
+FORCE_N = 80.0
+"""Contact force that ends a trial, for every method [N]."""
+
+
+def push(demonstrations: Sequence[Demonstration]) -> LearnedSkill:
+    """A straight push down the base's z, free across it and soft in rotation, as one would write it by hand.
+
+    Of the demonstrations it takes the tool's frames alone.
+    """
+    frames = {name: list(point) for name, point in demonstrations[0].meta["frames"].items()}
+    along = _diagonal(0.0, 0.0, STIFF_N_M)
+    translation = {
+        "desired_direction": [0.0, 0.0, -1.0], "speed": SPEED_M_S, "fully_compliant": False, "stiffness": along,
+        "compliant_axes": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], "damping": _diagonal(ACROSS, ACROSS, ALONG),
+    }  # fmt: skip
+    rotation = {
+        "desired_direction": None, "speed": 0.0, "fully_compliant": False, "compliant_axes": [],
+        "stiffness": _diagonal(*[TURN_NM_RAD] * 3), "damping": _diagonal(*[TURN_DAMPING] * 3),
+    }  # fmt: skip
+    stop = {"lead_force_n": PUSH_N, "force_limit_n": FORCE_N, "time_limit_s": 60.0, "travel_limit_m": 0.3}
+    phase: dict[str, Any] = {"pitch": None, "stop": stop}
+    phase |= {"translation": {**translation, "evidence": {}}, "rotation": {**rotation, "evidence": {}}}
+    document = {
+        "format": "skillframe.skill", "version": 1, "type": "lmc", "type_version": 1, "learned_from": [],
+        "created_by": {"by": "hand"}, "phases": [phase],
+        "frame": {"axes": "base", "frames": frames, **dict.fromkeys(PLACES, frames["tip"])},
+    }  # fmt: skip
+    return LearnedSkill(document=document, name="push")
+
+
+PLACES = ("center_of_compliance", "learned_at", "work_at")
+
+
+def _diagonal(x: float, y: float, z: float) -> list[list[float]]:
+    return [[x, 0.0, 0.0], [0.0, y, 0.0], [0.0, 0.0, z]]
+
+
+def lmc(demonstrations: Sequence[Demonstration]) -> LearnedSkill:
+    """Linear motion with compliance, from both demonstrations."""
+    return learn(demonstrations, "lmc")
+
+
+def replay(demonstrations: Sequence[Demonstration]) -> LearnedSkill:
+    """The first demonstration's path, stiff."""
+    return learn(demonstrations[:1], "replay")
+
+
+METHODS: Mapping[str, Method] = {"push": push, "lmc": lmc, "replay": replay}
+"""By the names that results give them."""

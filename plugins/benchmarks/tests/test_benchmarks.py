@@ -1,0 +1,181 @@
+"""AutoMate's check in closed form, rates whose unit is the assembly, and the command on two parts of our own."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from skillframe_benchmarks import counts, scores
+from skillframe_benchmarks.assets import pairs
+from skillframe_benchmarks.counts import Cell, cause, share
+
+from skillframe.cli.main import run
+from skillframe.errors import InputError, UnknownName
+from skillframe.frames import matrix_from_quaternion, quaternion_from_matrix, rotation_matrix
+
+DEPTH, ORIGIN, TIP = 0.02, np.array([0.001, -0.002, -0.03]), np.array([0.0, 0.0, 0.2])
+DOWN = np.diag([1.0, -1.0, -1.0])
+
+
+def ended(lift=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0)):
+    """The end of a trial whose part is turned about its origin and then shifted from where it is when assembled."""
+    rotation = rotation_matrix(np.array(turn))
+    base = matrix_from_quaternion(np.array([0.1, -0.2, 0.3, np.sqrt(1.0 - 0.14)]))
+    tip = rotation @ (np.array([0.0, 0.0, -DEPTH]) - ORIGIN) + ORIGIN + lift
+    wrist = tip - rotation @ DOWN @ TIP
+    place = np.array([0.5, 0.1, 0.2])
+    bodies = [(place + base @ wrist, base @ rotation @ DOWN), (place, base)]
+    return SimpleNamespace(
+        body_position=np.array([[position for position, _ in bodies]]),
+        body_quaternion=np.array([[quaternion_from_matrix(turned) for _, turned in bodies]]),
+        meta={"params": {"depth": DEPTH, "origin": list(ORIGIN)}, "bodies": [{"name": "tool"}, {"name": "fixture"}],
+              "frames": {"tip": list(TIP)}},
+    )  # fmt: skip
+
+
+def test_a_part_that_was_only_lifted_is_as_high_and_as_far_as_it_was_lifted():
+    trace = ended(lift=(0.0, 0.0, 0.005))
+    assert scores.height(trace) == pytest.approx(0.005, abs=1e-12)
+    assert scores.distance(trace) == pytest.approx(0.005, abs=1e-12)
+
+
+def test_a_part_turned_about_its_origin_is_no_higher_and_its_key_points_lie_on_chords():
+    """Chords of 2 s sin(a / 2) at s = 1/2, 1/6, 1/6 and 1/2 m: 2/3 sin(a / 2) in the mean."""
+    trace = ended(turn=(0.04, 0.03, 0.0))
+    assert scores.height(trace) == pytest.approx(0.0, abs=1e-12)
+    assert scores.distance(trace) == pytest.approx(2.0 / 3.0 * np.sin(0.025), rel=1e-9)
+
+
+def test_a_turn_about_the_way_in_is_not_seen_by_the_published_check():
+    assert scores.distance(ended(turn=(0.0, 0.0, 1.0))) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("height", "distance", "passed"),
+    [(0.0, 0.0, True), (-5e-4, 0.0, True), (-2e-3, 0.0, False), (0.009, 0.0, True), (0.011, 0.0, False),
+     (0.005, 0.021, False)],
+)  # fmt: skip
+def test_the_published_check_asks_for_a_height_and_for_key_points(height, distance, passed):
+    assert scores.passes(height, distance, 0.01) is passed
+
+
+def cell(seated, trials=20, checked=None):
+    return Cell(trials, seated, checked, {}, 30.0, 2.0)
+
+
+def test_the_interval_of_a_rate_knows_that_trials_of_one_assembly_are_alike():
+    """Half of the assemblies always, half never: 100 trials as if independent would say 40 to 60 %."""
+    found = share([cell(20), cell(0)] * 5)
+    assert found.rate == 0.5 and found.low <= 0.2 and found.high >= 0.8 and found.often == 5
+    assert share([cell(10)] * 10)[1:3] == (0.5, 0.5)
+
+
+def test_few_assemblies_get_no_interval_and_the_check_is_a_rate_of_its_own():
+    assert share([cell(20), cell(0)])[1:3] == (None, None)
+    assert share([cell(0, checked=20), cell(20, checked=0)], checked=True).rate == 0.5
+
+
+@pytest.mark.parametrize(
+    ("ended_by", "height", "reached", "word"),
+    [("force", 0.0, False, "force"), ("true_force", 0.0, False, "true force"), ("skill", 0.0195, False, "on the rim"),
+     ("skill", 0.01, False, "entered and stopped"), ("skill", 0.0005, False, "beside or tilted"),
+     ("time", 0.0, True, "seated, not ended")],
+)  # fmt: skip
+def test_a_failure_has_the_cause_that_ended_it_or_the_place_where_it_stood(ended_by, height, reached, word):
+    row = {"ended_by": ended_by, "score.automate_height": height, "score.automate_distance": 0.0,
+           "goal_reached": reached}  # fmt: skip
+    assert cause(row, DEPTH) == word
+
+
+@pytest.fixture
+def fetched(tmp_path):
+    """A folder like AutoMate's, of names alone."""
+    for name in ("00004", "00014"):
+        (tmp_path / "assets/automate/mesh" / name).mkdir(parents=True)
+        for part in ("plug", "socket"):
+            (tmp_path / "assets/automate/mesh" / name / f"asset_{part}.obj").write_text("")
+    heights = tmp_path / "isaacgymenvs/tasks/automate/data/disassembly_dist.json"
+    heights.parent.mkdir(parents=True)
+    heights.write_text(json.dumps({"asset_00004": 0.02}))
+    return tmp_path
+
+
+def test_pairs_are_found_in_a_checkout_and_in_its_assets_with_heights_where_they_are_known(fetched):
+    assert [(pair.name, pair.way_out) for pair in pairs(fetched)] == [("00004", 0.02), ("00014", None)]
+    assert [pair.way_out for pair in pairs(fetched / "assets/automate", ("00014",))] == [None]
+
+
+def test_a_wrong_folder_a_wrong_name_and_damaged_heights_are_one_sentence_each(fetched, tmp_path, capsys):
+    with pytest.raises(InputError, match=r"holds no NUMBER/asset_plug\.obj"):
+        pairs(tmp_path / "assets")
+    with pytest.raises(UnknownName, match="unknown assembly '4'"):
+        pairs(fetched, ("4",))
+    (fetched / "isaacgymenvs/tasks/automate/data/disassembly_dist.json").write_text("[1]")
+    assert run(["benchmark", "automate", str(fetched), "--list"]) == 2
+    assert "is no table of heights" in capsys.readouterr().err
+
+
+def test_a_folder_that_was_begun_with_another_plan_is_refused(fetched, tmp_path, capsys):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/plan.json").write_text(json.dumps({"trials": 7}))
+    assert run(["benchmark", "automate", str(fetched), "--out", str(tmp_path / "out")]) == 2
+    assert "was begun with" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_two_pairs_of_meshes_become_a_table_a_page_and_are_not_run_again(tmp_path, capsys, monkeypatch):
+    pytest.importorskip("manifold3d")
+    import trimesh
+
+    from skillframe.parts.solid import arrays_of
+    from tests import part_meshes
+
+    solids = {
+        "00001": part_meshes.round_pair(),
+        "00002": (part_meshes.rod(6.0, -12.0, 8.0), part_meshes.hole(5.0, 12.0)),
+    }
+    for name, pair in solids.items():
+        (tmp_path / "mesh" / name).mkdir(parents=True)
+        for part, solid in zip(("plug", "socket"), pair, strict=True):
+            made = trimesh.Trimesh(*arrays_of(part_meshes.in_metres(solid)), process=False)
+            made.export(tmp_path / "mesh" / name / f"asset_{part}.obj")
+    (tmp_path / "disassembly_dist.json").write_text(json.dumps({"asset_00001": 0.01}))
+    monkeypatch.chdir(tmp_path)
+    words = [
+        "benchmark",
+        "automate",
+        ".",
+        "--trials",
+        "2",
+        "--level",
+        "1mm-2deg-0.2",
+        "--method",
+        "push",
+        "--workers",
+        "1",
+    ]
+    assert run(words) == 0
+    said = capsys.readouterr()
+    assert "2 of 2 assemblies done, 1 of them refused" in said.err and "push" in said.out
+    found = json.loads((tmp_path / "automate/automate.json").read_text())
+    ran, refused = found["assemblies"]
+    assert "overlap" in refused["refused"] and not refused["cells"]  # a plug of 6 mm in a hole of 5
+    (only,) = ran["cells"]
+    assert only["trials"] == 2 and only["checked"] is not None and ran["cost_s"]["1mm-2deg-0.2"] > 0.0
+    page = (tmp_path / "automate/automate.html").read_text()
+    assert "00001" in page and "data:image/png" in page and "http://" not in page
+    assert run(words) == 0 and "2 of 2 assemblies are there already" in capsys.readouterr().err
+    assert run([*words, "--seed", "2"]) == 2
+
+
+def test_the_levels_are_those_that_are_told_and_the_widest_is_the_published_noise():
+    from skillframe_benchmarks.assembly import LEVELS
+
+    assert [level.name for level in LEVELS] == ["1mm-2deg-0.2", "1mm-2deg-0.5", "2mm-5deg-0.2", "2mm-5deg-0.5"]
+    last = LEVELS[-1].vary()
+    assert last["fixture.offset_x"] == {"uniform": [-0.002, 0.002]}  # socket_pos_obs_noise, socket_rot_obs_noise
+    assert last["fixture.tilt_z"]["uniform"][1] == pytest.approx(0.0872665, abs=1e-6)
+
+
+def test_an_assembly_that_is_not_done_has_no_entry(tmp_path):
+    assert counts.read(tmp_path, ()) is None
