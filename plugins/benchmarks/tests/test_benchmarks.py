@@ -23,13 +23,13 @@ def ended(lift=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0)):
     base = matrix_from_quaternion(np.array([0.1, -0.2, 0.3, np.sqrt(1.0 - 0.14)]))
     tip = rotation @ (np.array([0.0, 0.0, -DEPTH]) - ORIGIN) + ORIGIN + lift
     wrist = tip - rotation @ DOWN @ TIP
-    place = np.array([0.5, 0.1, 0.2])
-    bodies = [(place + base @ wrist, base @ rotation @ DOWN), (place, base)]
+    place, center = np.array([0.5, 0.1, 0.2]), np.array([0.0, 0.01, 0.15])
+    turned = base @ rotation @ DOWN
     return SimpleNamespace(
-        body_position=np.array([[position for position, _ in bodies]]),
-        body_quaternion=np.array([[quaternion_from_matrix(turned) for _, turned in bodies]]),
-        meta={"params": {"depth": DEPTH, "origin": list(ORIGIN)}, "bodies": [{"name": "tool"}, {"name": "fixture"}],
-              "frames": {"tip": list(TIP)}},
+        position=(place + base @ wrist + turned @ center)[None], quaternion=quaternion_from_matrix(turned)[None],
+        body_position=place[None, None], body_quaternion=quaternion_from_matrix(base)[None, None],
+        meta={"params": {"depth": DEPTH, "origin": list(ORIGIN)}, "bodies": [{"name": "fixture"}],
+              "frames": {"tip": list(TIP)}, "center_of_compliance": list(center)},
     )  # fmt: skip
 
 

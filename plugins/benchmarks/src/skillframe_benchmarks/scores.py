@@ -27,13 +27,16 @@ KEY_POINTS: Float = np.linspace(-0.5, 0.5, 4)
 
 
 def height(trace: Trace) -> float:
-    """Height of the held part's origin above the assembled one at the end, along the way out [m]."""
+    """Height of the held part's origin above the assembled one at the end, along the way out [m].
+
+    In a world of no fixture file, whose parts have no assembled pose, it is the tip's height over the fixture's origin.
+    """
     turn, shift, origin = _left(trace)
     return float((turn @ origin + shift - origin)[2])
 
 
 def distance(trace: Trace) -> float:
-    """Mean distance of the four key points from where they are when assembled, at the end [m]."""
+    """Mean distance of the four key points from where they are when assembled, at the end [m]. Likewise."""
     turn, shift, origin = _left(trace)
     points = origin + np.outer(KEY_POINTS, (0.0, 0.0, 1.0))
     return float(norm(points @ turn.T + shift - points).mean())
@@ -46,12 +49,16 @@ def passes(height_m: float, distance_m: float, way_out_m: float) -> bool:
 
 def _left(trace: Trace) -> tuple[Float, Float, Float]:
     """Rotation (3, 3) and shift (3,) from the assembled to the last pose in the fixture frame, and the origin (3,)."""
-    params, bodies = trace.meta["params"], [each["name"] for each in trace.meta["bodies"]]
-    place, quaternion = trace.body_position[-1], trace.body_quaternion[-1]
-    fixture, tool = bodies.index("fixture"), bodies.index("tool")
-    back, turned = (matrix_from_quaternion(quaternion[i]) for i in (fixture, tool))
-    tip = np.array(trace.meta["frames"]["tip"])
-    held = back.T @ turned
-    at = back.T @ (place[tool] + turned @ tip - place[fixture])
-    turn = held @ np.diag([1.0, -1.0, -1.0])  # the tool points down: its z is minus the fixture's
-    return turn, at - turn @ np.array([0.0, 0.0, -params["depth"]]), np.array(params["origin"])
+    meta = trace.meta
+    params, bodies = meta.get("params", {}), [each["name"] for each in meta.get("bodies", ())]
+    center = np.array(meta.get("center_of_compliance", np.zeros(3)))
+    place, turned = trace.position[-1], matrix_from_quaternion(trace.quaternion[-1])
+    stand, back = np.zeros(3), np.eye(3)  # the base, where no fixture is drawn
+    if "fixture" in bodies:
+        fixture = bodies.index("fixture")
+        stand, back = trace.body_position[-1, fixture], matrix_from_quaternion(trace.body_quaternion[-1, fixture])
+    tip = np.array(meta.get("frames", {}).get("tip", center)) - center
+    turn = back.T @ turned @ np.diag([1.0, -1.0, -1.0])  # the tool points down: its z is minus the fixture's
+    assembled = np.array([0.0, 0.0, -params.get("depth", 0.0)])
+    shift = back.T @ (place + turned @ tip - stand) - turn @ assembled
+    return turn, shift, np.array(params.get("origin", (0.0, 0.0, 0.0)))
