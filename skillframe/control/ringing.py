@@ -1,10 +1,12 @@
 r"""Contact that rings, seen in the force: what it touches is stiffer than the law was designed for, so it damps more.
 
-    f_s' = (f - f_s) / (2 T_tot),     a <- max(|f - f_s|, a exp(-h / (10 T_tot))),     rings where a > share * push
+    f_s' = (f - f_s) / (2 T_tot),     up <- max(f - f_s, up exp(-h / (5 T_tot))),     down the same of f_s - f
+    a = |min(up, down)|, axis by axis,     rings where a > share * push
 
 A law that is too lightly damped for its contact rings at 1 / (4 T_tot) or somewhat faster: f_s is the force without
-that, a the ringing's amplitude, remembered for a few periods. Raising the damping of an admittance while its force
-rings is Dimeas and Aspragathos, "Online stability in human-robot cooperation with admittance control", IEEE
+that, a the ringing's amplitude, remembered for a period. What goes one way alone, as the force at every touch, does
+not ring: damped as if it did, each insertion of a peg took a second longer. Raising the damping of an admittance while
+its force rings is Dimeas and Aspragathos, "Online stability in human-robot cooperation with admittance control", IEEE
 Transactions on Haptics 9 (2016), who find it in the force's spectrum; this measure of it, and its figures, are ours.
 """
 
@@ -15,10 +17,10 @@ from numpy.typing import NDArray
 
 from skillframe.frames import Float, norm
 
-SLOW, MEMORY = 2.0, 10.0
-"""Time constants of f_s and of a, in T_tot: 0.5 and 2.5 periods of a ringing of 1 / (4 T_tot)."""
-SHARE = 0.25
-"""Of the push: the amplitude from which contact counts as ringing. A wrist sensor's noise is far below."""
+SLOW, MEMORY = 2.0, 5.0
+"""Time constants of f_s and of a, in T_tot: 0.5 and 1.25 periods of a ringing of 1 / (4 T_tot)."""
+SHARE = 0.1
+"""Of the push: the amplitude from which contact counts as ringing, 2 N of 20 N. A wrist sensor's noise is far below."""
 
 
 class RingWatch:
@@ -35,12 +37,15 @@ class RingWatch:
         self._follow = -float(np.expm1(-dt / (SLOW * delay)))
         self._fade = float(np.exp(-dt / (MEMORY * delay)))
         self._least = SHARE * push
-        self._slow, self.amplitude = np.zeros((count, 3)), np.zeros(count)
+        self._slow, self._up, self._down = np.zeros((3, count, 3))
+        self.amplitude = np.zeros(count)
 
     def look(self, force: Float) -> NDArray[np.bool_]:
         """Whose contact rings (N,), by the forces (N, 3) that are felt now."""
         off = force - self._slow
         self._slow = self._slow + self._follow * off
-        self.amplitude = np.maximum(norm(off), self._fade * self.amplitude)
+        self._up = np.maximum(off, self._fade * self._up)
+        self._down = np.maximum(-off, self._fade * self._down)
+        self.amplitude = norm(np.minimum(self._up, self._down))
         result: NDArray[np.bool_] = self.amplitude > self._least
         return result

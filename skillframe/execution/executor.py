@@ -114,7 +114,7 @@ class Loop:
 
     def run(self, duration_s: float, progress: Callable[[float], None] | None) -> None:
         """Tick until every trial has ended or the time is up."""
-        pace = self.setup.robot.spec.control.pace
+        pace = self.setup.pace
         duration_s *= pace
         ticks = round(duration_s / self.dt)
         tick = 0

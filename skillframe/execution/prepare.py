@@ -138,9 +138,12 @@ def prepare(robot: RobotModel, scene: Scene, document: Document, coc: str | None
     with understood(what):
         skill = kind.build(placed)
         area = None if kind.area is None else kind.area(document)
+        speed = None if kind.speed is None else kind.speed(document)
     if area is not None:
         _check_area(robot, scene, document, area)
-    return skill, Setup(robot=robot, scene=scene, center_of_compliance=center, make_drive=made)
+    return skill, Setup(
+        robot=robot, scene=scene, center_of_compliance=center, make_drive=made, skill_speed=speed
+    )  # fmt: skip
 
 
 def _centers(kind: CoordinatorType, document: Document, scene: Scene, coc: str | None) -> Float:

@@ -27,6 +27,7 @@ class Setup:
         sensors: noise of the sensors.
         filter_wrench: False hands the raw wrench to the skill and the limits.
         make_drive: makes a plug-in's drive, `make_drive(setup, draws, rngs)`; None takes one of skillframe's own.
+        skill_speed: of the skill in contact, where its type knows it [m/s].
         stop_when: ends a trial as done, looked at every 10 ms; None leaves the end to the skill.
     """
 
@@ -36,7 +37,13 @@ class Setup:
     sensors: SensorSettings = field(default_factory=SensorSettings)
     filter_wrench: bool = True
     make_drive: Callable[..., Any] | None = None
+    skill_speed: float | None = None
     stop_when: Callable[[State], NDArray[np.bool_]] | None = None
+
+    @property
+    def pace(self) -> float:
+        """Seconds that a second of the skill takes on this robot, 1 or more."""
+        return self.robot.spec.control.pace(self.skill_speed)
 
     @property
     def limits(self) -> Limits:

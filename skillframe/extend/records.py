@@ -92,6 +92,8 @@ class SkillType:
         explain: pictures for the report, drawn from the document alone; None if there are none.
         area: (2, 3) corners of the box that a run may reach, relative to its start and in the axes of the document's
             `frame` [m]; a box that leaves the robot's workspace is refused before the run. None: not known.
+        speed: [m/s] at which a document's skill moves in contact at most, from which follows how many times longer it
+            takes on arms that must move slowly; None for one that moves nothing, or if it is not known.
         example: a small valid document to try the type with, for a type that is not learned, or that the example
             demonstrations of `skillframe.testing` do not suit.
     """
@@ -107,6 +109,7 @@ class SkillType:
     describe: Callable[[Document], list[str]] | None = None
     explain: Callable[[Document], list[Illustration]] | None = None
     area: Callable[[Document], Float] | None = None
+    speed: Callable[[Document], float | None] | None = None
     example: Callable[[], Document] | None = None
 
 

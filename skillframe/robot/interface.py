@@ -76,10 +76,9 @@ class Control:
         """Of the simulated robot [Hz]."""
         return self.rate_hz if self.interface == "torque" else TICK_HZ
 
-    @property
-    def pace(self) -> float:
-        """How many times longer than taught a skill takes. 1 for torques."""
-        return 1.0 if self.interface == "torque" else self.admittance.slow_down
+    def pace(self, speed: float | None = None) -> float:
+        """How many times longer than taught a skill takes. 1 for torques. `speed` as of `Admittance.slow_down`."""
+        return 1.0 if self.interface == "torque" else self.admittance.slow_down(speed)
 
     def figures(self) -> dict[str, float | str]:
         """What the arm takes and what follows, for files and scripts, in SI units."""
@@ -146,10 +145,13 @@ class Admittance:
         """At which the largest push moves the tool [m/s]."""
         return self.push[0] / self.damping
 
-    @property
-    def slow_down(self) -> float:
-        """How many times longer than taught a skill takes, 1 at least."""
-        return max(1.0, TAUGHT_SPEED / self.speed)
+    def slow_down(self, speed: float | None = None) -> float:
+        """How many times longer than taught a skill takes, 1 at least.
+
+        Args:
+            speed: at which the skill moves, `TAUGHT_SPEED` where it is not known [m/s].
+        """
+        return max(1.0, (TAUGHT_SPEED if speed is None else speed) / self.speed)
 
     def told(self, lever: float = 0.0) -> str:
         """The figures in a line, for people. `lever` as of `turning_damping`."""
@@ -157,14 +159,14 @@ class Admittance:
             f"takes a {self.kind} {self.rate:g} times a second and answers {1e3 * self.total_delay:.0f} ms late; "
             f"damping {self.damping:.0f} Ns/m and {self.turning_damping(lever):.2g} Nms/rad for contacts of "
             f"{self.stiffness:.2g} N/m; at most {1e3 * self.speed:.1f} mm/s at {self.push[0]:g} N, so skills take "
-            f"{self.slow_down:.1f} times as long as taught"
+            f"{self.slow_down():.1f} times as long as taught"
         )
 
     def figures(self) -> dict[str, float | str]:
         """The same, by name."""
         return {
             "takes": self.kind, "rate_hz": self.rate, "total_delay_s": self.total_delay, "damping": self.damping,
-            "turning_damping": self.turning_damping(), "speed_m_s": self.speed, "slow_down": self.slow_down,
+            "turning_damping": self.turning_damping(), "speed_m_s": self.speed, "slow_down": self.slow_down(),
         }  # fmt: skip
 
     def doubts(self) -> Iterator[str]:
@@ -172,7 +174,7 @@ class Admittance:
         if self.speed < SLOW_SPEED:
             yield (
                 f"at {self.push[0]:g} N the tool moves at {1e3 * self.speed:.2g} mm/s, "
-                f"{self.slow_down:.0f} times slower than taught"
+                f"{self.slow_down():.0f} times slower than taught"
             )
         if self.total_delay > LONG_DELAY:
             yield f"the arm answers {1e3 * self.total_delay:.0f} ms late, where 20 to 80 ms are usual"

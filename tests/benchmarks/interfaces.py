@@ -47,7 +47,7 @@ def real_time(show, bound=6.0):
     )
     cpu, _, result = timed_run(skill, setting, tilt, 1, 2.0)
     touching = 100 * np.mean(np.abs(result.traces[0].wrench_true[:, :3]).sum(-1) > 0.0)
-    pace = setting.robot.spec.control.pace  # the loop tells of its progress by the skill's clock
+    pace = setting.pace  # the loop tells of its progress by the skill's clock
     what = f"UR5e told positions, one run, in contact {touching:.0f} % of the time: real time"
     show(what, pace / cpu, "x", bound, below=False)
 

@@ -18,7 +18,7 @@ from skillframe.execution.prepare import load_robot_model, load_world, prepare
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.robot.interface import VIRTUAL_MASS, Control
-from tests.figures.teaching import SEED, row, taught
+from tests.figures.teaching import row, taught
 
 pytestmark = [pytest.mark.figures, pytest.mark.needs_plugins]
 KINDS = {
@@ -32,7 +32,7 @@ UR5E = {
     "position, 125 Hz, 20 ms": (replace(KINDS["position, 125 Hz, 20 ms"], contact_stiffness=4e4), 32, 18.0),
     "ur5e_velocity": ("ur5e_velocity", 32, 12.0),
     "torque": (Control(), 32, 12.0),
-    "ur5e_position": ("ur5e_position", 64, 20.0),
+    "ur5e_position": ("ur5e_position", 32, 20.0),
 }
 """Interface or robot, draws of the peg, and the median time that the design calls reachable [s]."""
 VARIED = {
@@ -41,6 +41,8 @@ VARIED = {
 }
 """Quantities that are fixed, and half the ranges of those that vary. Without the 2 mm the peg begins in contact in 8 of
 64 draws, the force sensor is tared there, and every force is then 3 to 13 N wrong."""
+DRAWS = 20261123
+"""Seed of the draws: none of them was looked at while law and watch were designed. Skills are taught by another."""
 PANDA_STIFFNESS = 5.4e4
 """[N/m] of contact and servo in series: what a prototype of another make found for this arm."""
 
@@ -57,10 +59,10 @@ def run(world: str, control: Control, count: int, seconds: float = 20.0, arm: st
     robot = replace(model, spec=replace(model.spec, control=control))
     runs, setup = prepare(robot, load_world(world, {}), skill(world, arm), "tip")
     fixed, spans = VARIED[world]
-    points = 2.0 * qmc.Sobol(len(spans), seed=SEED).random(64)[:count] - 1.0
+    points = 2.0 * qmc.Sobol(len(spans), seed=DRAWS).random(64)[:count] - 1.0
     draws = {key: np.full(count, value) for key, value in fixed.items()}
     draws |= {key: span * points[:, i] for i, (key, span) in enumerate(spans.items())}
-    rngs = [np.random.default_rng([SEED, i]) for i in range(count)]
+    rngs = [np.random.default_rng([DRAWS, i]) for i in range(count)]
     return simulate(runs, setup, draws, rngs, duration_s=seconds)
 
 
@@ -113,7 +115,7 @@ def test_the_least_damping_without_a_force_limit_is_within_a_fifth_of_the_formul
         middle = float(np.sqrt(low * high))
         own = replace(KINDS[name], contact_stiffness=middle / (1.5 * arm.total_delay), push_n=20.0,
                       contact_turning_stiffness=10.0 / (1.5 * arm.total_delay))  # fmt: skip
-        result = run("valley", own, 8, 8.0 / own.pace)
+        result = run("valley", own, 8, 8.0 / own.pace())
         stopped = any("force" in str(reason) for reason in result.reason)
         low, high = (middle, high) if stopped else (low, middle)
     row(name, f"least damping {high:.0f} Ns/m", f"formula {formula:.0f} Ns/m")

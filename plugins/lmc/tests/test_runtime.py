@@ -10,6 +10,7 @@ import synthetic as syn
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from skillframe_lmc.learner import learn
+from skillframe_lmc.phase import speed
 from skillframe_lmc.runtime import build
 
 from skillframe.errors import InputError
@@ -94,6 +95,13 @@ def test_a_tool_that_follows_moves_at_the_learned_speed() -> None:
         position = command.pose.position
     assert np.allclose(position, [[0.0, 0.0, -0.02]], atol=1e-12)
     assert np.allclose(command.twist, [[0, 0, -0.02, 0, 0, 0]])
+
+
+def test_a_slow_arm_is_told_the_speed_of_the_push_and_nothing_where_there_is_none() -> None:
+    pushing, turning = document(), document(turn=True)
+    pushing["phases"][0]["translation"]["speed"] = 0.013
+    turning["phases"][0]["translation"] = part(None, 0.0, [], 1000.0)
+    assert (speed(pushing), speed(turning)) == (0.013, None)
 
 
 def test_a_turn_advances_about_its_axis_at_the_learned_speed() -> None:

@@ -46,7 +46,7 @@ class AdmittanceDrive(TorqueDrive):
         limb = OneArm(setup, draws, rngs)
         super().__init__(setup, limb)
         self._by_hand = TorqueDrive(setup, limb)
-        self.arm, self._pace = setup.robot.spec.control.admittance, setup.robot.spec.control.pace
+        self.arm, self._pace = setup.robot.spec.control.admittance, setup.pace
         self._limits = _range(setup, self.plant)
         self._dofs, self._dt_command = self.plant.dofs, self.arm.ticks * self.dt
         self._all = np.array_equal(self._dofs, np.arange(self.limb.joint_positions().shape[1]))
@@ -81,7 +81,7 @@ class AdmittanceDrive(TorqueDrive):
 
     def notes(self, i: int) -> list[str]:
         """What the arm takes, and by which clock the skill ran."""
-        clock = f"; the skill's clock ran {self.arm.slow_down:.1f} times slower" if self.arm.slow_down > 1.0 else ""
+        clock = f"; the skill's clock ran {self._pace:.1f} times slower" if self._pace > 1.0 else ""
         return [*super().notes(i), f"the arm {self.arm.told(self._lever)}{clock}"]
 
     def _tell(self, command: Command, ramp: float) -> None:

@@ -54,7 +54,7 @@ def chosen_drive(skill: Skill, setup: Setup, draws: Draws, rngs: Sequence[np.ran
         from skillframe.execution.drives.admittance import AdmittanceDrive
         from skillframe.execution.paced import PacedSkill
 
-        return PacedSkill(skill, arm.admittance.ticks, arm.pace), AdmittanceDrive(setup, draws, rngs)
+        return PacedSkill(skill, arm.admittance.ticks, setup.pace), AdmittanceDrive(setup, draws, rngs)
     from skillframe.execution.drives.torque import OneArm, TorqueDrive
 
     return skill, TorqueDrive(setup, OneArm(setup, draws, rngs))

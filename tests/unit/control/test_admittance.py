@@ -233,7 +233,7 @@ def test_on_a_wall_four_times_as_stiff_as_declared_the_law_bounces_and_with_the_
         -pressed(loop, damping, 2.5, 20.0, speed, one_side=True, watch=w)[1500:] for w in (None, watched(loop))
     )
     assert bare.min() == 0.0 and bare.max() > 50.0  # it leaves the wall and hits it at 2.5 times the push
-    assert calm.min() > 10.0 and calm.max() < 30.0  # what grows again is calmed at a quarter of the push, 5 N
+    assert calm.min() > 10.0 and calm.max() < 30.0  # what grows again is calmed at 2 N
 
 
 @pytest.mark.parametrize("loop", [Loop(), Loop(rate=125, delay=20)])

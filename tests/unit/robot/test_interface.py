@@ -35,7 +35,7 @@ def robot(tmp_path):
 def test_by_default_an_arm_takes_torques_and_nothing_is_slower():
     control = load_robot("panda").control
     assert control == Control() and control.interface == "torque"
-    assert (control.tick_hz, control.pace) == (1000.0, 1.0)
+    assert (control.tick_hz, control.pace()) == (1000.0, 1.0)
     assert control.figures() == {"takes": "torque", "rate_hz": 1000.0}
 
 
@@ -47,7 +47,9 @@ def test_the_total_delay_counts_transport_hold_lag_and_the_servo_below(robot):
     assert arm.turning_damping() == pytest.approx(arm.damping * LEVER**2)
     assert arm.turning_damping(0.2) == pytest.approx(arm.damping * 0.2**2)
     assert arm.speed == pytest.approx(20.0 / arm.damping)
-    assert arm.slow_down == pytest.approx(TAUGHT_SPEED * arm.damping / 20.0)
+    assert arm.slow_down() == pytest.approx(TAUGHT_SPEED * arm.damping / 20.0)
+    assert arm.slow_down(0.015) == pytest.approx(0.015 * arm.damping / 20.0)
+    assert arm.slow_down(0.001) == 1.0  # a skill that is slower than the arm keeps its own time
     velocity = robot('interface = "velocity"\ndelay_s = 0.003\nbandwidth_hz = 50.0\n').control.admittance
     assert velocity.total_delay == pytest.approx(0.003 + 0.0005 + 1 / (2 * math.pi * 50) + 0.01061, abs=1e-5)
 

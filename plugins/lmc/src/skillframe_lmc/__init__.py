@@ -27,4 +27,5 @@ def skillframe_skills() -> Iterable[SkillType]:
         settings=Lazy("skillframe_lmc.settings:Settings").load,
         describe=Lazy("skillframe_lmc.describe:describe"),
         explain=Lazy("skillframe_lmc.explain:explain"),
+        speed=Lazy("skillframe_lmc.phase:speed"),
     )

@@ -97,6 +97,12 @@ def read_phase(document: Document) -> Phase:
     )
 
 
+def speed(document: Document) -> float | None:
+    """[m/s] at which the skill pushes; None for one that only turns or holds."""
+    push = read_phase(document).translation
+    return None if push.desired_direction is None or push.speed == 0.0 else push.speed
+
+
 def _get(values: dict[str, Any], key: str, hint: Any, where: str) -> Any:
     if key not in values:
         raise InputError(where, f"lacks the key {key!r}", "add it, or learn the skill again")
