@@ -82,6 +82,8 @@ def _measured(spec: RobotSpec) -> list[str]:
     ms = 1e3 * spec.control.late_s
     late = f"{ms:g} ms from command to torque" if ms else "no delay of the loop"
     lines = [f"  encoders: {known}; {late}"]
+    if spec.mount is not None:
+        lines.append(f"  mount: {spec.mount}, between force sensor and tool")
     if spec.dynamics.compensate:
         lines.append("  joint friction and damping: the controller adds the nominal ones to its torques")
     return lines
@@ -104,7 +106,8 @@ def as_json(robot: RobotModel) -> dict[str, Any]:
         "mass_kg": _mass(robot), "moving_bodies": _moving(robot), "rate_hz": spec.control.rate_hz,
         "interface": spec.control.figures(),
         "fixture_m": [float(x) for x in spec.workspace.fixture], "limits": asdict(spec.limits),
-        "encoders": spec.encoders and asdict(spec.encoders), "delay_s": spec.control.late_s,
+        "encoders": spec.encoders and asdict(spec.encoders), "mount": spec.mount and asdict(spec.mount),
+        "delay_s": spec.control.late_s,
         "joints": [_joint_values(robot, index) for index in range(1, model.njoints)],
         "arms": [_arm_values(robot, i) for i in range(len(spec.arm))],
         **(_machine_values(spec) if spec.loop or spec.actuation or spec.payload else {}),

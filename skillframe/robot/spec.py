@@ -26,6 +26,7 @@ from skillframe.robot.driven import (
 from skillframe.robot.home import home_in_si
 from skillframe.robot.interface import Control, check_control
 from skillframe.robot.joint_settings import Dynamics, Encoders, impossible_encoders, impossible_joints
+from skillframe.robot.mount import Mount, unfit_mount
 from skillframe.robot.numbers import LARGEST
 from skillframe.robot.surroundings import DeclaredCollisions, Obstacle, unfit_obstacles
 
@@ -119,6 +120,7 @@ class RobotFile:
     motor_inertia: dict[str, float] = field(default_factory=dict)
     dynamics: Dynamics = field(default_factory=Dynamics)
     encoders: Encoders | None = None
+    mount: Mount | None = None
     inertia: dict[str, LinkInertia] = field(default_factory=dict)
     payload: DeclaredPayload | None = None
     loop: tuple[LoopClosure, ...] = ()
@@ -146,7 +148,7 @@ class RobotSpec:
             [kg m^2, or kg where the joint slides]; 0 for joints not named.
         dynamics: friction and damping of joints in place of the URDF's, and whether the controller compensates them.
         encoders: of the joints; None where the controller knows positions and velocities exactly.
-        payload: what is carried, where it can be changed.
+        mount: soft, between sensor and tool, or None; payload: what is carried, where it can be changed.
         inertia: overlay by link name; loop: closed chains; actuation: what drives joints, of the kind in `drive`.
         sensors, gains: of a machine with actuators.
         collisions: which bodies may touch; obstacle: what stands around it.
@@ -168,6 +170,7 @@ class RobotSpec:
     motor_inertia: dict[str, float] = field(default_factory=dict)
     dynamics: Dynamics = field(default_factory=Dynamics)
     encoders: Encoders | None = None
+    mount: Mount | None = None
     inertia: dict[str, LinkInertia] = field(default_factory=dict)
     payload: DeclaredPayload | None = None
     loop: tuple[LoopClosure, ...] = ()
@@ -293,7 +296,7 @@ def _check_values(declared: RobotFile, where: str) -> None:
         if value is not None and not (0.0 < value < math.inf):
             raise InputError(f"{where}: {key}", f"is {value:g}", "give a positive, finite number")
     check_control(declared.control, where)
-    _check_interface(declared, where)
+    _check_one_arm(declared, where)
     _check_machine(declared, where)
     for joint, value in declared.home.items():
         if not math.isfinite(value):
@@ -366,20 +369,20 @@ def _check_machine(declared: RobotFile, where: str) -> None:
         raise InputError(where, text, "leave them out; a wrist sensor's noise is varied as `sensor.*` in a campaign")
 
 
-def _check_interface(declared: RobotFile, where: str) -> None:
-    """Velocities and positions are taken by one arm on a fixed base, whose joints nothing else drives."""
+def _check_one_arm(declared: RobotFile, where: str) -> None:
+    """Velocities, positions and mounts are for one arm on a fixed base, whose joints nothing else drives."""
     kind = declared.control.interface
-    if kind == "torque":
-        return
     others = {
         "is a machine whose joints are driven as [[actuation]] says": declared.actuation,
         "has a drive of its own": declared.drive, "has closed loops": declared.loop,
         "has several arms": len(declared.arm) > 1, "stands on a free base": declared.base == "free",
     }  # fmt: skip
-    for what, true in others.items():
-        if true:
-            text = f"is {kind!r}, which one arm on a fixed base takes, and this robot {what}"
-            raise InputError(f"{where}: control.interface", text, 'leave it out, or write "torque"')
+    other = next((what for what, true in others.items() if true), "")
+    for key, problem, fix in () if declared.mount is None else unfit_mount(declared.mount, declared.control, other):
+        raise InputError(f"{where}: {key}", problem, fix)
+    if other and kind != "torque":
+        text = f"is {kind!r}, which one arm on a fixed base takes, and this robot {other}"
+        raise InputError(f"{where}: control.interface", text, 'leave it out, or write "torque"')
 
 
 def _check_names(declared: RobotFile, where: str) -> None:

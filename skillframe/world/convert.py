@@ -16,6 +16,7 @@ import pinocchio as pin
 from skillframe.errors import SkillframeError
 from skillframe.frames import matrix_from_quaternion, quaternion_from_matrix
 from skillframe.robot.model import RobotModel
+from skillframe.robot.mount import Mount
 from skillframe.world.loops import close_loops
 from skillframe.world.scene import Geom, Holder, Scene, Sprung, Tool
 
@@ -26,6 +27,8 @@ IMPRATIO = 20.0  # friction stiff enough that a jammed peg does not creep in
 FIXTURE, TOOL, SENSOR, SECOND = "fixture", "tool", "sensor", "second_sensor"
 BASE = "robot_base"  # what does not move of the robot; nothing but drawn
 SPRUNG = "sprung_"  # what the names of the bodies and joints of sprung parts begin with
+MOUNT = SPRUNG + "mount_"  # and those of a soft mount's joints, between sensor and tool
+FASTEST_SWING = 1.2  # rad a time step, of the tool on a soft mount: semi-implicit Euler is stable up to 2
 STICTION_SOLREF, STICTION_SOLIMP = (0.004, 1.0), (0.99, 0.999, 1e-3, 0.5, 2.0)  # joint friction that hardly creeps
 _KINDS = {
     "box": mujoco.mjtGeom.mjGEOM_BOX, "sphere": mujoco.mjtGeom.mjGEOM_SPHERE, "plane": mujoco.mjtGeom.mjGEOM_PLANE,
@@ -137,12 +140,32 @@ def _add_joint(body: Any, model: pin.Model, index: int) -> None:
 
 
 def _add_tool(spec: mujoco.MjSpec, robot: RobotModel, scene: Scene, bodies: dict[int, Any]) -> None:
-    mount = _mount(robot, 0, bodies, SENSOR)
-    body = mount.add_body(name=TOOL)
+    body = _mount(robot, 0, bodies, SENSOR).add_body(name=TOOL)
+    if robot.spec.mount is not None:
+        _add_mount(body, robot.spec.mount, scene.tool, spec.option.timestep)
     set_inertia(body, tool_inertia(scene.tool))
     for index, geom in enumerate(scene.tool.geoms):
         add_geom(spec, body, geom, f"{TOOL}_{index}", contype=2, conaffinity=1, friction=scene.friction)
     _add_sensors(spec, SENSOR)
+
+
+def _add_mount(body: Any, mount: Mount, tool: Tool, timestep: float) -> None:
+    """Springs and dampers of a soft mount: three ways, then three turns about the tool frame's axes.
+
+    What would swing faster than the simulation can follow, as a slender tool about its axis, gets the inertia that it
+    lacks: some 190 Hz are beyond what an arm or its sensor's filter sees (our choice).
+    """
+    turning = np.diag(tool_inertia(tool).matrix())[3:]
+    for kind, stiffness, loads in (
+        (mujoco.mjtJoint.mjJNT_SLIDE, mount.stiffness, np.full(3, tool.mass)),
+        (mujoco.mjtJoint.mjJNT_HINGE, mount.turning_stiffness, turning),
+    ):
+        for letter, axis, load in zip("xyz", np.eye(3), loads, strict=True):
+            made = body.add_joint(name=f"{MOUNT}{kind.name[6:].lower()}_{letter}", axis=axis, type=kind)
+            made.stiffness = [stiffness, 0.0, 0.0]
+            least = stiffness * (timestep / FASTEST_SWING) ** 2
+            made.armature = max(least - load, 0.0)
+            made.damping = [2.0 * mount.damping_ratio * np.sqrt(stiffness * max(load, least)), 0.0, 0.0]
 
 
 def _add_holder(spec: mujoco.MjSpec, robot: RobotModel, holder: Holder, bodies: dict[int, Any]) -> Any:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from skillframe.frames import Float, cross
 from skillframe.robot.model import RobotModel
-from skillframe.world.convert import BASE, FIXTURE, SECOND, SENSOR, SPRUNG, TOOL
+from skillframe.world.convert import BASE, FIXTURE, MOUNT, SECOND, SENSOR, SPRUNG, TOOL
 
 
 class Layout:
@@ -32,6 +32,8 @@ class Layout:
         self.free = bool(model.njnt and model.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE)
         sprung = [j for j in range(model.njnt) if model.joint(j).name.startswith(SPRUNG)]
         self.sprung = model.jnt_dofadr[sprung].astype(np.int64)
+        mount = [j for j in range(model.njnt) if model.joint(j).name.startswith(MOUNT)]
+        self.mount, self.mount_places = (part[mount].astype(np.int64) for part in (model.jnt_dofadr, model.jnt_qposadr))
         self.places = _places(model)
         self._set_chain(model)
         self._rows, self._columns = _sparse_indices(model)

@@ -25,6 +25,8 @@ from skillframe.world.layout import Layout
 from skillframe.world.scene import Scene, State
 
 Draws = Mapping[str, Float]
+IMMOVABLE = 1e9
+"""[kg, kg m^2] on the joints of a mount that is to be rigid: 1e8 of an arm's, and its mass matrix stays exact."""
 _VELOCITY = int(mujoco.mjtStage.mjSTAGE_VEL)
 
 
@@ -60,19 +62,24 @@ class Plant:
         count: number of trials N.
         fixture: pose of the fixture in base per trial: (N, 3), (N, 3, 3).
         draws: quantities that differ from nominal: `grasp.*`, `robot.*` and `world.friction`, each (N,).
+        timestep: [s].
+        rigid: a soft mount does not give way, as a controller has it.
     """
 
     def __init__(
-        self, robot: RobotModel, scene: Scene, count: int, fixture: Pose, draws: Draws, timestep: float = TIMESTEP
-    ) -> None:
+        self, robot: RobotModel, scene: Scene, count: int, fixture: Pose, draws: Draws, timestep: float = TIMESTEP,
+        rigid: bool = False,
+    ) -> None:  # fmt: skip
         _leave_no_log_file()
         self.robot, self.scene, self.count = robot, scene, count
         try:
             self.model = build_spec(robot, scene, timestep).compile()
         except ValueError as error:
             raise unusable(robot.spec, error) from None
-        self.batch = mujoco.batch.Batch(self.model, count, nthread=1, persistent=True)
         self._layout = Layout(self.model)
+        if rigid:
+            self.model.dof_armature[self._layout.mount] = IMMOVABLE
+        self.batch = mujoco.batch.Batch(self.model, count, nthread=1, persistent=True)
         self._fixture, self._held, self.tool = fixture, held(robot, scene), scene.tool
         self._apply(draws)
         self._bind()
@@ -142,6 +149,30 @@ class Plant:
         self._qvel[:] = 0.0
         self._applied[:] = 0.0
         self.batch.forward()
+        if len(self._layout.mount):
+            self._level()
+
+    def _level(self) -> None:
+        """Preload the springs of a soft mount by the tool's weight, as it hangs now."""
+        places, dofs = self._layout.mount_places, self._layout.mount
+        stiffness = self.model.jnt_stiffness[self.model.dof_jntid[dofs]]
+        self.batch.expand("qpos_spring")[:, places] = self._bias[:, dofs] / stiffness
+        self.batch.forward()
+
+    def without_mount(self, qpos: Float, qvel: Float) -> tuple[Float, Float]:
+        """State (N, nq), (N, nv) of an arm whose mount is rigid: what its encoders know."""
+        if not len(self._layout.mount):
+            return qpos, qvel
+        qpos, qvel = qpos.copy(), qvel.copy()
+        qpos[:, self._layout.mount_places] = 0.0
+        qvel[:, self._layout.mount] = 0.0
+        return qpos, qvel
+
+    def positions_without_mount(self) -> Float:
+        """`joint_positions` (N, nv) of an arm whose mount is rigid."""
+        positions = self.joint_positions.copy()
+        positions[:, self._layout.mount] = 0.0
+        return positions
 
     def set_state(self, qpos: Float, qvel: Float, ids: NDArray[np.int64]) -> None:
         """Copy another plant's state and bring kinematics and velocities up to date."""

@@ -19,7 +19,8 @@ def varied_plants(setup: Setup, draws: Draws, count: int) -> tuple[Plant, Plant]
     plant = Plant(robot, scene, count, fixture, draws, timestep=dt)
     differs = any(key.startswith("grasp.") or key in ("robot.mass_scale", "robot.payload") for key in draws)
     differs = differs or robot.spec.encoders is not None  # what it knows of the state is not the plant's
-    nominal = Plant(robot, scene, count, fixture, {}, timestep=dt) if differs else plant
+    differs = differs or robot.spec.mount is not None
+    nominal = Plant(robot, scene, count, fixture, {}, timestep=dt, rigid=True) if differs else plant
     plant.reset(start_configurations(robot, scene, draws, count))
     return plant, nominal
 

@@ -211,13 +211,14 @@ class OneArm:
         self.plant, self.nominal = varied_plants(setup, draws, self.rows)
         self._encoders = encoders_of(setup, self.plant)
         self.point = np.asarray(setup.center_of_compliance, dtype=float)
+        self._stiff = setup.robot.spec.mount is None
         self.sensors: Gauge = Sensors(setup.sensors, self.plant, rngs, draws)
 
     def kinematics(self, active: Trials) -> Kinematics:
         """Of the nominal robots where the encoders say that the plant's are now."""
         if self.nominal is not self.plant:
             qpos, qvel = self.plant.state if self._encoders is None else self._encoders.state
-            self.nominal.set_state(qpos, qvel, active)
+            self.nominal.set_state(*self.nominal.without_mount(qpos, qvel), active)
         return self.nominal.kinematics(self.point)
 
     def read_encoders(self) -> None:
@@ -231,7 +232,7 @@ class OneArm:
 
     def joint_positions(self) -> Float:
         """(N, nv)."""
-        return self.plant.joint_positions
+        return self.plant.joint_positions if self._stiff else self.plant.positions_without_mount()
 
     def push(self, torque: Float, active: Trials) -> list[Broken]:
         """Move the plant by a tick under generalised forces (N, nv). Nothing fails."""

@@ -98,7 +98,7 @@ def read_phase(document: Document) -> Phase:
 
 
 def speed(document: Document) -> float | None:
-    """[m/s] at which the skill pushes; None for one that only turns or holds."""
+    """Speed of the push [m/s]. None for a skill that only turns or holds."""
     push = read_phase(document).translation
     return None if push.desired_direction is None or push.speed == 0.0 else push.speed
 
