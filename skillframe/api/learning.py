@@ -147,7 +147,7 @@ def learn(
 
     Args:
         demonstrations: one or several, as objects or files.
-        skill: kind of skill: "lmc", "search", "dual_arm", "replay", "dmp", "gmr", "seds" or a plug-in's.
+        skill: kind of skill: "lmc", "search", "dual_arm", "replay", "dmp", "gmr", "seds", "acp" or a plug-in's.
         at: where it is learned: a frame's name or "x,y,z" [m] in the tool frame; None for the recorded tool point.
         hand: where the hand held, for the work of torques; None for the recording's own, else the learning point.
         axes: "base", or "phase_start": the tool's attitude at the start of the phase.

@@ -1,4 +1,4 @@
-"""Baselines to compare learned skills with: `replay`, and the motion learners `dmp`, `gmr` and `seds`."""
+"""Baselines to compare learned skills with: `replay`, the motion learners `dmp`, `gmr`, `seds`, and `acp`."""
 
 from __future__ import annotations
 
@@ -50,4 +50,13 @@ def skillframe_skills() -> Iterable[SkillType]:
         learn=Lazy("skillframe_baselines.seds:learn"),
         settings=Lazy("skillframe_baselines.seds:SedsSettings").load,
         describe=Lazy("skillframe_baselines.seds:describe"),
+    )
+    yield SkillType(
+        name="acp",
+        summary="Estimator of an adaptive compliance policy: soft along the demonstrated force, stiff across it.",
+        build=Lazy("skillframe_baselines.acp:build"),
+        check=Lazy("skillframe_baselines.acp:check"),
+        learn=Lazy("skillframe_baselines.acp:learn"),
+        settings=Lazy("skillframe_baselines.acp:AcpSettings").load,
+        describe=Lazy("skillframe_baselines.acp:describe"),
     )

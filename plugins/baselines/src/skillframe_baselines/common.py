@@ -1,4 +1,4 @@
-r"""What `dmp`, `gmr` and `seds` share: the state that is learned, how it is followed, and what their files hold.
+r"""What `acp`, `dmp`, `gmr` and `seds` share: the state that is learned, how it is followed, and what their files hold.
 
 The state is the pose of the learning point relative to where the demonstrations ended,
 
@@ -50,7 +50,7 @@ class Following:
 class Phase:
     """The one phase of a document. The fields are those of `Following`."""
 
-    name: Literal["dmp", "gmr", "seds"]
+    name: Literal["acp", "dmp", "gmr", "seds"]
     stiffness: Stiffness
     feedforward: bool
     blend: float
