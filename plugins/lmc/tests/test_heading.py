@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 from skillframe_lmc.directions import choose
 from skillframe_lmc.heading import CAP, GAIN, NO_HEADING, Heading, doubt, heading
 from skillframe_lmc.intervals import Motion, track, translation
+from skillframe_lmc.learner import learn
 from skillframe_lmc.sectors import sectors
 from skillframe_lmc.settings import Settings
 
 from skillframe.demonstration.record import Demonstration
+from skillframe.extend.records import LearnOptions
 from skillframe.frames import Float, rotation_matrix, unit
 
 ORIGIN = np.zeros(3)
@@ -78,3 +80,52 @@ def test_votes_of_one_slope_only_overrule_the_heading() -> None:
     way = heading(motions(both))
     assert way.mean is not None  # down the slope, the edge of the sectors, 39 degrees from their middle
     assert math.degrees(math.acos(np.clip(chosen(both, way) @ chosen(both, NO_HEADING), -1.0, 1.0))) < 0.5
+
+
+SWUNG_ASIDE = ((-0.9, -0.2, -0.4), (-0.5, -0.65, -0.6))  # chords of a coupler that strayed to one side both times
+
+
+def swung(chords: Sequence[Sequence[float]], *forces: Sequence[float]) -> list[Motion]:
+    return motions([syn.straight(c, 0.03, f, syn.Recipe()) for c, f in zip(chords, forces, strict=True)])
+
+
+def test_a_point_that_the_parts_swung_heads_where_it_was_pushed_and_not_where_it_went() -> None:
+    """Friction met on either side is +-0.2 of the normal force, and cancels in the mean: straight down."""
+    given = swung(SWUNG_ASIDE, (1.2, 0.0, 6.0), (-1.8, 0.0, 9.0))
+    way = heading(given, turned=True)
+    assert way.swung and way.mean is not None and way.normal is None
+    np.testing.assert_allclose(way.mean, DOWN, atol=1e-9)
+    unturned = heading(given)
+    assert not unturned.swung and unturned.mean is not None and unturned.mean @ DOWN < 0.6  # the chords' own
+
+
+def test_pushes_that_disagree_and_chords_near_the_push_leave_the_heading_to_the_chords() -> None:
+    apart = swung(SWUNG_ASIDE, (3.0, 0.0, 6.0), (-3.0, 0.0, 6.0))  # 26.6 degrees from their mean: no agreement
+    assert not heading(apart, turned=True).swung
+    near = swung([(0.6, 0.0, -0.8), (-0.6, 0.0, -0.8)], (0.0, 0.0, 6.0), (0.0, 0.0, 6.0))  # 37 degrees: a peg's
+    assert not heading(near, turned=True).swung
+    free = swung(SWUNG_ASIDE, (0.0, 0.0, 6.0), (0.0, 0.0, 0.1))  # one that touched nothing says nothing
+    assert not heading(free, turned=True).swung
+
+
+def test_the_whole_departure_from_a_swung_point_s_heading_is_held_against_a_push() -> None:
+    off = np.array([[math.sin(0.1), 0.0, -math.cos(0.1)], [math.sin(0.3), 0.0, -math.cos(0.3)]])
+    np.testing.assert_allclose(doubt(off, Heading(DOWN, None, swung=True)), [0.1, CAP], atol=1e-7)
+
+
+def test_of_a_swung_point_pushes_are_chosen_among_wider_pyramids() -> None:
+    """Sectors that all hold the push need no opening at all: the least one of the heading decides, then 8 degrees."""
+    given = [sectors(m) for m in motions(syn.valley(45.0, 0.2))]
+    wide, plain = (choose(given, Settings(), Heading(DOWN, None, swung=each)) for each in (True, False))
+    assert math.degrees(wide.pyramid_angle) == pytest.approx(14.0)
+    assert math.degrees(plain.pyramid_angle) == pytest.approx(8.0)
+    assert wide.solid_angle > plain.solid_angle > 0.0
+
+
+def test_the_learner_asks_for_a_swung_point_only_where_the_tool_turned() -> None:
+    """A wrist 0.2 m behind a tip that goes 40 mm down swings by 0.2 m sin(tilt): 51 degrees aside at 14, 19 at 4."""
+    openings = []
+    for tilt in (14.0, 4.0):
+        shown = learn(syn.pair_of_alignments(tilt=tilt), LearnOptions())["phases"][0]["translation"]
+        openings.append(math.degrees(shown["evidence"]["pyramid_angle_rad"]))
+    assert openings == pytest.approx([14.0, 8.0])

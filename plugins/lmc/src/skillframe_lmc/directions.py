@@ -79,7 +79,7 @@ def choose(demonstrations: Sequence[Sectors], settings: Settings, way: Heading =
         way: where the demonstrations headed as a whole.
     """
     directions, need, depth, resolution = _search(demonstrations, settings, way)
-    angle = max(settings.pyramid_min_rad, float(need.min()))
+    angle = max(settings.pyramid_min_rad, way.least_pyramid, float(need.min()))
     if angle > settings.pyramid_max_rad:
         votes = _votes(directions[np.argmin(need)], demonstrations, settings.pyramid_max_rad)
         return Choice(None, angle, votes, 0.0, 0.0, None)
@@ -99,7 +99,7 @@ def _search(demonstrations: Sequence[Sectors], settings: Settings, way: Heading)
             cells = sphere.children(cells)
             directions = sphere.centres(cells, resolution)
         need, depth = needs(directions, demonstrations, settings.quantile, way)
-        bound = settings.slack * max(settings.pyramid_min_rad, float(need.min())) + margin
+        bound = settings.slack * max(settings.pyramid_min_rad, way.least_pyramid, float(need.min())) + margin
         keep = np.flatnonzero(need <= bound)
         if margin:
             cells = cells[keep[np.argsort(need[keep], kind="stable")[:MOST_CELLS]]]

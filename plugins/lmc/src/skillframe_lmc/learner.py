@@ -102,8 +102,7 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     at, hand = np.array(frame["learned_at"]), np.array(frame["work_at"])
     tracks = [intervals.track(d, at, hand, options.axes) for d in demonstrations]
     rotation = _learn_part("rotation", tracks, intervals.rotation, settings)
-    modes = settings.contact_modes and rotation.held
-    translation = _learn_part("translation", tracks, intervals.translation, settings, modes)
+    translation = _learn_part("translation", tracks, intervals.translation, settings, turned=not rotation.held)
     return {
         "frame": frame,
         "phases": [_phase(translation, rotation, settings)],
@@ -113,7 +112,7 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
 
 def _learn_part(
     name: Name, tracks: Sequence[Track], cut: Callable[[Track, Settings], Motion], settings: Settings,
-    by_modes: bool = False,
+    turned: bool = True,
 ) -> Learned:  # fmt: skip
     motions = [cut(blocks, settings) for blocks in tracks]
     if settings.contact_only:
@@ -126,8 +125,8 @@ def _learn_part(
     if done is not None and not done.environment_drove:
         given = [sectors(m, teacher_driven_only=name == "rotation") for m in moving]
         if all(len(g.contact) >= min(FEWEST_INTERVALS, len(m.work)) for g, m in zip(given, moving, strict=True)):
-            choice = choose(given, settings, heading(moving))
-            modes = _modes(moving, choice) if by_modes else []
+            choice = choose(given, settings, heading(moving, turned and name == "translation"))
+            modes = _modes(moving, choice) if settings.contact_modes and not turned else []
             choice = choose(modes, settings) if modes else choice
     stood = _standing(name, tracks, motions, moving, settings) if choice is None or choice.direction is None else None
     if stood is not None:
