@@ -27,6 +27,7 @@ def describe(document: Document) -> list[str]:
         f"press along ({x:.3f}, {y:.3f}, {z:.3f}) with {phase.push.force:.1f} N",
         *_where(phase),
         _way(phase),
+        *_held(phase),
         _forces(phase),
         f"done when {1e3 * phase.stop.drop_m:.3g} mm deeper than the surface and the answer to the push was lost; "
         f"failed after {phase.stop.time_s:g} s of search",
@@ -50,7 +51,20 @@ def _way(phase: Phase) -> str:
     path = phase.path
     way = WAYS[path.kind].format(pitch=1e3 * path.pitch, step=1e3 * path.step)
     bounds = f"at most {1e3 * path.speed:.3g} mm/s and {path.acceleration:.3g} m/s²"
+    if path.kind == "spiral" and path.radius:
+        way += f" and {1e3 * path.radius:.1f} mm wide, {path.passes} passes"
     return f"follow {way}, {bounds}, stiffness {phase.stiffness.translation:g} N/m across the push and none along it"
+
+
+def _held(phase: Phase) -> list[str]:
+    seen = phase.evidence
+    if "friction" not in seen or phase.forces is not None:
+        return []
+    line = f"friction {seen['friction']:.2f} holds the tool up to {1e3 * seen['dead_band_m']:.1f} mm behind its path"
+    if "freed_from" in seen:
+        push, stiffness, band = seen["freed_from"]
+        line += f"; it would be {1e3 * band:.1f} mm with the {push:.1f} N demonstrated and {stiffness:g} N/m"
+    return [line]
 
 
 def _forces(phase: Phase) -> str:

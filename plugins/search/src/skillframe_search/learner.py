@@ -16,6 +16,7 @@ from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, norm
 from skillframe_search import forces
 from skillframe_search.contact import Samples, in_contact, push_direction, samples, surface_axes
+from skillframe_search.deadband import Gains, dead_band, freed, friction_of
 from skillframe_search.exploration import Exploration, coordinates_of, explored
 from skillframe_search.phase import Kind, Path, Phase, Push, Stiffness, Stop
 
@@ -36,6 +37,8 @@ class Settings:
         contact_n: pressed harder than this is in contact [N].
         stiffness, turn_stiffness: across the push [N/m], of rotation [Nm/rad].
         pitch, layers: of the spiral [m], number of turns of it.
+        friction: between tool and surface; None measures it. A spiral that it would hold back by more than its pitch is
+            made stiffer and lighter than demonstrated; 0 leaves push and stiffness as they are.
         step, reach: of the random walk [m].
         time, drop: [s], [m]: `Stop`'s.
     """
@@ -50,6 +53,7 @@ class Settings:
     turn_stiffness: float = 60.0
     pitch: float = 0.0016
     layers: int = 1
+    friction: float | None = None
     step: float = 0.004
     reach: float = 0.02
     time: float = 20.0
@@ -76,18 +80,21 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions, kind: 
     model, criterion = forces.fit(rate * found.scale, pooled.wrench)
     felt = -(pooled.wrench[:, :3] @ push)
     across = norm(coordinates_of(pooled.rate, axes)[:, :2])
+    friction = friction_of(pooled, push) if settings.friction is None else settings.friction
+    asked = Gains(float(felt.mean()) if settings.push is None else settings.push, settings.stiffness)
+    gains = freed(friction or 0.0, asked, settings.pitch) if kind == "spiral" else asked
     baseline, looked = kind != "search", coordinates_of(pooled.place, axes)[:, found.columns]
     phase = Phase(
-        push=Push(direction=_vector(push), force=float(felt.mean()) if settings.push is None else settings.push),
+        push=Push(direction=_vector(push), force=gains.push),
         searched=found.coordinates,
         exploration=None if baseline else found,
         forces=None if baseline or settings.feedforward == "constant" else model,
         path=_path(kind, settings, found, across),
-        stiffness=Stiffness(translation=settings.stiffness, rotation=settings.turn_stiffness),
+        stiffness=Stiffness(translation=gains.stiffness, rotation=settings.turn_stiffness),
         stop=Stop(time_s=settings.time, drop_m=settings.drop),
-        evidence=_evidence(every, parts, push, across, criterion, looked),
+        evidence={**_evidence(every, parts, push, across, criterion, looked), **_held(friction, asked, gains)},
     )
-    body = {"frame": frame, "phases": [_plain(asdict(phase))], "settings": asdict(settings)}
+    body = {"frame": frame, "phases": [plain(asdict(phase))], "settings": asdict(settings)}
     return body
 
 
@@ -132,13 +139,21 @@ def _evidence(
     }
 
 
+def _held(friction: float | None, asked: Gains, gains: Gains) -> dict[str, Any]:
+    """What friction does to a compliant search, and from which push and stiffness a spiral was freed."""
+    if friction is None:
+        return {}
+    said = {"friction": friction, "dead_band_m": dead_band(friction, gains)}
+    return said if gains == asked else {**said, "freed_from": [asked.push, asked.stiffness, dead_band(friction, asked)]}
+
+
 def _vector(values: Float) -> tuple[float, float, float]:
     x, y, z = (float(v) for v in values)
     return (x, y, z)
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """The value with lists for tuples, as it comes back from a file."""
     if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    return [_plain(item) for item in value] if isinstance(value, tuple | list) else value
+        return {key: plain(item) for key, item in value.items()}
+    return [plain(item) for item in value] if isinstance(value, tuple | list) else value

@@ -34,6 +34,8 @@ class Path:
         speed: limit [m/s]; acceleration: limit [m/s^2].
         pitch: of the spiral [m]; layers: its turns about the normal [rad], one spiral each.
         step, reach: of the random walk [m].
+        radius: at which the spiral turns back [m]; 0 goes on outwards until time is up.
+        passes: of a spiral with a radius: each further one goes the other way, finer and slower.
     """
 
     kind: Kind
@@ -43,14 +45,36 @@ class Path:
     layers: tuple[float, ...]
     step: float
     reach: float
+    radius: float = 0.0
+    passes: int = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stiffness:
-    """Across the push [N/m], and of rotation [Nm/rad]. Along the push there is none while searching."""
+    """Across the push [N/m], and of rotation [Nm/rad]. Along the push there is none while searching.
+
+    Attributes:
+        turn: about the push [Nm/rad]; None: as of rotation.
+    """
 
     translation: float
     rotation: float
+    turn: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Dither:
+    """Torques that go round while searching, so that the tool rocks: over the push's axis, and about it.
+
+    Attributes:
+        tilt_nm, tilt_hz: size and frequency of a torque that turns in the surface.
+        turn_nm, turn_hz: of one about the push.
+    """
+
+    tilt_nm: float = 0.0
+    tilt_hz: float = 4.0
+    turn_nm: float = 0.0
+    turn_hz: float = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,6 +108,7 @@ class Phase:
         exploration: where to look; None for the baselines, which look around the start.
         forces: what is felt; None presses and no more.
         path, stiffness, stop: how to go there, how stiffly, until when.
+        dither: torques on the way.
         searched: names of the coordinates that the path moves.
         evidence: what it was learned from.
     """
@@ -96,6 +121,7 @@ class Phase:
     path: Path
     stiffness: Stiffness
     stop: Stop
+    dither: Dither = Dither()
     evidence: dict[str, Any]
 
 
@@ -127,6 +153,13 @@ def _check_numbers(phase: Phase) -> None:
     for key, value in positive.items():
         if not 0.0 < value < 1e6:
             raise InputError(f"phases[0].{key}", f"should be positive, is {value:g}", "fix it, or learn again")
+    if not (0.0 <= phase.path.radius < 1.0 and 1 <= phase.path.passes <= 10):
+        raise InputError("phases[0].path", "radius should be 0 to 1 m, passes 1 to 10", "fix it, or learn again")
+    if phase.stiffness.turn is not None and not 0.0 < phase.stiffness.turn < 1e6:
+        raise InputError("phases[0].stiffness.turn", f"should be positive, is {phase.stiffness.turn:g}", "fix it")
+    for name in Dither.__dataclass_fields__:
+        if not 0.0 <= getattr(phase.dither, name) < 25.0:
+            raise InputError(f"phases[0].dither.{name}", "should be 0 to 25 Nm or Hz", "fix it, or learn again")
     if phase.stop.time_s > 300.0:
         raise InputError("phases[0].stop.time_s", "a search longer than 300 s is not planned", "give a shorter time")
     if phase.path.reach < phase.path.step:

@@ -19,9 +19,9 @@ from skillframe.frames import Float, norm
 from skillframe_search.contact import surface_axes
 from skillframe_search.ergodic import ergodic
 from skillframe_search.exploration import COORDINATES, CUT, LEVER
-from skillframe_search.phase import Phase, read_phase
-from skillframe_search.simple import random_walk, spiral
-from skillframe_search.smoothing import SLACK, smoothed
+from skillframe_search.phase import Dither, Phase, read_phase
+from skillframe_search.simple import random_walk, spiral, there_and_back
+from skillframe_search.smoothing import SLACK, STEP_S, Motion, smoothed
 from skillframe_search.tour import tour
 
 NUMBERS = 256
@@ -48,15 +48,25 @@ class Plan(NamedTuple):
 def plan(phase: _Hashed, number: int) -> Plan:
     """The trajectory of a number, 0 ... 255."""
     settings = phase.phase
-    scaled, scale = _places(settings, np.random.default_rng([21, number]))
-    motion = smoothed(scaled, settings.path.speed, settings.path.acceleration, settings.stop.time_s)
+    motion, scale = _motion(settings, np.random.default_rng([21, number]))
     columns = [COORDINATES.index(name) for name in settings.searched]
     axes = surface_axes(np.array(settings.push.direction))
     full = np.zeros((5, 6))
     full[:2, :3], full[2:, 3:] = axes[:2], axes
     spread = full[columns] / scale[:, None]
     length = float(norm(np.diff(motion.place[:, : sum(c < 2 for c in columns)], axis=0)).sum())
-    return Plan(motion.place @ spread, motion.rate @ spread, exerted(settings, motion.rate), length)
+    wrench = exerted(settings, motion.rate)
+    wrench[:, 3:] += dithered(settings.dither, axes, len(wrench))
+    return Plan(motion.place @ spread, motion.rate @ spread, wrench, length)
+
+
+def dithered(dither: Dither, axes: Float, count: int) -> Float:
+    """(count, 3) the torque that goes round in the surface, and about its normal, every `STEP_S` [Nm]."""
+    time = np.arange(count) * STEP_S
+    tilt, turn = 2.0 * np.pi * dither.tilt_hz * time, 2.0 * np.pi * dither.turn_hz * time
+    rocking = dither.tilt_nm * np.stack([np.cos(tilt), np.sin(tilt)], axis=1) @ axes[:2]
+    result: Float = rocking + dither.turn_nm * np.sin(turn)[:, None] * axes[2]
+    return result
 
 
 def exerted(phase: Phase, rate: Float) -> Float:
@@ -71,6 +81,19 @@ def exerted(phase: Phase, rate: Float) -> Float:
     result: Float = scale[:, None] * wrench
     result[:, :3] += (phase.push.force - result[:, :3] @ push)[:, None] * push
     return result
+
+
+def _motion(phase: Phase, rng: np.random.Generator) -> tuple[Motion, Float]:
+    """The motion (T, k) [m, m/s], and metres per unit of each coordinate (k,)."""
+    path, time = phase.path, phase.stop.time_s
+    if path.kind != "spiral" or not path.radius:
+        places, scale = _places(phase, rng)
+        return smoothed(places, path.speed, path.acceleration, time), scale
+    flat = there_and_back(path.pitch, path.radius, path.speed, path.acceleration, path.passes, STEP_S)
+    flat = flat[: round(time / STEP_S) + 1]
+    place = np.concatenate([flat, np.zeros((len(flat), len(phase.searched) - 2))], axis=1)
+    rate = np.concatenate([np.diff(place, axis=0) / STEP_S, np.zeros((1, place.shape[1]))])
+    return Motion(place, rate), np.ones(place.shape[1])
 
 
 def _places(phase: Phase, rng: np.random.Generator) -> tuple[Float, Float]:
@@ -113,7 +136,9 @@ def area(document: Document) -> Float:
     if phase.exploration is None:
         radius = phase.path.reach
         if phase.path.kind == "spiral":
-            radius = float(np.sqrt(phase.path.speed * phase.stop.time_s * phase.path.pitch / np.pi))
+            radius = phase.path.radius or float(
+                np.sqrt(phase.path.speed * phase.stop.time_s * phase.path.pitch / np.pi)
+            )
         middle, deviation = np.zeros(3), radius * np.sqrt((axes[:2] ** 2).sum(axis=0))
     else:
         rows = [axes[c] for c in phase.exploration.columns if c < 2]

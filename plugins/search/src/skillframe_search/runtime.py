@@ -26,9 +26,10 @@ from skillframe_search.watch import Watch
 
 GROWTH_S = 0.2  # the push grows for this long after the touch
 HOLD = 1000.0  # N/m along the push in the approach and at the end
+HELD = 0.5  # of the distance commanded: who reached less was held by friction, not slowed by it
 PER_TRIAL = (  # arrays with a row per trial
     "_turn", "_push", "_place", "_rate", "_wrench", "_length", "_lever", "_began", "_touched", "_lead", "_status",
-    "_reason", "_stiffness",
+    "_reason", "_stiffness", "_commanded", "_reached",
 )  # fmt: skip
 
 
@@ -66,7 +67,7 @@ class SearchSkill(Skill):
         self._length = np.array([p.length for p in plans])
         self._lever = rotate(self._home.rotation, np.broadcast_to(self._shift, (n, 3)))
         self._began, self._touched = observation.time.copy(), np.full(n, np.inf)
-        self._lead = np.zeros(n)
+        self._lead, self._commanded, self._reached = np.zeros(n), np.zeros(n), np.zeros(n)
         self._status, self._reason = np.zeros(n, dtype=np.int64), no_reasons(n)
         self._watch = Watch(self._phase.push, self._stop, self._push, observation)
         self._end = Pose(self._home.position.copy(), self._home.rotation.copy())
@@ -93,6 +94,8 @@ class SearchSkill(Skill):
         outer = push[:, :, None] * push[:, None, :]
         result[:, :3, :3] = values.translation * np.eye(3) + (along - values.translation) * outer
         result[:, 3:, 3:] = values.rotation * np.eye(3)
+        if values.turn is not None:
+            result[:, 3:, 3:] += (values.turn - values.rotation) * outer
         return result
 
     def step(self, observation: Observation) -> Command:
@@ -118,6 +121,7 @@ class SearchSkill(Skill):
         nearing = (status == Status.RUNNING) & ~searching
         elapsed = np.where(searching, observation.time - np.where(searching, self._touched, 0.0), 0.0)
         place, rate, wrench = self._on_plan(elapsed)
+        self._measure(observation, place, searching)
         grown = np.where(searching, np.clip(elapsed / GROWTH_S, 0.0, 1.0), 0.0)[:, None]
         self._advance(observation.dt, nearing)
         along = np.where(searching, self._watch.depth, self._lead)
@@ -131,6 +135,13 @@ class SearchSkill(Skill):
             rotation = np.where(ended[:, None, None], self._end.rotation, rotation)
         gain = Impedance(self._stiffness)
         return Command(Pose(position, rotation), twist, gain, grown * wrench, status.copy(), self._reason.copy())
+
+    def _measure(self, observation: Observation, place: Float, searching: NDArray[np.bool_]) -> None:
+        """How far across the push the tool has been sent, and how far it has come, at most and squared [m2]."""
+        went = observation.pose.position - self._home.position
+        for most, moved in ((self._commanded, place[:, :3]), (self._reached, went)):
+            along = _dot(moved, self._push)
+            np.maximum(most, np.where(searching, _dot(moved, moved) - along * along, 0.0), out=most)
 
     def _advance(self, dt: float, nearing: NDArray[np.bool_]) -> None:
         """Approach: the desired depth goes on, but never asks for more than the push."""
@@ -179,9 +190,20 @@ class SearchSkill(Skill):
             return Status.SUCCESS, f"fell in after {seconds:.2f} s of search"
         if late:
             way = 1e3 * self._length[i]
-            return Status.FAILURE, f"searched for {seconds:.1f} s along {way:.0f} mm and did not fall in"
+            sent, came = (1e3 * float(np.sqrt(squares[i])) for squares in (self._commanded, self._reached))
+            held = ": friction holds the tool" if came < HELD * sent else ""
+            return Status.FAILURE, (
+                f"searched for {seconds:.1f} s along {way:.0f} mm and did not fall in; commanded {sent:.1f} mm, "
+                f"reached {came:.1f} mm{held}"
+            )
         went = 1e3 * float(self._watch.depth[i])
         return Status.FAILURE, f"touched no surface within {went:.0f} mm of the start; start the search nearer to it"
+
+
+def _dot(a: Float, b: Float) -> Float:
+    """Row-wise dot product (N,) of (N, 3) arrays in one fixed order of additions."""
+    result: Float = a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
+    return result
 
 
 def _at_center(place: Float, lever: Float) -> Float:

@@ -1,8 +1,12 @@
-r"""Baselines that learn nothing of where to look: a spiral and a random walk around the start.
+r"""Searches that learn nothing of where to look: a spiral and a random walk around the start.
 
 Archimedean spiral: r = pitch t / 2 pi, walked at constant speed; with several layers, one after the other, each at its
 own turn about the normal. Random walk: steps of one length in a random direction, drawn again where they would leave a
 circle. The seed names both as what a search is compared with; pitch, step and reach are ours.
+
+A spiral with a radius turns back there and comes in again the other way round, its pitch 0.6 and its speed 0.8 of what
+they were, out again and so on: what a pass ran over, the next one finds. Along it v = min(v_max, sqrt(a r)), so that
+the inner turns are slow enough to be followed (ours).
 """
 
 from __future__ import annotations
@@ -14,6 +18,7 @@ import numpy as np
 from skillframe.frames import Float, norm, unit
 
 FINE = 2e-4  # m between the spiral's points
+FINER, SLOWER = 0.6, 0.8  # of pitch and speed, each further pass
 
 
 def spiral(dimensions: int, pitch: float, length: float, layers: Sequence[float] = (0.0,)) -> Float:
@@ -30,6 +35,34 @@ def spiral(dimensions: int, pitch: float, length: float, layers: Sequence[float]
             part[:, -1] = layer
         parts.append(part)
     return np.concatenate([np.zeros((1, dimensions)), *parts])
+
+
+def there_and_back(pitch: float, radius: float, speed: float, acceleration: float, passes: int, step: float) -> Float:
+    """(n, 2) places [m] every `step` seconds: a spiral out to a radius, and finer ones in and out again."""
+    parts = [np.zeros((1, 2))]
+    for k in range(passes):
+        way = _outwards(pitch * FINER**k, radius, speed * SLOWER**k, acceleration, step)
+        parts.append(way if k % 2 == 0 else way[::-1] @ _turned(way[-1], parts[-1][-1]))
+    return np.concatenate(parts)
+
+
+def _outwards(pitch: float, radius: float, speed: float, acceleration: float, step: float) -> Float:
+    """(n, 2) places of an Archimedean spiral from the middle to a radius, by the law of the module's text."""
+    angle = np.linspace(0.0, 2.0 * np.pi * radius / pitch, max(round(np.pi * radius**2 / pitch / FINE), 64))
+    r = pitch * angle / (2.0 * np.pi)
+    rate = np.minimum(speed, np.sqrt(acceleration * np.maximum(r, pitch / (2.0 * np.pi))))
+    along = np.hypot(pitch / (2.0 * np.pi), r) / rate  # seconds per radian
+    time = np.concatenate([[0.0], np.cumsum(0.5 * (along[1:] + along[:-1]) * np.diff(angle))])
+    at = np.interp(np.arange(0.0, time[-1], step), time, angle)
+    places: Float = (pitch * at / (2.0 * np.pi))[:, None] * np.stack([np.cos(at), np.sin(at)], axis=1)
+    return places
+
+
+def _turned(from_: Float, to: Float) -> Float:
+    """(2, 2) what turns rows so that the bearing of one place is that of another."""
+    angle = np.arctan2(to[1], to[0]) - np.arctan2(from_[1], from_[0])
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, s], [-s, c]])
 
 
 def random_walk(dimensions: int, step: float, reach: float, length: float, rng: np.random.Generator) -> Float:
