@@ -26,6 +26,8 @@ EULER = ("roll", "pitch", "yaw")
 ROTATION_VECTOR = ("rvx", "rvy", "rvz")
 MATRIX = tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
 CANONICAL = ("t", *POSITION, *QUATERNION, *WRENCH)
+SECONDS, NANOSECONDS = "sec", "nsec"
+"""A clock in two columns."""
 KNOWN = (*CANONICAL, *EULER, *ROTATION_VECTOR, *MATRIX)
 QUANTITY = {
     "t": "time", **dict.fromkeys(POSITION, "length"), **dict.fromkeys((*EULER, *ROTATION_VECTOR), "angle"),
@@ -33,7 +35,7 @@ QUANTITY = {
 }  # fmt: skip
 ALIASES = {
     "time": "t", "timestamp": "t", "stamp": "t", "x": "px", "y": "py", "z": "pz", "pos_x": "px", "pos_y": "py",
-    "pos_z": "pz", "mx": "tx", "my": "ty", "mz": "tz",
+    "pos_z": "pz", "mx": "tx", "my": "ty", "mz": "tz", "secs": SECONDS, "nsecs": NANOSECONDS, "nanosec": NANOSECONDS,
 }  # fmt: skip
 """Names that other tools use: suggested for a header, which is never guessed, and taken where the user wrote them."""
 
@@ -78,19 +80,31 @@ def name_columns(table: Table, spec: str | None, units: str | None) -> Columns:
     factors = scales(units)
     columns: dict[str, Float] = {}
     for name, index in picks.items():
+        if index in table.stamps and name.rpartition("_")[2] == "t":
+            columns[name] = table.stamps[index]
+            continue
         if index in table.text:
             if name.rpartition("_")[2] in KNOWN:
                 _refuse_words(table, index, name)
             continue
         factor = factors.get(QUANTITY.get(name.rpartition("_")[2], ""), 1.0)
         columns[name] = table.values[:, index] * factor if factor != 1.0 else table.values[:, index].copy()
-    return Columns(columns, table.source, table.rows.tolist())
+    return Columns(_one_clock(columns), table.source, table.rows.tolist())
+
+
+def _one_clock(columns: dict[str, Float]) -> dict[str, Float]:
+    """Columns whose clock stood in two, whole seconds and nanoseconds, as headers of ROS do."""
+    for name in [name for name in columns if name.rpartition("_")[2] == SECONDS]:
+        arm = name.removesuffix(SECONDS)
+        if f"{arm}t" not in columns and f"{arm}{NANOSECONDS}" in columns:
+            columns[f"{arm}t"] = columns.pop(name) + 1e-9 * columns.pop(f"{arm}{NANOSECONDS}")
+    return columns
 
 
 def _refuse_words(table: Table, index: int, name: str) -> None:
     row, said = table.text[index]
     comma = said.count(",") == 1 and said.replace(",", "").replace("-", "").replace("+", "").isdigit()
-    fix = "a decimal comma is not read; write numbers with a point" if comma else "fix that cell"
+    fix = "separate cells that have a decimal comma by semicolons or tabs" if comma else "fix that cell"
     raise InputError(f"{table.source}: row {row}, column {name}", f"is not a number ({said[:40]!r})", fix)
 
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from skillframe.demonstration.assemble import assemble
 from skillframe.demonstration.checks import refuse_w_first_header
 from skillframe.demonstration.columns import WRENCH, Columns, left_out, name_columns, split_names
+from skillframe.demonstration.merged import assemble_split
 from skillframe.demonstration.metafile import read_meta
 from skillframe.demonstration.options import ReadOptions, read_options
 from skillframe.demonstration.record import Demonstration
@@ -31,8 +31,8 @@ def read_delimited(path: Path, options: Mapping[str, Any]) -> Demonstration:
     if chosen.columns is None:
         refuse_w_first_header(table.source, table.names)
     chosen = _split_columns(table, chosen)
-    columns = name_columns(table, chosen.columns, chosen.units)
-    return assemble(columns, read_meta(path), chosen, left_out(table), read_wrench_file(chosen))
+    columns, notes = name_columns(table, chosen.columns, chosen.units), left_out(table)
+    return assemble_split(columns, read_meta(path), chosen, notes, read_wrench_file(chosen))
 
 
 def _split_columns(table: Table, options: ReadOptions) -> ReadOptions:

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.demonstration.assemble import assemble
 from skillframe.demonstration.columns import KNOWN, Columns
 from skillframe.demonstration.csv import demonstration_columns
 from skillframe.demonstration.delimited import read_wrench_file
+from skillframe.demonstration.merged import assemble_split
 from skillframe.demonstration.options import ReadOptions, read_options
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
@@ -40,7 +40,7 @@ def read_npz(path: Path, options: Mapping[str, Any]) -> Demonstration:
     meta = _meta(path, arrays)
     notes = list[str]()
     columns = Columns(_columns(path, arrays, notes), str(path))
-    return assemble(columns, meta, chosen, notes, read_wrench_file(chosen))
+    return assemble_split(columns, meta, chosen, notes, read_wrench_file(chosen))
 
 
 def _refuse_text_settings(path: Path, options: ReadOptions) -> None:

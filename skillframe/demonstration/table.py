@@ -1,23 +1,28 @@
 """Delimited text as named columns of numbers, with the file's row numbers kept for messages.
 
 Rows are counted as an editor counts lines, from 1. Commas, semicolons, tabs and blanks are told apart by the first
-rows; a decimal comma is not read.
+rows. Where cells are not separated by commas, a comma in a number is a decimal comma. A file that has decimal points
+too is refused, because one of them may part thousands. An empty cell is no value. Dates and times become seconds.
 """
 
 from __future__ import annotations
 
 import codecs
-from dataclasses import dataclass
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.demonstration.stamps import seconds
 from skillframe.errors import InputError
 from skillframe.frames import Float
 
 CONTROL = [chr(code) for code in range(32) if chr(code) not in "\t\n\r\f\v"]
 """Characters that no table holds; random bytes nearly always do."""
+DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?|[-+]?\d+,")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,6 +35,8 @@ class Table:
         values: (T, C) numbers, NaN where `text` says that a column holds words.
         rows: (T,) row numbers in the file, from 1.
         text: indices of columns that are not numbers, with the first offending row and what it says.
+        stamps: (T,) seconds of those columns of `text` that hold a date or a time of day in every row.
+        blank: (T, C) which cells are empty; None where none is.
     """
 
     source: str
@@ -37,6 +44,8 @@ class Table:
     values: Float
     rows: NDArray[np.int64]
     text: dict[int, tuple[int, str]]
+    stamps: dict[int, Float] = field(default_factory=dict)
+    blank: NDArray[np.bool_] | None = None
 
 
 def read_text(path: Path) -> str:
@@ -90,8 +99,7 @@ def read_table(path: Path, header: bool | None = None) -> Table:
             path, "has a header but no rows" if names else "has no rows", "record again, or check the export"
         )
     _refuse_ragged(path, names, lines, delimiter)
-    values, text = _numbers([line for _, line in lines], delimiter, np.array([i for i, _ in lines]))
-    return Table(source=str(path), names=names, values=values, rows=np.array([i for i, _ in lines]), text=text)
+    return _table(str(path), names, [line for _, line in lines], delimiter, np.array([i for i, _ in lines]))
 
 
 def _delimiter(first: str, row: str) -> str | None:
@@ -101,7 +109,7 @@ def _delimiter(first: str, row: str) -> str | None:
     """
     for candidate in (";", ",", "\t"):
         named = first.count(candidate) == row.count(candidate) and not _is_numeric(first, candidate)
-        if candidate in row and (named or not any(" " in cell.strip() for cell in row.split(candidate))):
+        if candidate in row and (named or not any(len(cell.split()) > 1 for cell in row.split(candidate))):
             return candidate
     return None
 
@@ -144,21 +152,59 @@ def _refuse_ragged(path: Path, names: list[str], lines: list[tuple[int, str]], d
             )  # fmt: skip
 
 
-def _numbers(
-    lines: list[str], delimiter: str | None, rows: NDArray[np.int64]
-) -> tuple[Float, dict[int, tuple[int, str]]]:
-    """The numbers, and which columns hold words: numpy's own parser first, cell by cell where it fails."""
+def _table(source: str, names: list[str], lines: list[str], delimiter: str | None, rows: NDArray[np.int64]) -> Table:
+    """The numbers, and which columns hold words: numpy's own parser first, column by column where it fails."""
     if all(line.isascii() and "_" not in line for line in lines):
         try:
-            return np.loadtxt(lines, delimiter=delimiter, comments=None, ndmin=2), {}
+            return Table(
+                source=source, names=names, values=np.loadtxt(lines, delimiter=delimiter, comments=None, ndmin=2),
+                rows=rows, text={},
+            )  # fmt: skip
         except ValueError:
             pass
-    text: dict[int, tuple[int, str]] = {}
-    values = np.empty((len(lines), len(_split(lines[0], delimiter))))
-    for i, line in enumerate(lines):
-        for j, cell in enumerate(_split(line, delimiter)):
-            number = _number(cell) if cell.strip().strip('"') else np.nan
-            if number is None:
-                text.setdefault(j, (int(rows[i]), cell.strip()))
-            values[i, j] = np.nan if number is None else number
-    return values, text
+    cells = [
+        [cell.strip().strip('"') for cell in column]
+        for column in zip(*(_split(line, delimiter) for line in lines), strict=True)
+    ]
+    if delimiter != ",":
+        cells = _with_points(source, cells, rows)
+    values, text = np.empty((len(lines), len(cells))), dict[int, tuple[int, str]]()
+    for j, column in enumerate(cells):
+        values[:, j], word = _column_of(column)
+        if word is not None:
+            text[j] = (int(rows[word]), column[word])
+    stamps = {j: found for j in text if (found := seconds(cells[j])) is not None}
+    blank = np.array([[not cell for cell in column] for column in cells]).T
+    return Table(
+        source=source, names=names, values=values, rows=rows, text=text, stamps=stamps,
+        blank=blank if blank.any() else None,
+    )  # fmt: skip
+
+
+def _column_of(cells: Sequence[str]) -> tuple[Float, int | None]:
+    """Numbers of one column, NaN where there is none, and the first cell that holds a word."""
+    found = [_number(cell) if cell else np.nan for cell in cells]
+    word = next((i for i, number in enumerate(found) if number is None), None)
+    return np.array([np.nan if number is None else number for number in found]), word
+
+
+def _with_points(source: str, cells: list[list[str]], rows: NDArray[np.int64]) -> list[list[str]]:
+    """Columns of cells whose decimal commas are points.
+
+    Raises:
+        InputError: the file has numbers with commas and others with points.
+    """
+    commas = [[bool(DECIMAL_COMMA.fullmatch(cell)) for cell in column] for column in cells]
+    if not any(map(any, commas)):
+        return cells
+    for j, column in enumerate(cells):
+        for i, cell in enumerate(column):
+            if "." in cell and _number(cell) is not None:
+                raise InputError(
+                    f"{source}: row {rows[i]}, column {j + 1}", f"has a decimal point ({cell}), other cells a comma",
+                    "export it again with one decimal sign and without separators of thousands",
+                )  # fmt: skip
+    return [
+        [cell.replace(",", ".") if comma else cell for cell, comma in zip(column, which, strict=True)]
+        for column, which in zip(cells, commas, strict=True)
+    ]

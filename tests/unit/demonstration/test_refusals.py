@@ -69,7 +69,14 @@ CASES: dict[str, tuple[Callable[[Cells], Cells], str]] = {
     "infinity": (lambda r: spoil(r, "pz", "inf", 4), "row 4, column pz: is not a finite number"),
     "an empty cell": (lambda r: spoil(r, "qx", "", 5), "row 5, column qx: is not a finite number"),
     "a word": (lambda r: spoil(r, "tx", "high", 6), "row 6, column tx: is not a number .'high'.; fix that cell"),
-    "a decimal comma": (decimal_commas, "row 2, column t: is not a number.*decimal comma.*with a point"),
+    "commas and points": (
+        lambda r: [*decimal_commas(r)[:9], [decimal_commas(r)[9][0].replace(",", ".", 1)]],
+        "row 10, column 1: has a decimal point .0.08., other cells a comma.*one decimal sign",
+    ),
+    "a comma that parts cells and decimals": (
+        lambda r: [r[0], *([*row[:-1], f"{row[-1]},5"] for row in r[1:])],
+        "row 2: has 15 values, the header has 14",
+    ),
     "digits of another script": (lambda r: spoil(r, "px", "\u0661\u0662", 6), "row 6, column px: is not a number"),
     "a number as Python writes it": (lambda r: spoil(r, "px", "1_0", 6), "row 6, column px: is not a number .'1_0'"),
     "a number that overflows": (lambda r: spoil(r, "fz", "1e200", 6), "row 6, column fz: is 1e.200, which nothing"),
