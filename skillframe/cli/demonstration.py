@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -55,7 +55,8 @@ _OPTIONS = [
     click.option(
         "--columns", multiple=True,
         help='Column names in order, "t,px,py,pz,qx,...", "_" to ignore one, or picks by header, "t=stamp,px=x,...". '
-        "Given twice, the second names the --wrench file's; given once with names of both, each file takes its own.",
+        "Given twice, the second names the --wrench file's; given once with names of both, each file takes its own. "
+        '"auto" reads nothing and proposes the line to type, with reasons.',
     ),
     click.option("--units", help='Units that are not SI, in any order: "mm,deg,us,kN,Nmm".'),
     click.option("--euler", help='Order of roll, pitch, yaw: "xyz" about fixed axes, "ZYX" about moving ones.'),
@@ -145,9 +146,12 @@ def convert(source: Path, out: Path, as_json: bool, **options: Any) -> int:
       skillframe demonstration convert demo.bag --robot panda --wrench-topic /ft --wrench-frame tool --out demo.npz
     """
     from skillframe.conditioning.audit import audit
-    from skillframe.extend.reading import read_demonstration, write_demonstration
+    from skillframe.extend.reading import AUTO, read_demonstration, write_demonstration
 
-    demonstration = read_demonstration(source, **reading_settings(options))
+    settings = reading_settings(options)
+    if settings.get("columns") == AUTO:
+        return proposed([source], settings, as_json) or 1  # nothing was written
+    demonstration = read_demonstration(source, **settings)
     found = audit(demonstration)
     write_demonstration(demonstration, out)
     for text in found.notes:
@@ -175,12 +179,15 @@ def check(files: tuple[Path, ...], as_json: bool, **options: Any) -> int:
     Examples:
       skillframe demonstration check demo1.npz demo2.npz
       skillframe demonstration check rim0.csv --columns t,px,py,pz,qx,qy,qz,qw,fx,fy,fz,tx,ty,tz --json
+      skillframe demonstration check log.csv --columns auto
     """
     from skillframe.conditioning.audit import audit, compared
     from skillframe.errors import SkillframeError
-    from skillframe.extend.reading import read_demonstration
+    from skillframe.extend.reading import AUTO, read_demonstration
 
     settings, demonstrations = reading_settings(options), []
+    if settings.get("columns") == AUTO:
+        return proposed(files, settings, as_json)
     for path in files:
         try:
             demonstrations.append(read_demonstration(path, **settings))
@@ -197,6 +204,24 @@ def check(files: tuple[Path, ...], as_json: bool, **options: Any) -> int:
     if len(demonstrations) < len(files):
         return 2
     return 0 if all(found.usable for found in audits) else 1
+
+
+def proposed(files: Sequence[Path], settings: dict[str, Any], as_json: bool) -> int:
+    """Print the line that reads each foreign file. The exit code is 1 unless every line can be typed as it stands."""
+    from skillframe.extend.reading import propose_reading
+
+    found = [propose_reading(path, **settings) for path in files]
+    if as_json:
+        emit_json([proposal.as_json() for proposal in found])
+        return 0 if all(proposal.whole for proposal in found) else 1
+    for proposal in found:
+        click.echo(f"{proposal.file}\n  type      {proposal.line}")
+        for name in ("because", "undecided", "missing"):
+            for text in getattr(proposal, name):
+                click.echo(f"  {name:<10}{text}")
+        if proposal.error:
+            click.echo(f"  refused   {proposal.error}")
+    return 0 if all(proposal.whole for proposal in found) else 1
 
 
 def _show(found: DemonstrationAudit) -> None:

@@ -59,7 +59,7 @@ def quaternions(d: Demonstration) -> Iterator[str]:
         return
     q = d.quaternion
     first, last = q[:, 0], q[:, 3]
-    kept, turns = _kept_positive(q)
+    kept, turns = kept_positive(q)
     if kept == [0]:
         yield (
             f"quaternion: its sign is turned {turns} times so that qx is never negative, as recorders do for w: "
@@ -76,7 +76,7 @@ def quaternions(d: Demonstration) -> Iterator[str]:
         yield "quaternion: qx never changes sign, but qw does: the values may be w-first"
 
 
-def _kept_positive(q: Float) -> tuple[list[int], int]:
+def kept_positive(q: Float) -> tuple[list[int], int]:
     """Which numbers of (T, 4) stay on the positive side although the sign is turned now and then, and how often."""
     turns = int(np.count_nonzero((q[:-1] * q[1:]).sum(axis=1) < 0.0))
     kept = [i for i in range(4) if turns and q[:, i].min() >= -1e-6 and q[:, i].max() > 1e-6]

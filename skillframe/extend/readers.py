@@ -13,6 +13,7 @@ from skillframe.extend.records import ReaderType
 if TYPE_CHECKING:
     from skillframe.demonstration.bags import ToolPoses
     from skillframe.demonstration.record import Demonstration
+    from skillframe.demonstration.table import Table
 
 BAG_OPTIONS = ("pose_topic", "pose_frames", "wrench_topic", "robot")
 
@@ -26,6 +27,12 @@ def _reader(module: str, function: str) -> Callable[[Path, Mapping[str, Any]], D
         return result
 
     return read
+
+
+def _text_table(path: Path, options: Mapping[str, Any]) -> Table:
+    from skillframe.demonstration.table import read_table
+
+    return read_table(path)
 
 
 def _writer(module: str, function: str) -> Callable[[Demonstration, Path], None]:
@@ -56,11 +63,11 @@ def reader_types(tool_poses: ToolPoses) -> Iterable[ReaderType]:
     )  # fmt: skip
     yield ReaderType(
         name="csv", summary="CSV with a header, metadata in NAME.meta.toml", suffixes=(".csv",),
-        read=_reader("csv", "read_csv"), write=_writer("csv", "write_csv"),
+        read=_reader("csv", "read_csv"), write=_writer("csv", "write_csv"), table=_text_table,
     )  # fmt: skip
     yield ReaderType(
         name="delimited", summary="delimited text of any layout, with --columns", suffixes=(".dat", ".txt", ".tsv"),
-        read=_reader("delimited", "read_delimited"),
+        read=_reader("delimited", "read_delimited"), table=_text_table,
     )  # fmt: skip
     yield ReaderType(
         name="rosbag", summary="ROS 1 and ROS 2 bags, with --pose-topic and --wrench-topic",

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skillframe.demonstration.bagfile import BAG_FACTS
-from skillframe.errors import InputError
+from skillframe.errors import InputError, SkillframeError
 from skillframe.extend.records import ReaderType
 
 if TYPE_CHECKING:
+    from skillframe.demonstration.proposal.propose import Proposal
     from skillframe.demonstration.record import Demonstration
+    from skillframe.demonstration.table import Table
 
+AUTO = "auto"
+"""Value of `columns` that asks for a proposal."""
 
 PACKED_BAGS = (".db3.zstd", ".mcap.zstd")
 
@@ -27,7 +32,44 @@ def read_demonstration(path: Path | str, **options: Any) -> Demonstration:
         InputError: an ending that no format has, or anything wrong with the file.
     """
     path = Path(path)
+    if options.get("columns") == AUTO:
+        raise InputError(
+            "--columns auto", "proposes columns and reads nothing",
+            f"type skillframe demonstration check {path} --columns auto, and then the line that it prints",
+        )  # fmt: skip
     return _format_of(path, reading=True, named_columns=options.get("columns") is not None).read(path, options)
+
+
+def propose_reading(path: Path | str, **options: Any) -> Proposal:
+    """The settings that read a foreign table, proposed with reasons (`demonstration.proposal`), and whether they do.
+
+    Args:
+        path: the file.
+        **options: settings that are known, as `read_demonstration` takes them; they are kept.
+
+    Raises:
+        InputError: no table, or nothing of a demonstration in it.
+    """
+    from skillframe.demonstration.proposal.propose import propose
+
+    given = {name: value for name, value in options.items() if name != "columns" and value is not None}
+    wrench = given.get("wrench")
+    found = propose(_table(Path(path), given), None if wrench is None else _table(Path(wrench), given), given)
+    if not found.whole:
+        return found
+    settings = {name: value or True for name, value in found.settings.items()}
+    try:
+        read_demonstration(path, **{**settings, **given})
+    except SkillframeError as error:
+        return replace(found, error=str(error))
+    return found
+
+
+def _table(path: Path, options: dict[str, Any]) -> Table:
+    form = _format_of(path, reading=True, named_columns=True)
+    if form.table is None:
+        raise InputError(path, f"is no table but a {form.name}", "leave --columns away")
+    return form.table(path, options)
 
 
 def write_demonstration(demonstration: Demonstration, path: Path | str) -> None:

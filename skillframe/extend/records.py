@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from skillframe.demonstration.record import Demonstration
+    from skillframe.demonstration.table import Table
     from skillframe.frames import Float
     from skillframe.skill import Skill
     from skillframe.world.scene import Scene
@@ -165,6 +166,7 @@ class ReaderType:
         suffixes: file name endings that select it (".csv").
         read: `read(path, options)` gives the demonstration or raises `InputError`.
         write: the inverse, or None.
+        table: `table(path, options)` gives the file as a table, for what `--columns auto` proposes; None: it has none.
     """
 
     name: str
@@ -173,6 +175,7 @@ class ReaderType:
     suffixes: tuple[str, ...]
     read: Callable[[Path, Mapping[str, Any]], Demonstration]
     write: Callable[[Demonstration, Path], None] | None = None
+    table: Callable[[Path, Mapping[str, Any]], Table] | None = None
 
 
 Verdict = Literal["pass", "fail", "reported"]
