@@ -89,6 +89,7 @@ _OPTIONS = [
         "--calibration", type=click.Path(path_type=Path),
         help="File of skillframe calibrate: its bias and weight are taken off.",
     ),
+    click.option("--episode", help="Which of several recordings of a file: demo_0 in HDF5, 3 of a LeRobot data set."),
     click.option("--pose-topic", help="Topic of a ROS bag with the tool's pose, or with --robot its joint states."),
     click.option("--pose-frames", metavar="BASE,TOOL", help="Frames of a ROS bag's transforms (/tf, /tf_static)."),
     click.option("--wrench-topic", help="Topic of a ROS bag with the wrench (WrenchStamped)."),

@@ -1,4 +1,7 @@
-"""The native form: one array per column and a JSON text `meta` with format and version, in an uncompressed npz."""
+"""The native form: one array per column and a JSON text `meta` with format and version, in an uncompressed npz.
+
+An npz file without metadata is foreign: its arrays are named with `--columns`, as those of other tools' files are.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from skillframe.demonstration.arrays import read_as_table, table_of
 from skillframe.demonstration.columns import KNOWN, Columns
 from skillframe.demonstration.csv import demonstration_columns
 from skillframe.demonstration.delimited import read_wrench_file
@@ -35,8 +39,11 @@ def read_npz(path: Path, options: Mapping[str, Any]) -> Demonstration:
         InputError: no npz, of another format or a newer version, or anything of the contract's list of bad input.
     """
     chosen = read_options(options)
-    _refuse_text_settings(path, chosen)
     arrays = read_arrays(path, "npz file", "write it again")
+    if "meta" not in arrays and chosen.columns is not None:
+        left = list[str]()
+        return read_as_table(path, options, table_of(str(path), arrays, left), left)
+    _refuse_text_settings(path, chosen)
     meta = _meta(path, arrays)
     notes = list[str]()
     columns = Columns(_columns(path, arrays, notes), str(path))
@@ -55,7 +62,9 @@ def _meta(path: Path, arrays: dict[str, Any]) -> dict[str, Any]:
     """The metadata, with format and version checked and taken off."""
     if "meta" not in arrays:
         raise InputError(
-            path, "holds no meta", f'store a JSON text meta with "format": "{FORMAT}", "version": {VERSION}'
+            path,
+            "holds no meta",
+            f"name its arrays with --columns (auto proposes them), or store a JSON text meta with format {FORMAT!r}",
         )
     meta = json_member(path, arrays, "meta", "store one JSON text")
     if meta is None:

@@ -52,6 +52,7 @@ class ReadOptions:
         pose_frames: "BASE,TOOL", frames of a ROS bag's transforms: the tool's pose is that of the second in the first.
         wrench_topic: topic of a ROS bag with the wrench.
         robot: the robot whose joint states a ROS bag holds.
+        episode: which of several recordings of a file or data set: a group's name in HDF5, a number in LeRobot's.
     """
 
     columns: str | None = None
@@ -78,6 +79,7 @@ class ReadOptions:
     pose_frames: str | None = None
     wrench_topic: str | None = None
     robot: str | None = None
+    episode: str | None = None
 
     def __post_init__(self) -> None:
         for name in ("rate", "wrench_rate"):

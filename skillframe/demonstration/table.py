@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import codecs
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,6 +101,11 @@ def read_table(path: Path, header: bool | None = None) -> Table:
         )
     _refuse_ragged(path, names, lines, delimiter)
     return _table(str(path), names, [line for _, line in lines], delimiter, np.array([i for i, _ in lines]))
+
+
+def table_of_text(path: Path, options: Mapping[str, Any]) -> Table:
+    """A delimited file as a table, for what is proposed of it. Takes what readers take."""
+    return read_table(path)
 
 
 def _delimiter(first: str, row: str) -> str | None:

@@ -29,10 +29,12 @@ def _reader(module: str, function: str) -> Callable[[Path, Mapping[str, Any]], D
     return read
 
 
-def _text_table(path: Path, options: Mapping[str, Any]) -> Table:
-    from skillframe.demonstration.table import read_table
+def _table(module: str, function: str) -> Callable[[Path, Mapping[str, Any]], Table]:
+    def table(path: Path, options: Mapping[str, Any]) -> Table:
+        result: Table = getattr(import_module(f"skillframe.demonstration.{module}"), function)(path, options)
+        return result
 
-    return read_table(path)
+    return table
 
 
 def _writer(module: str, function: str) -> Callable[[Demonstration, Path], None]:
@@ -52,22 +54,35 @@ def _bag_reader(tool_poses: ToolPoses) -> Callable[[Path, Mapping[str, Any]], De
 
 
 def reader_types(tool_poses: ToolPoses) -> Iterable[ReaderType]:
-    """The core's formats: native npz, CSV, delimited text, ROS bags.
+    """The core's formats: native npz, CSV, delimited text, files of arrays, HDF5, parquet, ROS bags.
 
     Args:
         tool_poses: forward kinematics for recorded joint states.
     """
     yield ReaderType(
         name="npz", summary="native form: named arrays and JSON metadata", suffixes=(".npz",),
-        read=_reader("npz", "read_npz"), write=_writer("npz", "write_npz"),
+        read=_reader("npz", "read_npz"), write=_writer("npz", "write_npz"), table=_table("foreign", "npz_table"),
     )  # fmt: skip
     yield ReaderType(
         name="csv", summary="CSV with a header, metadata in NAME.meta.toml", suffixes=(".csv",),
-        read=_reader("csv", "read_csv"), write=_writer("csv", "write_csv"), table=_text_table,
+        read=_reader("csv", "read_csv"), write=_writer("csv", "write_csv"), table=_table("table", "table_of_text"),
     )  # fmt: skip
     yield ReaderType(
         name="delimited", summary="delimited text of any layout, with --columns", suffixes=(".dat", ".txt", ".tsv"),
-        read=_reader("delimited", "read_delimited"), table=_text_table,
+        read=_reader("delimited", "read_delimited"), table=_table("table", "table_of_text"),
+    )  # fmt: skip
+    yield ReaderType(
+        name="arrays", summary="NumPy, MATLAB and JSON files of any layout, with --columns",
+        suffixes=(".npy", ".mat", ".json", ".jsonl"), read=_reader("foreign", "read_foreign"),
+        table=_table("foreign", "foreign_table"),
+    )  # fmt: skip
+    yield ReaderType(
+        name="hdf5", summary="HDF5: robomimic, robosuite, REASSEMBLE and others, with --columns",
+        suffixes=(".h5", ".hdf5"), read=_reader("hdf5", "read_hdf5"), table=_table("hdf5", "hdf5_table"),
+    )  # fmt: skip
+    yield ReaderType(
+        name="parquet", summary="parquet files and folders of LeRobot data sets, with --columns and --episode",
+        suffixes=(".parquet",), read=_reader("parquet", "read_parquet"), table=_table("parquet", "parquet_table"),
     )  # fmt: skip
     yield ReaderType(
         name="rosbag", summary="ROS 1 and ROS 2 bags, with --pose-topic and --wrench-topic",

@@ -100,6 +100,8 @@ def _format_of(path: Path, *, reading: bool, named_columns: bool = False) -> Rea
     records: list[ReaderType] = [r for r in registry().records("reader") if reading or r.write is not None]
     if reading and (path / BAG_FACTS).is_file():
         return registry().reader("rosbag")
+    if reading and (path / "meta" / "info.json").is_file():
+        return registry().reader("parquet")
     if reading and path.name.lower().endswith(PACKED_BAGS):
         raise InputError(path, "is a packed part of a ROS bag", f"give the bag's folder, {path.parent}")
     matches = [(len(s), r) for r in records for s in r.suffixes if path.name.lower().endswith(s)]

@@ -145,7 +145,7 @@ def _whole_pose(group: Group) -> dict[str, int]:
     if len(order) == 16 and not (group.says({"f", "ne", "k"}) and not group.says({"o"})):
         by_columns = {f"r{i + 1}{j + 1}": order[4 * j + i] for i in range(3) for j in range(3)}
         return {**by_columns, **dict(zip(POSITION, order[12:15], strict=True))}
-    if not group.says(POSES):
+    if not group.says(POSES) or group.says(WRENCHES | FORCES | TORQUES):
         return {}
     if len(order) == 7:
         return dict(zip((*POSITION, *QUATERNION), order, strict=True))
