@@ -85,6 +85,14 @@ def sweep(folder: Path) -> None:
         remove_temporary(place)
 
 
+def sweep_prepared(place: Path) -> None:
+    """Remove what killed sessions left of campaigns that were being prepared in a folder. Only where nobody writes."""
+    remove_temporary(place)
+    for path in place.glob(".*"):
+        if re.fullmatch(r"\..+\.[0-9a-f]{16}", path.name) and path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+
+
 def load(folder: Path, params: type | None = None) -> CampaignSpec:
     """The campaign of a prepared folder.
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 import typing
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 from skillframe.campaign.axes import Axis, Value
@@ -23,8 +24,9 @@ from skillframe.world.quantities import QUANTITIES, UNITS
 GROUPS = ("start", "fixture", "grasp", "world", "robot", "actuator", "sensor", "fault")
 
 
-def world_hints(params: type) -> dict[str, Any]:
-    """`world.KEY` to annotation, from a world's parameter dataclass."""
+@cache
+def world_hints(params: type) -> Mapping[str, Any]:
+    """`world.KEY` to annotation, from a world's parameter dataclass. Found once, as each value of a list asks."""
     hints = typing.get_type_hints(params)
     return {f"world.{f.name}": hints[f.name] for f in dataclasses.fields(params) if f.init}
 

@@ -15,12 +15,14 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from skillframe.campaign.driver import CampaignError, Driver, Evaluate, InProcess, Pool, chunk_size
 from skillframe.campaign.folder import CAMPAIGN, COPIES, campaign_hash, load, sweep
 from skillframe.campaign.identity import identity, needed_plugins
+from skillframe.campaign.kept import Keeper, Note, Tell
 from skillframe.campaign.lock import FolderLock
 from skillframe.campaign.provenance import environment, file_hash, file_hashes
 from skillframe.campaign.remarks import remarks
@@ -75,6 +77,7 @@ class Options:
         chunk: largest number of trials per job.
         time_limit_s: wall time that a job may take without simulated time going on; a slow one may take for ever.
         memory_bytes: limit per local worker; None shares the machine's.
+        keeper: of workers that outlast the campaign; None starts its own and ends them.
         traces: how many trials per skill leave a trace: the first `SAMPLE`, the success whose duration is nearest to
             the median of all successes, then the first failures.
     """
@@ -84,6 +87,7 @@ class Options:
     chunk: int = CHUNK
     time_limit_s: float = STILL_S
     memory_bytes: int | None = None
+    keeper: Keeper | None = None
     traces: int = TRACES
 
 
@@ -176,13 +180,20 @@ class _Session:
     def _pool(self, evaluate: Evaluate) -> Pool[ChunkJob]:
         if self.options.workers is None and self.options.scheduler is None:
             return InProcess(evaluate, self._tell_share)
+        keeper = self.options.keeper
+        if keeper is not None:
+            make = partial(self._workers, evaluate, keeper.watch)
+            return keeper.lend(make, self._tell_share, self._tell)
+        return self._workers(evaluate, self.spec.folder.resolve() / WATCH, self._tell_share, self._tell)
+
+    def _workers(self, evaluate: Evaluate, watch: Path, tell: Tell, note: Note) -> Pool[ChunkJob]:
         from skillframe.campaign.cluster import ClusterPool
 
         ours = identity(plugins=self.options.scheduler is not None)
         return ClusterPool(
             evaluate, self.options.time_limit_s, workers=self.options.workers or 1, scheduler=self.options.scheduler,
-            memory_bytes=self.options.memory_bytes, watch=self.spec.folder.resolve() / WATCH, tell=self._tell_share,
-            ours=ours, needed=needed_plugins(self.spec, ours), note=self._tell,
+            memory_bytes=self.options.memory_bytes, watch=watch, tell=tell, ours=ours,
+            needed=needed_plugins(self.spec, ours), note=note,
         )  # fmt: skip
 
     def _driver(self, pool: Pool[ChunkJob], keep: Callable[[list[Row]], None], traces: bool = False) -> Driver:

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from skillframe.cli.certify import certify, check
+from skillframe.cli.claims import certify, check
 from skillframe.cli.endings import TRACE
 from skillframe.cli.interrupts import terminable
 from skillframe.cli.numbers import COUNT, NATURAL, WithUnit
 from skillframe.cli.output import note, quiet_option
+from skillframe.cli.searches import break_, map_, matter
 from skillframe.config.ranges import Range
 
 if TYPE_CHECKING:
@@ -163,6 +164,8 @@ def replay(folder: Path, trial: int, skill: str | None, out: Path | None) -> int
 
 command.add_command(certify)
 command.add_command(check)
+for each in (map_, break_, matter):
+    command.add_command(each)
 
 
 def _options(settings: dict[str, Any]) -> Options:

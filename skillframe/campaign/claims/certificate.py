@@ -15,8 +15,11 @@ import numpy as np
 
 from skillframe import __version__
 from skillframe.campaign.claims.claim import Tested, certified, judge
-from skillframe.campaign.claims.procedure import CLAIM, FRESH, box_of, claims, looked, read_claim, rows_of_campaign
+from skillframe.campaign.claims.engine import rows_of_campaign
+from skillframe.campaign.claims.procedure import CLAIM, FRESH, box_of, claims, read_claim
 from skillframe.campaign.claims.question import LOOK, QUESTION, Question, read_question
+from skillframe.campaign.claims.rounds import BORDER, looked, rounds_done
+from skillframe.campaign.claims.searches import BREAK, FOUND, found_in
 from skillframe.campaign.folder import load
 from skillframe.campaign.provenance import file_hash
 from skillframe.campaign.rows import Row
@@ -26,6 +29,8 @@ from skillframe.files import write_whole
 from skillframe.files.documents import read_json
 
 CERTIFICATE = "certificate.json"
+TOLD = (BORDER, BREAK)
+"""Searches that a certificate tells of, where they have ended."""
 TYPE, PREDICATE = "https://in-toto.io/Statement/v1", "skillframe.certificate/v1"
 MEANS = (
     "a mean over the box, taken evenly, not a promise at each of its points",
@@ -81,30 +86,40 @@ def _check_fresh(place: Path, claim: dict[str, Any], params: type | None) -> Non
 
 
 def write_certificate(folder: Path, found: Outcome | None, params: type | None = None) -> dict[str, Any]:
-    """Write certificate.json. Takes the arguments of `statement` and returns what it does."""
-    content = statement(folder, found, params)
+    """Write certificate.json, with what the folder's searches have come to. Returns its content."""
+    rounds = rounds_done(folder, params) if found is None else int(found.claim["border_rounds"])
+    told = tuple(stream for stream in TOLD if found_in(folder, stream) is not None)
+    content = statement(folder, found, params, rounds, told)
     text = json.dumps(content, indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False) + "\n"
     write_whole(folder / CERTIFICATE, text.encode())
     return content
 
 
-def statement(folder: Path, found: Outcome | None, params: type | None = None) -> dict[str, Any]:
+def statement(
+    folder: Path, found: Outcome | None, params: type | None = None, rounds: int = 0, told: tuple[str, ...] = ()
+) -> dict[str, Any]:
     """The content of certificate.json.
 
     Args:
         folder: of the question.
         found: what the last claim came to; None if no box was worth claiming.
         params: the world's parameter dataclass; None looks it up.
+        rounds: of the border that the proposal looked at.
+        told: searches whose outcome belongs to the certificate.
     """
-    question, seen = read_question(folder), looked(folder, params)
+    question, seen = read_question(folder), looked(folder, params, rounds)
     spec = load(folder / LOOK, params)
     subject = [*sorted((folder / LOOK / "skills").iterdir()), folder / QUESTION]
     predicate: dict[str, Any] = {
         "certified": found is not None and found.best is not None, "skill": spec.labels[0], "robot": spec.robot_name,
         "world": spec.world, "rate": question.rate, "declared": {k: list(v) for k, v in question.ranges.items()},
-        "looked_at": {"trials": len(seen.works), "successes": int(seen.works.sum())}, "means": list(MEANS),
+        "looked_at": {"trials": len(seen.works), "successes": int(seen.works.sum()), "border_rounds": rounds},
+        "means": list(MEANS),
         "skillframe": __version__, "fixed": dict(sorted(spec.fixed.items())),
     }  # fmt: skip
+    for stream in told:
+        subject.append(folder / FOUND[stream])
+        predicate[stream] = found_in(folder, stream)
     if found is not None:
         subject += [found.place / CLAIM, found.place / FRESH / RESULTS]
         predicate |= _tested(question, found, rows_of_campaign(found.place / FRESH, params))
@@ -155,7 +170,9 @@ def check_certificate(folder: Path, params: type | None = None) -> list[str]:
     if wrong:
         return wrong
     again = outcome(folder, params) if content["predicate"].get("tested") else None
-    now = json.loads(json.dumps(statement(folder, again, params)["predicate"]))
+    named = tuple(stream for stream in TOLD if stream in content["predicate"])
+    rounds = int(content["predicate"]["looked_at"]["border_rounds"])
+    now = json.loads(json.dumps(statement(folder, again, params, rounds, named)["predicate"]))
     told = {key: value for key, value in content["predicate"].items() if key != "skillframe"}
     same = told == {key: value for key, value in now.items() if key != "skillframe"}
     return [] if same else ["the figures do not follow from the trials"]

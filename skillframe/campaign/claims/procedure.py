@@ -13,71 +13,40 @@ as an undisturbed one.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skillframe.campaign.axes import Axis
+from skillframe.campaign.claims.border import cloud
 from skillframe.campaign.claims.box import Box, peel
 from skillframe.campaign.claims.claim import family, fresh_trials
-from skillframe.campaign.claims.question import LOOK, Question, read_question
+from skillframe.campaign.claims.engine import Engine, Looked, Notify
+from skillframe.campaign.claims.question import LOOK, Question
+from skillframe.campaign.claims.rounds import is_complete, rounds_done, scene_of
 from skillframe.campaign.claims.surrogate import Surrogate
-from skillframe.campaign.folder import COPIES, Describe, campaign_hash, load, prepare
+from skillframe.campaign.folder import COPIES, campaign_hash, load, prepare, sweep_prepared
 from skillframe.campaign.provenance import file_hashes
-from skillframe.campaign.rows import Row
-from skillframe.campaign.runner import Options, Progress, run_campaign
-from skillframe.campaign.store import ordered, read_content
-from skillframe.campaign.trouble import Evaluate
+from skillframe.campaign.runner import run_campaign
 from skillframe.errors import InputError
 from skillframe.files import write_whole
 from skillframe.files.documents import read_json
-from skillframe.frames import Float
 
 CLAIM, FRESH = "claim.json", "fresh"
-CLOUD = 8192
+MOST_CLAIMS = 4
+"""Of a folder (ours): together they are falsely certified with at most 1.875 times the level."""
 SLACK = 4.0
 """A proposed box may hold predicted failures of a SLACK-th of what the rate allows (ours)."""
 
 
-class Engine(NamedTuple):
-    """How trials run.
-
-    Attributes:
-        evaluate: a chunk of them.
-        describe: a scene, as `campaign.folder.prepare` asks.
-        params: the world's parameter dataclass.
-        options: workers and the like.
-    """
-
-    evaluate: Evaluate
-    describe: Describe
-    params: type
-    options: Options
-
-
-class Looked(NamedTuple):
-    """Trials that were looked at: scaled points (n, d), and whether each succeeded (n,)."""
-
-    points: Float
-    works: NDArray[np.bool_]
-
-
-Notify = Callable[[Progress], None]
-
-
 def look(folder: Path, engine: Engine, notify: Notify | None = None) -> None:
     """Run what is missing of the trials to look at."""
-    run_campaign(folder / LOOK, engine.evaluate, engine.options, notify, engine.params)
-
-
-def looked(folder: Path, params: type | None = None) -> Looked:
-    """The trials that were looked at."""
-    rows = rows_of_campaign(folder / LOOK, params)
-    return Looked(read_question(folder).scaled(rows), np.array([row["success"] for row in rows], dtype=bool))
+    if not is_complete(folder / LOOK, engine.params):
+        run_campaign(folder / LOOK, engine.evaluate, engine.options, notify, engine.params)
 
 
 def propose(question: Question, seen: Looked) -> Box | None:
@@ -87,12 +56,9 @@ def propose(question: Question, seen: Looked) -> Box | None:
     if seen.works.all():
         ones = np.ones(len(question.ranges))
         return Box(-ones, ones)
-    from scipy.stats import qmc
-
-    dimension = len(question.ranges)
-    cloud = 2.0 * qmc.Sobol(dimension, scramble=True, rng=np.random.default_rng(0)).random(CLOUD) - 1.0
-    predicted = Surrogate(seen.points, seen.works).mean(cloud) > 0.0
-    return peel(cloud, predicted, (1.0 - question.rate) / SLACK)
+    even = cloud(len(question.ranges))
+    predicted = Surrogate(seen.points, seen.works).mean(even) > 0.0
+    return peel(even, predicted, (1.0 - question.rate) / SLACK)
 
 
 def claims(folder: Path) -> list[Path]:
@@ -103,15 +69,22 @@ def claims(folder: Path) -> list[Path]:
 def write_claim(folder: Path, question: Question, box: Box, params: type) -> Path:
     """Write the next claim down, before its first trial. Returns its folder."""
     number = len(claims(folder)) + 1
+    if number > MOST_CLAIMS:
+        raise InputError(
+            folder, f"has spent its level on {MOST_CLAIMS} claims", "ask again in a new folder, with another seed"
+        )
     alpha = question.alpha / 2.0 ** (number - 1)
     boxes = [_in_si(question, each) for each in family(box)]
     spec = load(folder / LOOK, params)
     place = folder / f"claim{number}"
+    if (place / FRESH).exists():
+        raise InputError(place, "holds trials that are older than their claim", "test it in another folder")
     content = {
         "format": "skillframe.claim", "version": 1, "number": number, "rate": question.rate, "alpha": alpha,
         "alpha_spent": question.alpha * (2.0 - 2.0 ** (1 - number)), "trials": fresh_trials(question.rate, alpha),
         "seed": spec.seed + number, "skill": spec.labels[0], "robot": spec.robot_name, "world": spec.world,
         "files": file_hashes(folder / LOOK, COPIES), "looked_at": campaign_hash(spec), "boxes": boxes,
+        "border_rounds": rounds_done(folder, params),
         "distribution": "even over the box, independent; other axes as declared",
         "other_axes": {name: axis.plain() for name, axis in spec.vary.items() if name not in question.ranges},
     }  # fmt: skip
@@ -129,27 +102,16 @@ def read_claim(place: Path) -> dict[str, Any]:
 def run_fresh(folder: Path, place: Path, engine: Engine, notify: Notify | None = None) -> None:
     """Run what is missing of a claim's fresh trials."""
     target = place / FRESH
+    for written in (folder, place):
+        sweep_prepared(written)
     if not target.exists():
         claim = read_claim(place)
         spec = load(folder / LOOK, engine.params)
         largest = claim["boxes"][-1]
         axes = {name: Axis(kind="uniform", numbers=(float(a), float(b))) for name, (a, b) in largest.items()}
         fresh = replace(spec, vary={**spec.vary, **axes}, trials=int(claim["trials"]), seed=int(claim["seed"]))
-        prepare(fresh, target, engine.describe, engine.params)
+        prepare(fresh, target, partial(scene_of, folder), engine.params)
     run_campaign(target, engine.evaluate, engine.options, notify, engine.params)
-
-
-def rows_of_campaign(folder: Path, params: type | None = None) -> list[Row]:
-    """All rows of a complete campaign in the order of its trials.
-
-    Raises:
-        InputError: rows are missing, damaged or another campaign's.
-    """
-    spec = load(folder, params)
-    rows = ordered(spec, read_content(folder, campaign_hash(spec), spec).done.values(), None)
-    if len(rows) != spec.trials:
-        raise InputError(folder, f"has {len(rows)} of {spec.trials} trials", "go on with skillframe campaign certify")
-    return rows
 
 
 def box_of(content: Mapping[str, Any], names: list[str]) -> Box:

@@ -23,6 +23,8 @@ QUESTION, LOOK = "question.json", "look"
 FORMAT, VERSION = "skillframe.question", 1
 LOOKS = {1: 64, 2: 128, 3: 256, 4: 512}
 """Trials that are looked at, by the number of ranges: our choice, from the volumes that they certify in simulations."""
+USUAL = 0.95
+"""Rate and confidence where none is asked for."""
 NORMAL = 2.0
 """Standard deviations to either side that a normal axis is looked at."""
 FIX = "start again with skillframe campaign certify FILE.toml --out FOLDER"
@@ -82,9 +84,7 @@ def begin(
         InputError: axes that are no ranges, too many ranges, or a folder that holds something.
         UnknownName: no such skill.
     """
-    for name, value in (("--rate", rate), ("--confidence", confidence)):
-        if not 0.5 <= value < 1.0:
-            raise InputError(name, f"is {value:g}", "give a number from 0.5 up to, and not, 1")
+    _check(rate, confidence)
     ranges = _ranges(spec)
     label = pick_label(spec.labels, skill)
     question = Question(rate=rate, confidence=confidence, ranges=ranges)
@@ -95,9 +95,29 @@ def begin(
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise InputError(out, "exists and is not an empty folder", "choose another --out")
     prepare(one, out / LOOK, describe, params)
-    content = {"format": FORMAT, "version": VERSION, **asdict(question)}
-    write_whole(out / QUESTION, (json.dumps(content, indent=2, sort_keys=True) + "\n").encode())
+    _write(out, question)
     return question
+
+
+def ask_again(folder: Path, rate: float, confidence: float) -> None:
+    """Ask a folder for another rate or confidence. Its trials stay.
+
+    Raises:
+        InputError: a rate or a confidence that cannot be.
+    """
+    _check(rate, confidence)
+    _write(folder, replace(read_question(folder), rate=rate, confidence=confidence))
+
+
+def _write(folder: Path, question: Question) -> None:
+    content = {"format": FORMAT, "version": VERSION, **asdict(question)}
+    write_whole(folder / QUESTION, (json.dumps(content, indent=2, sort_keys=True) + "\n").encode())
+
+
+def _check(rate: float, confidence: float) -> None:
+    for name, value in (("--rate", rate), ("--confidence", confidence)):
+        if not 0.5 <= value < 1.0:
+            raise InputError(name, f"is {value:g}", "give a number from 0.5 up to, and not, 1")
 
 
 def _ranges(spec: CampaignSpec) -> dict[str, tuple[float, float]]:

@@ -24,6 +24,8 @@ NOISES = (1e-3, 1e-2, 0.1, 0.5)
 MOST_ROWS = 320
 """Rows by which lengths and noise are chosen; more hardly change them, and cost their third power."""
 ROUNDS = 3
+CONFIDENCE, DECIMALS = 1.96, 6
+"""Deviations to either side in which the border may lie, and the digits of a score that count."""
 
 
 class Surrogate:
@@ -43,12 +45,48 @@ class Surrogate:
         self.lengths, self.noise = _chosen(points[:MOST_ROWS], labels[:MOST_ROWS])
         self._points = points
         gram = covariance(points, points, self.lengths) + self.noise * np.eye(len(points))
-        self._weights = cho_solve(cho_factor(gram, lower=True), labels)
+        self._factor = cho_factor(gram, lower=True)
+        self._weights = cho_solve(self._factor, labels)
 
     def mean(self, points: Float) -> Float:
         """(m,) means at (m, d) points: towards 1 where it works, towards -1 where it does not."""
         result: Float = covariance(points, self._points, self.lengths) @ self._weights
         return result
+
+    def deviation(self, points: Float) -> Float:
+        """(m,) standard deviations of the guess at (m, d) points, the labels' noise left out."""
+        result: Float = np.sqrt(np.maximum(1.0 - np.sum(self._whitened(points) ** 2, axis=0), 0.0))
+        return result
+
+    def _whitened(self, points: Float) -> Float:
+        """(n, m): the covariance of trials and points, whitened by that of the trials."""
+        cross = covariance(self._points, points, self.lengths)
+        result: Float = solve_triangular(self._factor[0], cross, lower=True, check_finite=False)
+        return result
+
+    def straddle(self, candidates: Float, count: int) -> NDArray[np.intp]:
+        """Which of (m, d) candidates to try next to learn where the border lies, (count,) indices.
+
+        The straddle score 1.96 s - |mean| (Bryan et al. 2005, "Active learning for identifying function threshold
+        boundaries") is taken greedily: a picked point shrinks the deviations s of the others and leaves the mean.
+        Scores are rounded and ties go to the smaller index, so that last bits of other processors pick the same.
+        """
+        half, mean = self._whitened(candidates), np.abs(self.mean(candidates))
+        variance = 1.0 - np.sum(half**2, axis=0)
+        picked: list[int] = []
+        known: list[Float] = []
+        for _ in range(count):
+            score = np.round(CONFIDENCE * np.sqrt(np.maximum(variance, 0.0)) - mean, DECIMALS)
+            score[picked] = -np.inf
+            best = int(np.argmax(score))
+            column = covariance(candidates, candidates[best : best + 1], self.lengths)[:, 0] - half.T @ half[:, best]
+            for before in known:
+                column = column - before * before[best]
+            column = column / np.sqrt(max(variance[best], 0.0) + self.noise)
+            variance = variance - column**2
+            known.append(column)
+            picked.append(best)
+        return np.array(picked, dtype=np.intp)
 
 
 def covariance(first: Float, second: Float, lengths: Float) -> Float:

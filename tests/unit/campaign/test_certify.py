@@ -12,7 +12,9 @@ from skillframe.campaign.claims import procedure
 from skillframe.campaign.claims.box import Box, peel
 from skillframe.campaign.claims.certificate import check_certificate, outcome, write_certificate
 from skillframe.campaign.claims.claim import certified, family, fresh_trials, judge, most_failures, passes
+from skillframe.campaign.claims.engine import Engine
 from skillframe.campaign.claims.question import begin, read_question
+from skillframe.campaign.claims.rounds import looked
 from skillframe.campaign.claims.surrogate import Surrogate, covariance
 from skillframe.campaign.folder import load
 from skillframe.campaign.rows import ChunkJob, rows_of
@@ -148,7 +150,7 @@ def failed(row):
     return row | {"success": False, "failure": "stuck"}
 
 
-ENGINE = procedure.Engine(inside, lambda spec: {"fixture": []}, ValleyParams, Options(traces=0))
+ENGINE = Engine(inside, lambda spec: {"fixture": []}, ValleyParams, Options(traces=0))
 
 
 def asked(tmp_path, **changed):
@@ -163,7 +165,7 @@ def through(out: Path, engine=ENGINE):
     if not procedure.claims(out):
         procedure.look(out, engine)
         question = read_question(out)
-        box = procedure.propose(question, procedure.looked(out, ValleyParams))
+        box = procedure.propose(question, looked(out, ValleyParams))
         if box is None:
             return write_certificate(out, None, ValleyParams)
         procedure.write_claim(out, question, box, ValleyParams)
@@ -245,7 +247,7 @@ def test_a_claim_that_fails_is_not_certified_and_the_next_one_costs(tmp_path):
     said = through(out, engine)["predicate"]
     assert not said["certified"]
     assert [each["passed"] for each in said["tested"]] == [False]
-    box = procedure.propose(read_question(out), procedure.looked(out, ValleyParams))
+    box = procedure.propose(read_question(out), looked(out, ValleyParams))
     again = procedure.read_claim(procedure.write_claim(out, read_question(out), box, ValleyParams))
     assert (again["number"], again["alpha"]) == (2, pytest.approx(0.025))
     assert again["alpha_spent"] == pytest.approx(0.075)
@@ -257,7 +259,7 @@ def test_nothing_to_certify_is_said(tmp_path):
     never = ENGINE._replace(evaluate=lambda job: [failed(row) for row in inside(job)])
     said = through(asked(tmp_path), never)["predicate"]
     assert not said["certified"]
-    assert said["looked_at"] == {"trials": 128, "successes": 0}
+    assert said["looked_at"] == {"trials": 128, "successes": 0, "border_rounds": 0}
     assert check_certificate(tmp_path / "out", ValleyParams) == []
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +15,7 @@ from skillframe.cli.output import emit_json, note, quiet_option
 
 if TYPE_CHECKING:
     from skillframe.campaign.claims.certificate import Outcome
-    from skillframe.campaign.claims.procedure import Engine
+    from skillframe.campaign.claims.engine import Engine
 
 _PATH = click.Path(path_type=Path)
 
@@ -21,8 +23,8 @@ _PATH = click.Path(path_type=Path)
 @click.command()
 @click.argument("source", type=_PATH)
 @click.option("--out", type=_PATH, help="Folder for everything; absent or empty. Not given to go on with a folder.")
-@click.option("--rate", default=0.95, show_default=True, help="Success probability to certify, at least.")
-@click.option("--confidence", default=0.95, show_default=True, help="With which the certificate is to hold.")
+@click.option("--rate", type=float, help="Success probability to certify, at least [0.95].")
+@click.option("--confidence", type=float, help="With which the certificate is to hold [0.95].")
 @click.option("--skill", help="Skill as in the campaign file, or its beginning [the first].")
 @click.option("--look", type=COUNT, help="Trials to look at first [64 to 512, by the number of ranges].")
 @click.option("--again", is_flag=True, help="Claim once more, with fresh trials, after a claim that failed.")
@@ -30,8 +32,8 @@ _PATH = click.Path(path_type=Path)
 @click.option("--json", "as_json", is_flag=True, help="The certificate as JSON alone on stdout.")
 @quiet_option
 def certify(
-    source: Path, out: Path | None, rate: float, confidence: float, skill: str | None, look: int | None, again: bool,
-    workers: int | None, as_json: bool,
+    source: Path, out: Path | None, rate: float | None, confidence: float | None, skill: str | None, look: int | None,
+    again: bool, workers: int | None, as_json: bool,
 ) -> int:  # fmt: skip
     """Certify the box of declared quantities in which a skill works. SOURCE is a campaign.toml.
 
@@ -53,9 +55,11 @@ def certify(
     with terminable() as code:
         try:
             if out is not None:
-                _begin(source, out, rate, confidence, skill, look)
-            engine = _engine(folder, workers)
-            found = _judged(folder, engine, again)
+                start(source, out, rate, confidence, skill, look)
+            else:
+                _ask(folder, rate, confidence)
+            with engine_of(folder, workers) as engine:
+                found = _judged(folder, engine, again)
         except KeyboardInterrupt:
             go_on = f"to go on: skillframe campaign certify {folder}"
             click.echo(f"interrupted; what is done is kept, {go_on}", err=True)
@@ -69,30 +73,55 @@ def certify(
     return 0 if content["predicate"]["certified"] else 1
 
 
-def _begin(source: Path, out: Path, rate: float, confidence: float, skill: str | None, look: int | None) -> None:
+def start(
+    source: Path, out: Path, rate: float | None = None, confidence: float | None = None, skill: str | None = None,
+    look: int | None = None,
+) -> None:  # fmt: skip
+    """Begin a folder from a campaign file."""
     from skillframe.campaign import evaluate
-    from skillframe.campaign.claims.question import begin
+    from skillframe.campaign.claims.question import USUAL, begin
     from skillframe.campaign.spec import CampaignSpec
     from skillframe.extend.registry import registry
 
     spec = CampaignSpec.from_toml(source)
     begin(
-        spec, out, evaluate.describe, registry().world(spec.world).params, rate=rate, confidence=confidence,
-        skill=skill, look=look,
+        spec, out, evaluate.describe, registry().world(spec.world_place).params, rate=rate or USUAL,
+        confidence=confidence or USUAL, skill=skill, look=look,
     )  # fmt: skip
 
 
-def _engine(folder: Path, workers: int | None) -> Engine:
+def _ask(folder: Path, rate: float | None, confidence: float | None) -> None:
+    """Another rate than the folder was begun with, as long as nothing is claimed."""
+    from skillframe.campaign.claims import procedure
+    from skillframe.campaign.claims.question import ask_again, read_question
+    from skillframe.errors import InputError
+
+    asked = read_question(folder)
+    if (rate or asked.rate, confidence or asked.confidence) == (asked.rate, asked.confidence):
+        return
+    if procedure.claims(folder):
+        raise InputError(folder, f"has claimed a rate of {asked.rate:g} with confidence {asked.confidence:g} already",
+                         "leave out --rate and --confidence, or claim another in a new folder")  # fmt: skip
+    ask_again(folder, rate or asked.rate, confidence or asked.confidence)
+
+
+@contextmanager
+def engine_of(folder: Path, workers: int | None) -> Iterator[Engine]:
+    """How a folder's trials run. Workers that were started end with it."""
     from skillframe.campaign import evaluate
-    from skillframe.campaign.claims.procedure import Engine
+    from skillframe.campaign.claims.engine import Engine
     from skillframe.campaign.claims.question import LOOK, read_question
     from skillframe.campaign.folder import load
-    from skillframe.campaign.runner import Options
+    from skillframe.campaign.kept import Keeper
+    from skillframe.campaign.lock import FolderLock
+    from skillframe.campaign.runner import WATCH, Options
     from skillframe.extend.registry import registry
 
     read_question(folder)
-    params = registry().world(load(folder / LOOK).world).params
-    return Engine(evaluate.evaluate, evaluate.describe, params, Options(workers=workers, traces=2))
+    params = registry().world(load(folder / LOOK).world_place).params
+    with FolderLock(folder), Keeper(folder.resolve() / WATCH) as keeper:
+        options = Options(workers=workers, traces=2, keeper=keeper)
+        yield Engine(evaluate.evaluate, evaluate.describe, params, options)
 
 
 def _judged(folder: Path, engine: Engine, again: bool) -> Outcome | None:
@@ -100,6 +129,7 @@ def _judged(folder: Path, engine: Engine, again: bool) -> Outcome | None:
     from skillframe.campaign.claims import procedure
     from skillframe.campaign.claims.certificate import outcome
     from skillframe.campaign.claims.question import read_question
+    from skillframe.campaign.claims.rounds import looked
     from skillframe.cli.campaign_words import progress
     from skillframe.errors import InputError
 
@@ -112,7 +142,7 @@ def _judged(folder: Path, engine: Engine, again: bool) -> Outcome | None:
         if again and (not places or outcome(folder, engine.params).best is not None):
             raise InputError("--again", "no claim of this folder has failed", "leave it out")
         question = read_question(folder)
-        box = procedure.propose(question, procedure.looked(folder, engine.params))
+        box = procedure.propose(question, looked(folder, engine.params))
         if box is None:
             return None
         places = [*places, procedure.write_claim(folder, question, box, engine.params)]
@@ -140,8 +170,8 @@ def _show(found: Outcome | None, said: dict[str, Any]) -> None:
     else:
         click.echo(f"not certified: {where} at {100 * said['rate']:g} % in the smallest box, where")
     for name, (low, high) in box.items():
-        declared = said["declared"][name]
-        click.echo(f"               {name} is {_shown(name, low)} to {_shown(name, high)}{_edge(low, high, declared)}")
+        ends = f"{said_value(name, low)} to {said_value(name, high)}"
+        click.echo(f"               {name} is {ends}{_edge(low, high, said['declared'][name])}")
     if said["certified"]:
         click.echo(f"             {100 * said['share_of_declared']:.3g} % of the declared volume")
     if said["failed_trials"]:
@@ -149,7 +179,7 @@ def _show(found: Outcome | None, said: dict[str, Any]) -> None:
         click.echo(f"failed       trials {some}; to see one: skillframe campaign replay {found.place}/fresh TRIAL")
 
 
-def _shown(name: str, value: float) -> str:
+def said_value(name: str, value: float) -> str:
     """A value of a quantity as it could be typed, to four digits."""
     import re
 
@@ -180,10 +210,19 @@ def check(folder: Path, replays: int) -> int:
     """
     from skillframe.campaign import evaluate
     from skillframe.campaign.claims import procedure
-    from skillframe.campaign.claims.certificate import check_certificate
+    from skillframe.campaign.claims.certificate import CERTIFICATE, check_certificate
+    from skillframe.campaign.claims.plan import PLAN
+    from skillframe.campaign.claims.searches import check_plan
     from skillframe.campaign.replay import replay_trial
 
-    wrong = check_certificate(folder)
+    planned = (folder / PLAN).is_file()
+    wrong = check_plan(folder) if planned else []
+    if planned and not (folder / CERTIFICATE).is_file():
+        for text in wrong:
+            click.echo(f"does not fit: {text}", err=True)
+        click.echo("the plan does not hold" if wrong else "the plan follows from the trials; there is no certificate")
+        return 1 if wrong else 0
+    wrong += check_certificate(folder)
     for text in wrong:
         click.echo(f"does not fit: {text}", err=True)
     places = procedure.claims(folder)

@@ -1,0 +1,138 @@
+r"""Where the border of success lies, from trials that are picked near it.
+
+After the first trials, each round fits the surrogate, takes three quarters of its points where the straddle score is
+largest and a quarter from the Sobol sequence, which goes on where the first trials ended and finds what the surrogate
+does not expect. It ends once the predicted labels over a fixed cloud of points changed by less than `CLOSE` of the
+predicted set in two rounds running, or at the budget. Batches grow and stay below an eighth of the budget: a large
+batch picks its last points from a guess that its first ones would have changed.
+
+Rows that were picked so are no sample: no rate, interval or test may be made of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator
+from typing import NamedTuple
+
+import numpy as np
+
+from skillframe.campaign.claims.engine import Looked, Say
+from skillframe.campaign.claims.surrogate import Surrogate
+from skillframe.frames import Float
+
+BUDGET = {1: 160, 2: 416, 3: 1024, 4: 2048}
+"""Trials after which the search ends in any case; our choice, from runs on synthetic truths."""
+SMALLEST = 32
+EXPLORED = 4
+"""Every EXPLORED-th point of a round is the Sobol sequence's next."""
+CANDIDATES, CLOUD = 2048, 8192
+CLOSE, RUNNING = 0.05, 2
+ISLANDS = 3.0
+"""Rule of three: what none of n even points met is with 95 % confidence at most 3 / n of the whole."""
+
+
+class ToTry(NamedTuple):
+    """Points to try: (n, d), the first `explored` of them even over the ranges whatever came before."""
+
+    points: Float
+    explored: int
+
+
+class Border(NamedTuple):
+    """What a search came to.
+
+    Attributes:
+        trials: all that were looked at.
+        explored: how many of them are even over the ranges.
+        changed: share of the predicted set that the last round changed; None before two rounds.
+        settled: whether it ended by itself, and not at the budget.
+        share: of the ranges' volume in which trials are predicted to succeed.
+        edges: (d, 2) whether the predicted set reaches the low and the high end of each range.
+    """
+
+    trials: int
+    explored: int
+    changed: float | None
+    settled: bool
+    share: float
+    edges: tuple[tuple[bool, bool], ...]
+
+
+Sobol = Callable[[int, int], Float]
+"""Points first .. last - 1 of the sequence whose beginning was looked at, (n, d)."""
+
+
+def cloud(dimension: int, count: int = CLOUD, seed: int = 0) -> Float:
+    """(count, d) even points in the scaled ranges."""
+    from scipy.stats import qmc
+
+    points: Float = 2.0 * qmc.Sobol(dimension, scramble=True, rng=np.random.default_rng(seed)).random(count) - 1.0
+    return points
+
+
+def batch_size(number: int, budget: int) -> int:
+    """Points of a search's n-th round: 32, 32, 64, 64, 128 ... and an eighth of the budget at most."""
+    most = max(EXPLORED, budget // 8 // EXPLORED * EXPLORED)
+    return int(min(SMALLEST * 2 ** ((number - 1) // 2), most))
+
+
+def search(
+    seen: Looked, explored: int, sobol: Sobol, budget: int, say: Say = lambda text: None
+) -> Generator[ToTry, Looked, Border]:
+    """Yields what to try and is sent how it ended.
+
+    Args:
+        seen: trials so far, at least one.
+        explored: how many of them are the Sobol sequence's first.
+        sobol: the points that follow.
+        budget: trials in all.
+        say: told how far it is.
+    """
+    dimension = seen.points.shape[1]
+    even, number, calm, changed = cloud(dimension), 0, 0, None
+    surrogate = Surrogate(seen.points, seen.works)
+    labels = surrogate.mean(even) > 0.0
+    while len(seen.works) < budget and calm < RUNNING:
+        number += 1
+        count = min(batch_size(number, budget), budget - len(seen.works))
+        share = math.ceil(count / EXPLORED)
+        offered = cloud(dimension, CANDIDATES, number)
+        picks = offered[surrogate.straddle(offered, count - share)]
+        ended = yield ToTry(np.concatenate([sobol(explored, explored + share), picks]), share)
+        seen, explored = seen.with_more(ended), explored + share
+        surrogate, before = Surrogate(seen.points, seen.works), labels
+        labels = surrogate.mean(even) > 0.0
+        changed = float(np.mean(labels != before) / max(np.mean(labels), 1.0 / len(even)))
+        calm = calm + 1 if changed < CLOSE else 0
+        say(_progress(changed, len(seen.works), to_go(changed, calm, len(seen.works), number, budget)))
+    return Border(
+        len(seen.works), explored, changed, calm >= RUNNING, float(np.mean(labels)), edges_of(surrogate, dimension)
+    )
+
+
+def to_go(changed: float, calm: int, trials: int, number: int, budget: int) -> int:
+    """A guess of the trials that are left: the error falls as one over the trials, and the end takes calm rounds."""
+    if calm >= RUNNING:
+        return 0
+    rounds = sum(batch_size(number + i, budget) for i in range(1, RUNNING - calm + 1))
+    falling = trials * (changed / CLOSE - 1.0) if changed > CLOSE else 0.0
+    return max(0, min(max(rounds, math.ceil(falling / 8) * 8), budget - trials))
+
+
+def _progress(changed: float, trials: int, left: int) -> str:
+    within = f"border within {100.0 * max(changed, 0.001):.2g} % after {trials} trials"
+    return f"{within}, about {left} trials to go" if left else within
+
+
+def edges_of(surrogate: Surrogate, dimension: int) -> tuple[tuple[bool, bool], ...]:
+    """Whether trials are predicted to succeed somewhere at the low and the high end of each range."""
+    found = []
+    for i in range(dimension):
+        face = cloud(dimension, 1024)
+        ends = []
+        for end in (-1.0, 1.0):
+            face[:, i] = end
+            ends.append(bool(np.any(surrogate.mean(face) > 0.0)))
+        found.append((ends[0], ends[1]))
+    return tuple(found)

@@ -1,0 +1,198 @@
+"""The three searches of a folder: where the border is, what breaks the skill, and which quantity matters.
+
+    plan.jsonl      what was about to run, written before it ran
+    border/1 ...    rounds of the border; border.json says what came out
+    break/1 ...     rounds of the search for a small disturbance, confirm/1 ... fresh trials at its end; breaking.json
+    matter/1 ...    fresh trials over the ranges, then the same with a quantity held; matter.json
+
+Each may be interrupted at any moment and goes on when it is asked again.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Generator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from skillframe.campaign.claims import border, breaking, matter
+from skillframe.campaign.claims.border import Border, ToTry
+from skillframe.campaign.claims.engine import Engine, Looked, Say
+from skillframe.campaign.claims.plan import PLAN, RoundPlan
+from skillframe.campaign.claims.question import LOOK, Question, read_question
+from skillframe.campaign.claims.rounds import BORDER, carry_out, ended, looked, next_sobol, rows_hash, scene_of, seed_of
+from skillframe.campaign.claims.surrogate import Surrogate
+from skillframe.campaign.folder import load
+from skillframe.errors import InputError
+from skillframe.files import write_whole
+from skillframe.files.documents import read_json
+from skillframe.frames import Float
+from skillframe.world.quantities import VARIED
+
+BREAK, CONFIRM, MATTER = "break", "confirm", "matter"
+FOUND = {BORDER: "border.json", BREAK: "breaking.json", MATTER: "matter.json"}
+"""Where each search writes what came out."""
+
+
+def nominal(folder: Path, question: Question) -> dict[str, float]:
+    """Each quantity where nothing is varied, in SI, or the middle of its range where robot or draws decide."""
+    scene = scene_of(folder, load(folder / LOOK))
+    known: dict[str, Any] = {each.name: each.nominal for each in VARIED}
+    known |= {f"world.{name}": value for name, value in scene["params"].items()} if "params" in scene else {}
+    return {
+        name: float(value) if isinstance(value := known.get(name), int | float) else 0.5 * (low + high)
+        for name, (low, high) in question.ranges.items()
+    }
+
+
+def map_border(folder: Path, engine: Engine, say: Say = print) -> dict[str, Any]:
+    """Find the border of success. Returns the content of border.json."""
+    found = carry_out(folder, BORDER, _border(folder, engine.params, say), engine, say)
+    question = read_question(folder)
+    names = list(question.ranges)
+    seen = looked(folder, engine.params)
+    ranks = matter.indices(Surrogate(seen.points, seen.works), len(names))
+    return _written(folder, BORDER, {
+        "trials": found.trials, "successes": int(seen.works.sum()), "explored": found.explored,
+        "changed": found.changed, "settled": found.settled, "share_that_works": found.share,
+        "smallest_island": border.ISLANDS / found.explored,
+        "reaches": {name: list(found.edges[i]) for i, name in enumerate(names)},
+        "index": {name: float(ranks[i]) for i, name in enumerate(names)},
+    })  # fmt: skip
+
+
+def _border(folder: Path, params: type | None, say: Say) -> Generator[ToTry, Looked, Border]:
+    question = read_question(folder)
+    seen = looked(folder, params, rounds=0)
+    budget = max(border.BUDGET[len(question.ranges)], 2 * len(seen.works))
+    return border.search(seen, len(seen.works), next_sobol(folder, question, params), budget, say)
+
+
+def find_break(folder: Path, engine: Engine, say: Say = print) -> dict[str, Any]:
+    """Find a small disturbance that breaks the skill. Returns the content of breaking.json."""
+    question = read_question(folder)
+    found = carry_out(folder, BREAK, _breaking(folder, engine.params, say), engine, say)
+    confirmed, tried = carry_out(folder, CONFIRM, _confirming(found.points), engine, say)
+    content: dict[str, Any] = {
+        "trials": found.trials, "undisturbed_failures": found.undisturbed, "nominal": nominal(folder, question),
+        "confirmations": tried, "confirmed": confirmed is not None, "fresh_trials": breaking.AGAIN,
+    }  # fmt: skip
+    if confirmed is not None:
+        away = found.points[confirmed] - question.scaled(nominal(folder, question))[0]
+        values = question.in_si(found.points[confirmed])
+        content |= {
+            "size": float(np.sqrt(np.sum(away**2))), "round": confirmed + 1,
+            "point": {name: float(values[i]) for i, name in enumerate(question.ranges)},
+        }  # fmt: skip
+    return _written(folder, BREAK, content)
+
+
+def _breaking(folder: Path, params: type | None, say: Say) -> Generator[ToTry, Looked, breaking.BreakingPoints]:
+    question = read_question(folder)
+    origin = question.scaled(nominal(folder, question))[0]
+    outside = next((n for n, x in zip(question.ranges, origin, strict=True) if abs(x) > 1.0), None)
+    if outside is not None:
+        raise InputError(
+            f"vary.{outside}", "does not contain its nominal value, from which a disturbance is measured",
+            "widen the range, or fix the quantity in [set]",
+        )  # fmt: skip
+    seen = looked(folder, params, rounds=0)
+    return breaking.search(seen, origin, breaking.BUDGET[len(question.ranges)], say)
+
+
+def _confirming(points: Float) -> Generator[ToTry, Looked, tuple[int | None, list[int]]]:
+    """Fresh trials at failing points, the smallest first, until more than half of them fail."""
+    tried: list[int] = []
+    for number, point in enumerate(points[: breaking.MOST_AGAIN]):
+        again = yield ToTry(np.tile(point, (breaking.AGAIN, 1)), 0)
+        tried.append(int(np.sum(~again.works)))
+        if tried[-1] > breaking.AGAIN // 2:
+            return number, tried
+    return None, tried
+
+
+def rank(folder: Path, engine: Engine, say: Say = print) -> dict[str, Any]:
+    """Rank the quantities and test the first two. Returns the content of matter.json."""
+    question = read_question(folder)
+    held = carry_out(folder, MATTER, _matter(folder, engine.params, say), engine, say)
+    where = nominal(folder, question)
+    return _written(folder, MATTER, {
+        "index": _ranks(folder, engine.params),
+        "held": [{**each._asdict(), "change": list(each.change), "at": where[each.name]} for each in held],
+    })  # fmt: skip
+
+
+def _ranks(folder: Path, params: type | None) -> dict[str, float]:
+    """Index of each quantity by the trials that were looked at evenly."""
+    question, seen = read_question(folder), looked(folder, params, rounds=0)
+    found = matter.indices(Surrogate(seen.points, seen.works), len(question.ranges))
+    return {name: float(found[i]) for i, name in enumerate(question.ranges)}
+
+
+def _matter(folder: Path, params: type | None, say: Say) -> Generator[ToTry, Looked, tuple[matter.Frozen, ...]]:
+    question = read_question(folder)
+    at = question.scaled(nominal(folder, question))[0]
+    seed = seed_of(load(folder / LOOK, params).seed, MATTER, 0)
+    return matter.search(_ranks(folder, params), list(question.ranges), at, seed, say)
+
+
+def _written(folder: Path, stream: str, content: dict[str, Any]) -> dict[str, Any]:
+    text = json.dumps(content, indent=2, sort_keys=True, allow_nan=False) + "\n"
+    write_whole(folder / FOUND[stream], text.encode())
+    return content
+
+
+def found_in(folder: Path, stream: str) -> dict[str, Any] | None:
+    """What a search of a folder came to, or None if it has not ended."""
+    path = folder / FOUND[stream]
+    if not path.is_file():
+        return None
+    content: dict[str, Any] = read_json(path, "remove it and type the command that wrote it again")
+    return content
+
+
+def check_plan(folder: Path, params: type | None = None) -> list[str]:
+    """Compute the plan again from the rows. Says, in sentences, where it does not agree."""
+    question = read_question(folder)
+    plan = RoundPlan(folder, list(question.ranges))
+    wrong: list[str] = []
+
+    def quiet(text: str) -> None:
+        """Nothing runs, so there is nothing to tell."""
+
+    searches: dict[str, Any] = {BORDER: _border(folder, params, quiet)}
+    if plan.of(BREAK):
+        searches[BREAK] = _breaking(folder, params, quiet)
+    if plan.of(MATTER):
+        searches[MATTER] = _matter(folder, params, quiet)
+    for stream, search in searches.items():
+        wrong += _disagreements(folder, question, plan, stream, search, params)
+    return wrong
+
+
+def _disagreements(
+    folder: Path,
+    question: Question,
+    plan: RoundPlan,
+    stream: str,
+    search: Generator[ToTry, Looked, Any],
+    params: type | None,
+) -> list[str]:
+    entries = plan.of(stream)
+    if not entries:
+        return []
+    batch, wrong = next(search), []
+    for entry in entries:
+        where = f"{PLAN}: round {entry.round} of {stream}"
+        points = np.array([question.in_si(point) for point in batch.points])
+        if points.shape != entry.points.shape or not np.array_equal(points, entry.points):
+            wrong.append(f"{where} is not what follows from the trials before it")
+        if entry.rows != rows_hash(folder, stream, entry.round):
+            wrong.append(f"{where} was computed from other tables than those that are there")
+        try:
+            batch = search.send(ended(folder, question, entry, params))
+        except StopIteration:
+            break
+    return wrong

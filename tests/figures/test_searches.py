@@ -1,0 +1,142 @@
+"""How near searches come to the truth, and in how many trials: borders beside Sobol points, breaking points, ranks.
+
+Truths are closed forms over [-1, 1]^d. The error of a border is the volume where the predicted and the true set differ
+over the volume of the true one. Sobol points beside it: the same surrogate from as many of them.
+"""
+
+import numpy as np
+import pytest
+from scipy.stats import qmc
+
+from skillframe.campaign.claims import border, breaking, matter
+from skillframe.campaign.claims.engine import Looked
+from skillframe.campaign.claims.question import LOOKS
+from skillframe.campaign.claims.surrogate import Surrogate
+from tests.figures.teaching import row
+
+pytestmark = pytest.mark.figures
+SEED = 2026_11_23
+
+
+def sobol(dimension, seed):
+    return 2.0 * qmc.Sobol(dimension, scramble=True, rng=np.random.default_rng([SEED, seed])).random(4096) - 1.0
+
+
+def ellipsoid(points):
+    return np.sum((points / np.array([0.8, 0.5, 0.7, 0.9])[: points.shape[1]]) ** 2, axis=1) < 1.0
+
+
+def lobes(points):
+    centre = np.zeros(points.shape[1])
+    centre[:2] = 0.45
+    near = np.sum(((points - centre) / 0.4) ** 2, axis=1), np.sum(((points + centre) / 0.35) ** 2, axis=1)
+    return np.minimum(*near) < 1.0
+
+
+def wedge(points):
+    """8 % of the range's width for each unit of x, and thinner towards one end."""
+    return np.abs(points[:, 1] - 0.3 * points[:, 0]) < 0.08 * (points[:, 0] + 1.1)
+
+
+def error(points, truth):
+    even = np.random.default_rng(SEED).uniform(-1.0, 1.0, (20_000, points.shape[1]))
+    there = truth(even)
+    return float(np.mean((Surrogate(points, truth(points)).mean(even) > 0.0) != there) / there.mean())
+
+
+def mapped(truth, dimension, seed):
+    """Trials, whether it settled, its error, and that of as many Sobol points."""
+    points = sobol(dimension, seed)
+    seen = points[: LOOKS[dimension]]
+    search = border.search(
+        Looked(seen, truth(seen)), len(seen), lambda a, b: points[a:b], border.BUDGET[dimension]
+    )  # fmt: skip
+    try:
+        batch = next(search)
+        while True:
+            seen = np.concatenate([seen, batch.points])
+            batch = search.send(Looked(batch.points, truth(batch.points)))
+    except StopIteration as end:
+        return len(seen), end.value.settled, error(seen, truth), error(points[: len(seen)], truth)
+
+
+@pytest.mark.parametrize(
+    ("truth", "dimension", "seeds", "most"),
+    [(ellipsoid, 2, 10, 0.05), (lobes, 2, 10, 0.05), (wedge, 2, 5, None), (ellipsoid, 3, 3, 0.05), (lobes, 3, 3, None)],
+)
+def test_a_border_is_found_with_half_the_error_of_sobol_points(truth, dimension, seeds, most):
+    found = [mapped(truth, dimension, seed) for seed in range(seeds)]
+    trials, settled, errors, beside = (np.array(column) for column in zip(*found, strict=True))
+    row(
+        f"{truth.__name__}, {dimension}-D, {seeds} seeds", f"{np.median(trials):.0f} trials, {settled.sum()} settled",
+        f"error {np.median(errors):.3f} (worst {errors.max():.3f}), Sobol {np.median(beside):.3f}",
+    )  # fmt: skip
+    assert np.median(errors) < 0.5 * np.median(beside)
+    assert most is None or np.mean(errors <= most) >= 0.9
+
+
+def planes(rng, dimension):
+    """Fails beyond any of 3 d planes. The true smallest disturbance is the nearest plane's distance."""
+    normals = rng.standard_normal((3 * dimension, dimension))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    away = rng.uniform(0.35, 0.9, 3 * dimension)
+    return (lambda x: ~np.any(x @ normals.T > away, axis=1)), away.min()
+
+
+def dent(rng, dimension):
+    """Fails in a cone of half angle 27 degrees whose tip is 0.4 away."""
+    axis = rng.standard_normal(dimension)
+    axis /= np.linalg.norm(axis)
+
+    def works(x):
+        along = x @ axis
+        across = np.sqrt(np.maximum(np.sum(x**2, axis=1) - along**2, 0.0))
+        return ~(along > 0.4 + 2.0 * across)
+
+    return works, 0.4
+
+
+@pytest.mark.parametrize("kind", [planes, dent])
+@pytest.mark.parametrize("dimension", [2, 3, 4])
+def test_a_breaking_point_is_within_a_tenth_of_the_smallest_in_fourteen_of_fifteen(kind, dimension):
+    sizes, spent = [], []
+    for seed in range(15):
+        rng = np.random.default_rng([SEED, seed, dimension])
+        truth, least = kind(rng, dimension)
+        seen = sobol(dimension, seed)[: LOOKS[dimension]]
+        search = breaking.search(Looked(seen, truth(seen)), np.zeros(dimension), breaking.BUDGET[dimension])
+        try:
+            batch = next(search)
+            while True:
+                batch = search.send(Looked(batch.points, truth(batch.points)))
+        except StopIteration as end:
+            found = np.linalg.norm(end.value.points, axis=1)
+            sizes.append(found[0] / least if len(found) else np.inf)
+            spent.append(end.value.trials)
+    near = sum(size <= 1.1 for size in sizes)
+    row(
+        f"{kind.__name__}, {dimension}-D", f"{near} of 15 within 10 %",
+        f"worst {max(sizes):.2f}, {np.median(spent):.0f} trials after {LOOKS[dimension]} looked at",
+    )  # fmt: skip
+    assert near >= 14
+
+
+RANKED = {
+    "two act only together": (lambda x: x[:, 1] * x[:, 2] > 0.0, {1, 2}),
+    "one strong, two weak": (lambda x: 2.0 * x[:, 0] + 0.8 * x[:, 1] + 0.8 * x[:, 2] < 0.5, {0, 1, 2}),
+    "graded": (lambda x: x[:, 0] + 0.6 * x[:, 1] + 0.4 * x[:, 2] < 0.3, {0, 1, 2}),
+}
+
+
+@pytest.mark.parametrize("name", RANKED)
+def test_the_quantities_that_matter_rank_before_the_one_that_does_not(name):
+    """Four quantities, of which the others do nothing; 128, 256 and 512 even trials."""
+    truth, right = RANKED[name]
+    for trials in (128, 256, 512):
+        hits = 0
+        for seed in range(10):
+            points = sobol(4, seed)[:trials]
+            found = matter.indices(Surrogate(points, truth(points)), 4)
+            hits += set(np.argsort(-found)[: len(right)].tolist()) == right
+        row(f"{name}, {trials} trials", f"{hits} of 10 seeds right")
+        assert hits >= 8 or trials < 512

@@ -1,0 +1,285 @@
+"""Borders, breaking points and ranks: against closed forms, and as a folder that may be killed at any moment."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import norm, qmc
+from search_fakes import content, everything
+from test_certify import ENGINE, TEXT, asked, written
+
+from skillframe.campaign.claims import border, breaking, matter, procedure
+from skillframe.campaign.claims.engine import Looked
+from skillframe.campaign.claims.plan import PLAN, RoundPlan
+from skillframe.campaign.claims.question import ask_again, begin, read_question
+from skillframe.campaign.claims.rounds import looked
+from skillframe.campaign.claims.searches import check_plan, find_break, nominal
+from skillframe.campaign.claims.surrogate import Surrogate, covariance
+from skillframe.errors import InputError
+from skillframe.world.worlds.valley import ValleyParams
+
+SOBOL = 2.0 * qmc.Sobol(2, scramble=True, rng=np.random.default_rng(3)).random(512) - 1.0
+RNG = np.random.default_rng(4)
+
+
+def answered(search, truth):
+    """A search to its end over a truth. Its outcome, and all trials."""
+    batches = [next(search)]
+    try:
+        while True:
+            batches.append(search.send(Looked(batches[-1].points, truth(batches[-1].points))))
+    except StopIteration as end:
+        return end.value, np.concatenate([batch.points for batch in batches])
+
+
+def test_the_deviation_is_that_of_the_gaussian_process():
+    points, asked_at = RNG.uniform(-1.0, 1.0, (20, 2)), RNG.uniform(-1.0, 1.0, (5, 2))
+    found = Surrogate(points, points[:, 0] > 0.0)
+    gram = covariance(points, points, found.lengths) + found.noise * np.eye(20)
+    cross = covariance(asked_at, points, found.lengths)
+    expected = np.sqrt(1.0 - np.einsum("ij,jk,ik->i", cross, np.linalg.inv(gram), cross))
+    assert found.deviation(asked_at) == pytest.approx(expected, abs=1e-6)  # the root of a difference of ones
+
+
+def test_a_picked_point_shrinks_the_deviations_of_the_others_and_leaves_the_mean():
+    """Greedy picks against the Gaussian process with each pick added as a trial of the same noise."""
+    points, offered = RNG.uniform(-1.0, 1.0, (12, 2)), RNG.uniform(-1.0, 1.0, (40, 2))
+    found = Surrogate(points, points[:, 0] + 0.3 * points[:, 1] > 0.0)
+    mean, known, expected = np.abs(found.mean(offered)), points, []
+    for _ in range(6):
+        gram = covariance(known, known, found.lengths) + found.noise * np.eye(len(known))
+        cross = covariance(offered, known, found.lengths)
+        variance = 1.0 - np.einsum("ij,jk,ik->i", cross, np.linalg.inv(gram), cross)
+        score = 1.96 * np.sqrt(np.maximum(variance, 0.0)) - mean
+        score[expected] = -np.inf
+        expected.append(int(np.argmax(score)))
+        known = np.concatenate([known, offered[expected[-1:]]])
+    assert found.straddle(offered, 6).tolist() == expected
+
+
+def test_the_border_of_an_ellipse_is_found_and_the_ends_of_the_ranges_that_it_passes():
+    """x^2/0.8^2 + y^2/1.3^2 < 1 leaves the range at both ends of y; its area over the range's is from quadrature."""
+
+    def truth(points):
+        return np.sum((points / [0.8, 1.3]) ** 2, axis=1) < 1.0
+
+    found, points = answered(
+        border.search(Looked(SOBOL[:64], truth(SOBOL[:64])), 64, lambda a, b: SOBOL[a:b], 192), truth
+    )
+    assert found.edges == ((False, False), (True, True))
+    even = RNG.uniform(-1.0, 1.0, (40_000, 2))
+    assert found.share == pytest.approx(truth(even).mean(), rel=0.06)
+    away = np.abs(np.sqrt(np.sum((points / [0.8, 1.3]) ** 2, axis=1)) - 1.0)
+    evenly = np.abs(np.sqrt(np.sum((even / [0.8, 1.3]) ** 2, axis=1)) - 1.0)
+    assert np.median(away) < 0.6 * np.median(evenly)  # a quarter of the trials is even, three quarters seek the border
+    assert found.explored == 64 + sum(batch_share(found.trials - 64))
+
+
+def batch_share(left):
+    """A quarter of each round, rounded up, of batches of an eighth of the budget of 192."""
+    sizes = [min(24, left - first) for first in range(0, left, 24)]
+    return [-(-size // 4) for size in sizes]
+
+
+def test_batches_grow_and_stay_below_an_eighth_of_the_budget():
+    assert [border.batch_size(n, 2048) for n in range(1, 9)] == [32, 32, 64, 64, 128, 128, 256, 256]
+    assert border.batch_size(9, 1024) == 128
+
+
+def test_trials_to_go_never_pass_the_budget_and_end_with_the_search():
+    assert border.to_go(0.5, 0, 64, 1, 416) == 416 - 64
+    assert border.to_go(0.01, 2, 200, 4, 416) == 0
+    assert border.to_go(0.01, 1, 160, 3, 1024) == border.batch_size(4, 1024)
+
+
+def test_the_smallest_disturbance_of_two_planes_is_the_nearer_one():
+    """Fails beyond x + y = 0.6 sqrt 2 (distance 0.6 from the middle), and beyond x = -0.9."""
+
+    def truth(points):
+        return (points.sum(axis=1) < 0.6 * np.sqrt(2.0)) & (points[:, 0] > -0.9)
+
+    seen = Looked(SOBOL[:32], truth(SOBOL[:32]))
+    found, _ = answered(breaking.search(seen, np.zeros(2), 200), truth)
+    assert found.trials <= 200 + 32  # rays are bisected to their end
+    sizes = np.linalg.norm(found.points, axis=1)
+    assert 0.6 <= sizes[0] < 0.63  # radii are bisected to 5 %, then shortened by 2 % at least a hit
+    assert np.all(np.diff(sizes) >= 0.0)
+    assert not truth(found.points).any()
+
+
+def test_what_fails_undisturbed_needs_no_search():
+    found, points = answered(
+        breaking.search(Looked(SOBOL[:8], SOBOL[:8, 0] > 2.0), np.zeros(2), 200), lambda p: p[:, 0] > 2.0
+    )
+    assert (found.trials, found.undisturbed, len(points)) == (8, 8, 8)
+
+
+def test_where_nothing_fails_there_is_no_breaking_point():
+    found, points = answered(
+        breaking.search(Looked(SOBOL[:8], SOBOL[:8, 0] < 2.0), np.zeros(2), 200), lambda p: p[:, 0] < 2.0
+    )
+    assert found.points.shape == (0, 2)
+    assert len(points) == 8 + 32
+
+
+def test_a_ray_ends_where_the_ranges_do():
+    assert breaking.reach(np.array([0.5, 0.0]), np.array([1.0, 0.0])) == pytest.approx(0.5)
+    assert breaking.reach(np.array([0.0, 0.0]), np.array([0.6, -0.8])) == pytest.approx(1.25)
+
+
+def test_indices_of_a_linear_truth_are_the_shares_of_its_variance():
+    class Linear:
+        def mean(self, points):
+            return points @ np.array([0.4, 0.2, 0.0])
+
+    assert matter.indices(Linear(), 3) == pytest.approx([0.8, 0.2, 0.0], abs=0.01)  # 4096 even points
+
+
+def test_two_quantities_that_act_only_together_both_matter():
+    points = SOBOL[:128]
+    found = matter.indices(Surrogate(points, points[:, 0] * points[:, 1] > 0.0), 2)
+    assert np.all(found > 0.7)
+
+
+def test_the_change_over_pairs_has_the_interval_of_agresti_and_min():
+    """30 of 100 pairs gain, 10 lose: (30 - 10) / 102 with the variance of their counts, one half added to each cell."""
+    low, high = matter.paired_change(30, 10, 100)
+    won, lost, n = 30.5, 10.5, 102.0
+    half = norm.ppf(0.975) * np.sqrt(won + lost - (won - lost) ** 2 / n) / n
+    assert (low, high) == pytest.approx((20.0 / n - half, 20.0 / n + half))
+
+
+def test_a_quantity_without_effect_is_not_tested_and_the_others_on_the_same_trials():
+    def truth(points):
+        return points[:, 0] < 0.2
+
+    search = matter.search({"a": 0.9, "b": 0.01}, ["a", "b"], np.array([0.0, 0.0]), 5)
+    (held,), points = answered(search, truth)
+    assert points[:128, 1] == pytest.approx(points[128:, 1])
+    assert np.all(points[128:, 0] == 0.0)
+    assert (held.name, held.after, held.only_before) == ("a", 128, 0)
+    assert held.only_after == 128 - held.before
+    with pytest.raises(StopIteration):
+        next(matter.search({"a": 0.0, "b": 0.0}, ["a", "b"], np.zeros(2), 5))
+
+
+class TestPlan:
+    def planned(self, folder):
+        plan = RoundPlan(folder, ["a", "b"])
+        plan.append("border", np.array([[0.1, 0.2], [0.3, 0.4]]), 1, "x")
+        plan.append("break", np.array([[0.5, 0.6]]), 0, "y")
+        return plan
+
+    def test_what_was_planned_is_read_back_to_the_last_bit_and_a_torn_line_is_not_there(self, tmp_path):
+        head = self.planned(tmp_path).head
+        with (tmp_path / PLAN).open("ab") as file:
+            file.write(b'{"stream": "bor')
+        again = RoundPlan(tmp_path, ["a", "b"])
+        assert again.head == head
+        assert [(e.stream, e.round, e.points.tolist()) for e in again.entries] == [
+            ("border", 1, [[0.1, 0.2], [0.3, 0.4]]), ("break", 1, [[0.5, 0.6]]),
+        ]  # fmt: skip
+        again.append("border", np.zeros((1, 2)), 0, "z")
+        assert [e.round for e in RoundPlan(tmp_path, ["a", "b"]).of("border")] == [1, 2]
+
+    @pytest.mark.parametrize("edit", [lambda t: t.replace("0.1", "0.11", 1), lambda t: t.split("\n", 1)[1]])
+    def test_a_plan_that_was_edited_is_refused(self, tmp_path, edit):
+        self.planned(tmp_path)
+        (tmp_path / PLAN).write_text(edit((tmp_path / PLAN).read_text()))
+        with pytest.raises(InputError, match=r"the plan was changed|is damaged"):
+            RoundPlan(tmp_path, ["a", "b"])
+
+
+def quiet(text):
+    """Nothing to say."""
+
+
+def test_a_nominal_value_outside_its_range_is_refused_in_words(tmp_path):
+    text = TEXT.replace("[-0.4, 0.4]", "[0.1, 0.4]")
+    spec, out = written(tmp_path / "in", text), tmp_path / "out"
+    begin(spec, out, ENGINE.describe, ValleyParams, rate=0.95, confidence=0.95)
+    assert nominal(out, read_question(out))["fixture.tilt_y"] == 0.0
+    with pytest.raises(InputError, match=r"vary\.fixture.tilt_y: does not contain its nominal value"):
+        find_break(out, ENGINE, quiet)
+
+
+def test_claims_are_neither_older_than_their_trials_nor_without_end(tmp_path):
+    out = asked(tmp_path)
+    procedure.look(out, ENGINE)
+    question = read_question(out)
+    box = procedure.propose(question, looked(out, ValleyParams))
+    (out / "claim1" / "fresh").mkdir(parents=True)
+    with pytest.raises(InputError, match="holds trials that are older than their claim"):
+        procedure.write_claim(out, question, box, ValleyParams)
+    (out / "claim1" / "fresh").rmdir()
+    for _ in range(procedure.MOST_CLAIMS):
+        procedure.write_claim(out, question, box, ValleyParams)
+    with pytest.raises(InputError, match="has spent its level on 4 claims"):
+        procedure.write_claim(out, question, box, ValleyParams)
+
+
+def test_another_rate_may_be_asked_of_the_same_trials(tmp_path):
+    out = asked(tmp_path)
+    ask_again(out, 0.9, 0.99)
+    assert (read_question(out).rate, read_question(out).confidence) == (0.9, 0.99)
+    with pytest.raises(InputError, match="--rate: is 2"):
+        ask_again(out, 2.0, 0.95)
+
+
+@pytest.mark.slow
+def test_the_four_commands_in_one_folder_agree_with_the_truth_and_with_the_plan(tmp_path):
+    """Works in (tilt / 0.32)^2 + (offset / 0.018)^2 < 1, in half ranges 0.8 and 0.9."""
+    out = asked(tmp_path)
+    procedure.look(out, ENGINE)
+    everything(out)
+    found = {name: json.loads((out / f"{name}.json").read_text()) for name in ("border", "breaking", "matter")}
+    assert found["border"]["share_that_works"] == pytest.approx(np.pi * 0.8 * 0.9 / 4.0, rel=0.06)
+    assert found["breaking"]["size"] == pytest.approx(0.8, rel=0.05)
+    assert found["breaking"]["confirmed"]
+    assert {each["name"] for each in found["matter"]["held"]} == {"fixture.tilt_y", "fixture.offset_x"}
+    assert all(each["change"][0] > 0.0 for each in found["matter"]["held"])
+    predicate = json.loads((out / "certificate.json").read_text())["predicate"]
+    assert predicate["certified"]
+    assert predicate["looked_at"]["border_rounds"] > 1
+    assert predicate["break"] == found["breaking"]
+    assert check_plan(out, ValleyParams) == []
+    (out / "look" / "results.csv").write_bytes((out / "look" / "results.csv").read_bytes() + b"\n")
+    assert any("computed from other tables" in text for text in check_plan(out, ValleyParams))
+
+
+def killed(folder: Path, *moment: float) -> int:
+    command = [sys.executable, str(Path(__file__).with_name("search_fakes.py")), str(folder), *map(str, moment)]
+    return subprocess.run(command, capture_output=True, check=False).returncode
+
+
+def killed_at(tmp_path, moments, text=TEXT):
+    """How processes ended that were killed at each moment in turn. Two folders: undisturbed, and theirs."""
+    for name in ("whole", "killed"):
+        spec = written(tmp_path / name / "in", text)
+        begin(spec, tmp_path / name / "out", ENGINE.describe, ValleyParams, rate=0.95, confidence=0.95)
+    assert killed(tmp_path / "whole" / "out", np.inf) == 0
+    ends = [killed(tmp_path / "killed" / "out", *moment) for moment in moments]
+    assert killed(tmp_path / "killed" / "out", np.inf) == 0
+    return ends
+
+
+@pytest.mark.slow
+def test_a_folder_whose_process_was_killed_while_it_wrote_ends_as_one_that_was_not(tmp_path):
+    """Killed in its 60th, then in its 9th write, in one range, which is searched in a second."""
+    text = TEXT.replace("{ normal = [0.0, 0.01] }", "{ choice = [0.0, 0.002] }")
+    assert killed_at(tmp_path, [(np.inf, 60), (np.inf, 9)], text) == [-9, -9]
+    assert content(tmp_path / "killed" / "out") == content(tmp_path / "whole" / "out")
+
+
+@pytest.mark.figures
+def test_twenty_kills_at_random_moments_leave_the_folder_as_it_would_be(tmp_path):
+    """Ten in a random write, ten at a random time: seed 2026_11_23."""
+    rng = np.random.default_rng(2026_11_23)
+    moments = [(np.inf, int(rng.integers(1, 80))) if i % 2 else (rng.uniform(1.5, 5.0),) for i in range(20)]
+    ends = killed_at(tmp_path, moments)
+    print(f"{ends.count(-9)} of 20 processes killed before their end")
+    assert ends.count(-9) >= 10
+    assert content(tmp_path / "killed" / "out") == content(tmp_path / "whole" / "out")
