@@ -53,11 +53,11 @@ def unknown_end(status: int, reason: object) -> str:
 
 def shown(observation: Observation) -> Observation:
     """Copies that a skill can keep and cannot write to. Nothing leads from them to what the loop goes by."""
-    time, twist, wrench = observation.time.copy(), observation.twist.copy(), observation.wrench.copy()
-    position, rotation = observation.pose.position.copy(), observation.pose.rotation.copy()
-    time.flags.writeable = position.flags.writeable = rotation.flags.writeable = False
-    twist.flags.writeable = wrench.flags.writeable = False
-    return Observation(time, observation.dt, Pose(position, rotation), twist, wrench)
+    time, dt, (position, rotation), twist, wrench = observation
+    time, position, rotation, twist, wrench = time.copy(), position.copy(), rotation.copy(), twist.copy(), wrench.copy()
+    for array in (time, position, rotation, twist, wrench):
+        array.setflags(write=False)
+    return Observation(time, dt, Pose(position, rotation), twist, wrench)
 
 
 def asked(skill: Skill, method: Callable[..., Answer], *arguments: Any) -> Answer:

@@ -45,6 +45,8 @@ class _Window:
 
     @property
     def peak(self) -> Float:
+        if not self._new:
+            return self._peak
         largest: Float = np.max([self._peak, *self._new], axis=0)
         return largest
 

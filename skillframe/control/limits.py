@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import itertools
 import sys
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,10 +41,12 @@ class LimitGuard:
         self._limits, self._dt, self._motors = limits, dt, motors
         self.energy = np.zeros(count)
         """(N,) work of the controller on the tool so far [J]."""
-        self._centre, self._squares, self._bounds = _glance(limits)
-        self._values: Float = np.zeros((count, len(self._centre)))
+        self.glance = glance(limits)
+        self.values: Float = np.zeros((count, len(self.glance.centre)))
+        """(N, 21) position, twist, wrench and command of the last look."""
         ends = (0, 3, 9, 15, 21)
-        self._parts = [self._values[:, begin:end] for begin, end in itertools.pairwise(ends)]
+        self.parts = [self.values[:, begin:end] for begin, end in itertools.pairwise(ends)]
+        """The four of them."""
 
     def violations(
         self, position: Float, twist: Float, wrench: Float, command: Float, rows: NDArray[np.int64]
@@ -58,11 +61,13 @@ class LimitGuard:
             rows: indices of the trials that still run.
         """
         self.energy += np.vecdot(command, twist) * self._dt
-        for part, given in zip(self._parts, (position, twist, wrench, command), strict=True):
+        for part, given in zip(self.parts, (position, twist, wrench, command), strict=True):
             part[...] = given
-        values = self._values
-        if self._surely_fine(values):
-            return []
+        return [] if self._surely_fine(self.values) else self.named(rows)
+
+    def named(self, rows: NDArray[np.int64]) -> list[Broken]:
+        """The trials among `rows` that broke a limit, by `values` and the energy that are there already."""
+        values, (position, twist, wrench, command) = self.values, self.parts
         force, torque, speed = norm(wrench[:, :3]), norm(wrench[:, 3:]), norm(twist[:, :3])
         limits = self._limits
         fine = self._inside(position) & (speed <= SPEED_CEILING)
@@ -79,14 +84,14 @@ class LimitGuard:
 
     def _surely_fine(self, values: Float) -> bool:
         """Are all trials well inside all limits? One look for the many ticks in which nothing happens."""
-        from_centre = values - self._centre
+        from_centre = values - self.glance.centre
         from_centre *= from_centre
-        sums = from_centre @ self._squares
-        if self._limits.energy_j is not None and not (self.energy <= self._limits.energy_j).all():
+        sums = from_centre @ self.glance.squares
+        if self._limits.energy_j is not None and not (self.energy <= self.glance.energy).all():
             return False
         if self._motors is not None and self._motors.counting:
             return False
-        return bool(np.count_nonzero(sums <= self._bounds) == sums.size)
+        return bool(np.count_nonzero(sums <= self.glance.bounds) == sums.size)
 
     def _inside(self, position: Float) -> NDArray[np.bool_]:
         if self._limits.workspace_m is None:
@@ -121,11 +126,21 @@ def _or_largest(limit: float | None) -> float:
     return sys.float_info.max if limit is None else limit
 
 
-def _glance(limits: Limits) -> tuple[Float, Float, Float]:
-    """For position, twist, wrench, command (21): what to subtract, which squares to sum, and bounds of the sums.
+class Glance(NamedTuple):
+    """For position, twist, wrench, command (21,): what to subtract, which squares to sum (21, 7), bounds of the sums.
 
-    The bounds are below the limits by more than rounding. What is not finite makes every sum not a number.
+    The bounds are below the limits by more than rounding. What is not finite makes every sum not a number. The energy
+    has a bound of its own [J].
     """
+
+    centre: Float
+    squares: Float
+    bounds: Float
+    energy: float
+
+
+def glance(limits: Limits) -> Glance:
+    """One look that tells that nothing is near its limit."""
     low, high = (np.array(corner) for corner in limits.workspace_m or ((-1e100,) * 3, (1e100,) * 3))
     centre, squares = np.zeros(21), np.zeros((21, 7))
     centre[:3] = 0.5 * (low + high)
@@ -136,4 +151,4 @@ def _glance(limits: Limits) -> tuple[Float, Float, Float]:
     most = (SPEED_CEILING, limits.force_n, limits.torque_n_m, WRENCH_CEILING)
     bounds = np.array([*half, *(1e100 if limit is None else limit for limit in most)])
     inside = bounds * (1.0 - 1e-9) - 1e-9 * np.abs(np.append(centre[:3], np.zeros(4)))
-    return centre, squares, np.square(np.maximum(inside, 0.0))
+    return Glance(centre, squares, np.square(np.maximum(inside, 0.0)), _or_largest(limits.energy_j))

@@ -32,10 +32,13 @@ class BondLedger:
 
     Args:
         count: number of bonds.
+
+    Attributes:
+        rows: (8, BLOCK, count) what `add` is given, of the steps that are not summed yet.
     """
 
     def __init__(self, count: int) -> None:
-        self._steps: Float = np.zeros((8, BLOCK, count))
+        self.rows: Float = np.zeros((8, BLOCK, count))
         self._sums: Float = np.zeros((2, count))
         self._length = 0
 
@@ -48,16 +51,21 @@ class BondLedger:
         step: float,
     ) -> None:  # fmt: skip
         """A step: forces, positions and velocities (count,) at its begin and end, and the actuators' work (count,)."""
+        row = self.claim()
+        for rows, value in zip(self.rows, (*force, *position, *velocity, given, step), strict=True):
+            rows[row] = value
+
+    def claim(self) -> int:
+        """Which row of `rows` the next step's numbers are to be written to, before anyone asks for sums."""
         if self._length == BLOCK:
             self.sums()
-        for rows, value in zip(self._steps, (*force, *position, *velocity, given, step), strict=True):
-            rows[self._length] = value
         self._length += 1
+        return self._length - 1
 
     def sums(self) -> Float:
         """(2, count): energy that the coupling has made or lost [J], and energy that was exchanged [J]."""
         if self._length:
-            f0, f1, x0, x1, v0, v1, given, step = self._steps[:, : self._length]
+            f0, f1, x0, x1, v0, v1, given, step = self.rows[:, : self._length]
             received = bond_work(f0, f1, x1 - x0, v0, v1, step)
             turns = np.stack([received, -given], axis=1).reshape(2 * self._length, -1)
             for total, more in zip(self._sums, (turns, np.abs(received)), strict=True):

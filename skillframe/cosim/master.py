@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.cosim.bond import BondLedger, bond_work, relative_residual
+from skillframe.cosim.exchange import CompiledExchange, compiled_exchange
 from skillframe.cosim.plant import Float, Mechanics, Motion
 from skillframe.errors import SkillframeError
 from skillframe.fmu.actuator import Actuators
@@ -87,6 +88,15 @@ class Master:
         self.time, self.steps = 0.0, 0
         self.force = np.zeros(bank.count)
         self._ledger = BondLedger(bank.count)
+        self._native = self._compiled()
+
+    def _compiled(self) -> CompiledExchange | None:
+        """What steps in C, where settings, plant and bank are of the common kind."""
+        s = self.settings
+        usual = self._plain and self._all_give_work and self._refresh and s.plant_substeps == 1
+        if not usual or s.tolerance_j is not None:
+            return None
+        return compiled_exchange(self.plant, self.bank, self._ledger, self.force, s.step)
 
     @property
     def difference(self) -> Float:
@@ -118,7 +128,7 @@ class Master:
         self.bank.u[:, self._column["command"]] = command
         self.bank.start(time, parameters)
         self.time, self.steps = time, 0
-        self.force = self.bank.y[:, self._force].copy()
+        self.force[:] = self.bank.y[:, self._force]
         self._ledger.start()
 
     def step(self, command: Float | float) -> bool:
@@ -168,6 +178,11 @@ class Master:
             at_acceleration[:] = acceleration
 
     def _exchange(self, step: float) -> bool:
+        if self._native is not None:
+            fine = self._native.step(self.time, step)
+            self.time += step
+            self.steps += 1
+            return fine
         begin = self.plant.motion(self.force)
         fine, given = self._actuate(begin, step)
         after = self._felt(self.force)

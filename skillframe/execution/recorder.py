@@ -63,11 +63,12 @@ class Recorder:
         if self._length == len(self._data["time"]):
             self._make_room()
         positions, quaternions = self._plant.body_poses()
+        seen, desired = quaternion_from_matrix(np.stack([observation.pose.rotation, command.pose.rotation]))
         sample: dict[str, Any] = {
             "time": observation.time, "position": observation.pose.position, "twist": observation.twist,
-            "quaternion": quaternion_from_matrix(observation.pose.rotation), "wrench": observation.wrench,
+            "quaternion": seen, "wrench": observation.wrench,
             "wrench_true": self._plant.contact_wrench(self._point), "desired_position": command.pose.position,
-            "desired_quaternion": quaternion_from_matrix(command.pose.rotation), "command_wrench": law,
+            "desired_quaternion": desired, "command_wrench": law,
             "q": self._plant.configuration, "body_position": positions, "body_quaternion": quaternions,
             **{MACHINE + name: value for name, value in (machine or {}).items()},
         }  # fmt: skip

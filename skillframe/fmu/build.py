@@ -54,9 +54,9 @@ def cached_path(folder: Path, version: int) -> Path:
     return cache_dir("fmus") / key[:24] / f"fmi{version}" / f"{table.name}.fmu"
 
 
-def build_stepper(source: Path) -> Path | None:
-    """The shared library of stepper.c, from the cache if it is there, or None where it cannot be built."""
-    return build_library("stepper", source.read_text(encoding="utf-8"))
+def build_source(source: Path) -> Path | None:
+    """The shared library of one C file, from the cache if it is there, or None where it cannot be built."""
+    return build_library(source.stem, source.read_text(encoding="utf-8"))
 
 
 def build_library(name: str, text: str) -> Path | None:

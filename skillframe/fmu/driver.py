@@ -11,7 +11,7 @@ from skillframe.fmu.actuator import DISCARD, OK, STATUS_TEXT, ActuatorSpec, Capa
 from skillframe.fmu.bindings import Instance
 from skillframe.fmu.inspection import FmuFacts
 from skillframe.fmu.probe import probe
-from skillframe.fmu.stepper import SlotTable, compiled_step, python_step
+from skillframe.fmu.stepper import SlotTable, compiled_step, native_step, python_step
 from skillframe.fmu.wiring import columns, wire
 
 
@@ -50,6 +50,8 @@ class FmuBank:
         self._table = SlotTable(wirings, self.u, self.y)
         fast = compiled_step(self._table, self.active) if compiled else None
         self.compiled = fast is not None
+        self.native = native_step(self._table) if self.compiled else None
+        """Address of the slots, their number, and address of the C function that steps them, where there is one."""
         self._step = fast or python_step(self._table, self.active)
 
     def _spec(self, index: int) -> ActuatorSpec:
@@ -76,14 +78,15 @@ class FmuBank:
 
     def step(self, time: float, step: float) -> bool:
         """Advance from `time` by `step` [s] with inputs `u`. Returns True if every active instance went well."""
-        self._time = time
-        return self._settle(self._step(time, step))
+        return self.settle(time, self._step(time, step))
 
     def refresh(self) -> bool:
         """Outputs at the present inputs. No time passes."""
-        return self._settle(self._step(self._time, 0.0))
+        return self.settle(self._time, self._step(self._time, 0.0))
 
-    def _settle(self, worst: int) -> bool:
+    def settle(self, time: float, worst: int) -> bool:
+        """See to those that failed at `time`, the worst with this status. Returns True if none did."""
+        self._time = time
         if worst < DISCARD:
             return True
         for i, status in enumerate(self._table.statuses()):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from skillframe.fmu.actuator import DISCARD, ENDED, NOT_FINITE
 from skillframe.fmu.bindings import Instance
-from skillframe.fmu.build import build_stepper
+from skillframe.fmu.build import build_source
 
 Float = NDArray[np.float64]
 LARGEST = 64  # variables per slot, as in stepper.c
@@ -47,7 +47,7 @@ class Slot(ctypes.Structure):
 @lru_cache(maxsize=1)
 def stepper_library() -> ctypes.CDLL | None:
     """The built stepper, or None where there is no compiler."""
-    path = build_stepper(Path(__file__).with_name("stepper.c"))
+    path = build_source(Path(__file__).with_name("stepper.c"))
     return ctypes.CDLL(str(path)) if path else None
 
 
@@ -92,6 +92,15 @@ def compiled_step(table: SlotTable, active: NDArray[np.uint8]) -> Step | None:
     function.argtypes = [ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p, ctypes.c_double, ctypes.c_double]
     slots, count, flags = ctypes.addressof(table.slots), len(table.wirings), active.ctypes.data
     return lambda time, step: function(slots, count, flags, time, step)  # type: ignore[no-any-return]
+
+
+def native_step(table: SlotTable) -> tuple[int, int, int] | None:
+    """Address of the slots, their number, and address of the C function that steps them. None without a compiler."""
+    library = stepper_library()
+    if library is None:
+        return None
+    function = ctypes.cast(library.skillframe_step, ctypes.c_void_p).value or 0
+    return ctypes.addressof(table.slots), len(table.wirings), function
 
 
 def python_step(table: SlotTable, active: NDArray[np.uint8]) -> Step:

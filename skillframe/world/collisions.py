@@ -149,9 +149,11 @@ class Collisions:
         if not len(rows):
             return
         position, quaternion = plant.body_coordinates()
-        free = np.concatenate([position[rows[:, None], self._free], quaternion[rows[:, None], self._free]], axis=-1)
+        if len(rows) < plant.count:
+            position, quaternion = position[rows], quaternion[rows]
+        free = np.concatenate([position.take(self._free, axis=1), quaternion.take(self._free, axis=1)], axis=-1)
         free = free.reshape(len(rows), 7 * len(self._free))
-        at, turn = position[rows[:, None], self._posed], quaternion[rows[:, None], self._posed]
+        at, turn = position.take(self._posed, axis=1), quaternion.take(self._posed, axis=1)
         finite = np.isfinite(free).all(axis=-1)  # a diverging trial is the limits' business
         for k in np.flatnonzero(finite):
             yield int(rows[k]), (free[k], at[k], turn[k])

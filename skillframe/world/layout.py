@@ -38,6 +38,7 @@ class Layout:
         self._set_chain(model)
         self._rows, self._columns = _sparse_indices(model)
         self._ordered: tuple[Any, list[tuple[int, int, int]]] = (None, [])
+        """A model of Pinocchio, and of each of its joints size, place in its configuration, and place in MuJoCo's."""
 
     def _set_chain(self, model: mujoco.MjModel) -> None:
         ancestors, body = set(), self.sensor
@@ -94,6 +95,8 @@ class Layout:
             joints = [(model.joints[i], model.names[i]) for i in range(1, model.njoints)]
             places = [(j.nq, j.idx_q, int(self.model.joint(name).qposadr[0])) for j, name in joints]
             self._ordered = model, places
+            single = np.array([place[1:] for place in places if place[0] == 1], dtype=np.int64).reshape(-1, 2)
+            self._single = _span(single[:, 0]), single[:, 1]
         return self._ordered[1]
 
     def to_mujoco(self, model: Any, configuration: Float) -> Float:
@@ -111,14 +114,15 @@ class Layout:
     def to_pinocchio(self, model: Any, qpos: Float) -> Float:
         """The inverse of `to_mujoco`."""
         configuration = np.zeros((len(qpos), model.nq))
-        for size, start, address in self._order(model):
+        order = self._order(model)
+        starts, addresses = self._single
+        configuration[:, starts] = qpos.take(addresses, axis=1)
+        for size, start, address in order:
             if size == 7:
                 configuration[:, start : start + 7] = qpos[:, address + np.array([0, 1, 2, 4, 5, 6, 3])]
             elif size == 2:
                 angle = qpos[:, address]
                 configuration[:, start], configuration[:, start + 1] = np.cos(angle), np.sin(angle)
-            else:
-                configuration[:, start] = qpos[:, address]
         return configuration
 
 

@@ -46,6 +46,19 @@ class Kinematics(NamedTuple):
     velocity: Float
 
 
+class PlantState(NamedTuple):
+    """Live arrays of N trials: position (N, nq), velocity, acceleration and generalised forces applied (N, nv).
+
+    `still` names the columns of the forces that stay zero: nothing drives the fixture's sprung parts.
+    """
+
+    position: Float
+    velocity: Float
+    acceleration: Float
+    applied: Float
+    still: NDArray[np.int64]
+
+
 def _leave_no_log_file() -> None:
     """MuJoCo would write MUJOCO_LOG.TXT where the user stands whenever a trial diverges, which the limits tell."""
     config = mujoco.MjLogConfig.get()
@@ -202,12 +215,25 @@ class Plant:
     def step(self, torque: Float, ids: NDArray[np.int64]) -> None:
         """Advance some trials by one time step under generalised forces (N, nv) in MuJoCo's order."""
         self._apply_torque(torque)
+        self.advance(ids)
+
+    def arrays(self) -> PlantState:
+        """State and generalised forces as live arrays, MuJoCo's order, for whoever writes the forces there himself."""
+        still = np.asarray(self._layout.sprung, dtype=np.int64)
+        return PlantState(self._qpos, self._qvel, self._acceleration, self._applied, still)
+
+    def advance(self, ids: NDArray[np.int64]) -> None:
+        """Advance some trials by one time step under the generalised forces that are written already."""
         self.batch.step(ids=self._some(ids), stage=_VELOCITY)
+
+    def accelerate(self, ids: NDArray[np.int64]) -> None:
+        """Bring accelerations of some trials up to date with the forces that are written. No time passes."""
+        self.batch.forward(ids=self._some(ids))
 
     def acceleration(self, torque: Float, ids: NDArray[np.int64]) -> Float:
         """Accelerations (N, nv) of some trials under generalised forces (N, nv), MuJoCo's order. No time passes."""
         self._apply_torque(torque)
-        self.batch.forward(ids=self._some(ids))
+        self.accelerate(ids)
         acceleration: Float = self._acceleration
         return acceleration
 

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.cosim.exchange import PlantArrays
 from skillframe.cosim.plant import Motion
 from skillframe.errors import SkillframeError
 from skillframe.frames import Float
@@ -47,6 +48,14 @@ class CoupledPlant:
         self.load: Float = np.zeros((self.trials, plant.model.nv))
         self._saved: tuple[Float, Float] = plant.state
         self._all: Float = np.zeros_like(self.load)
+
+    def arrays(self) -> PlantArrays:
+        """Where the plant keeps its numbers, for a master that moves them itself."""
+        own = self.plant.arrays()
+        return PlantArrays(
+            own.position, own.velocity, own.acceleration, self.load, own.applied, self._qpos, self.dofs, own.still,
+            self._timestep, lambda: self.plant.accelerate(self.active), lambda: self.plant.advance(self.active),
+        )  # fmt: skip
 
     def motion(self, force: Float) -> Motion:
         """Motion (count,) of the pistons now, with forces (count,) [N] acting on them."""

@@ -22,14 +22,14 @@ from skillframe.errors import InputError
 from skillframe.execution.drive import Shares, Trials
 from skillframe.execution.drives.actuated import Actuated
 from skillframe.execution.drives.machine_faults import BrokenParts, moved_joints
-from skillframe.execution.drives.machine_reference import LEAST_DAMPING, plane_reference
+from skillframe.execution.drives.machine_reference import LEAST_DAMPING, PlaneTask
 from skillframe.execution.drives.machine_start import closed_configurations, holding_force
 from skillframe.execution.drives.recording import WithColumns
 from skillframe.execution.recorder import Recorder
 from skillframe.execution.result import Result
 from skillframe.execution.setup import Setup
 from skillframe.fmu.unmapped import unmapped
-from skillframe.frames import Float, Pose, norm
+from skillframe.frames import Float, norm
 from skillframe.machine.checks.figures import CYLINDER
 from skillframe.machine.checks.holding import require_held
 from skillframe.machine.columns import EnergyBill, columns, supply_pressures
@@ -84,8 +84,6 @@ class MachineDrive:
         self.chain = ClosedChain(robot)
         self.actuators = tuple(self.chain.actuated)
         self.task = plane_task(self.chain)
-        first, second = self.task.axes
-        self._plane = slice(first, second + 1, second - first)
         fixture = fixture_poses(robot, draws, self.count)
         self.plant = Plant(robot, setup.scene, self.count, fixture, draws, timestep=self.dt)
         self.plant.reset(closed_configurations(self.chain, self.task, setup.scene, draws, self.count))
@@ -97,8 +95,13 @@ class MachineDrive:
         corner, estimate = spec.sensors.corner_hz, ForceSettings()
         noise = residual_noise(self.chain, known, spec.sensors, estimate.corner, self.dt)
         estimate = replace(estimate, sensor_corner=corner, row_noise=tuple(noise.tolist()))
-        self.law = CompiledLaw(self.chain, known, law_gains(self.chain), self.count, self.dt)
-        self.estimator = CompiledEstimator(self.chain, known, self.count, self.dt, estimate)
+        g, unknown = self.gauges, np.zeros((self.count, 2))
+        seen = g.z, g.rate
+        self.law = CompiledLaw(self.chain, known, law_gains(self.chain), self.count, self.dt, seen=seen)
+        self._seen = Measured(*seen, g.pressure_a, g.pressure_b, unknown, unknown)
+        """Sensors' readings, as they are now. The force is not measured."""
+        reads = self._seen, self.law.at
+        self.estimator = CompiledEstimator(self.chain, known, self.count, self.dt, estimate, reads=reads)
         self.valves = ValveIdentification(known, self.count, self.dt, ValveSettings(corner=corner))
         broken = faults_in(draws)
         self.bank = banks(spec, self.count, ports(broken))
@@ -140,6 +143,7 @@ class MachineDrive:
         for problem, fix in fast_filters(spec.sensors, spec.gains, spec.control.rate_hz):
             raise InputError(f"robot {spec.name}", problem, fix)
         self.gauges.start(z, *self._true_pressures())
+        self._wire()
         self.law.start()
         self.load = BelievedLoad(self.law, draws, self.count)
         self.home = self.plant.tool_pose().position[:, self.task.axes].copy()
@@ -147,7 +151,16 @@ class MachineDrive:
         nothing = np.zeros((self.count, 2))
         self.estimate = Estimate(nothing, nothing, np.zeros((self.count, len(self.chain.actuated))), nothing, nothing)
         self.demand = Demand(*(np.zeros((self.count, len(self.chain.actuated))) for _ in range(3)))
-        self.estimator.start(self._measured())
+        self.estimator.start(self._seen)
+        tool, axes = self.plant.tool_pose().position, self.task.axes
+        self._in_plane = PlaneTask(self.gauges, self.estimator, self.law, self.guard, axes, tool, self.dt)
+
+    def _wire(self) -> None:
+        """Tell the sensors where the true values stand."""
+        k, width = len(self.actuators), len(self.bank.outputs)
+        where = [(0, column) for column in self._z]
+        where += [(1, j * width + column) for column in self._pressures for j in range(k)]
+        self.gauges.wire([self.plant.state[0], self.bank.y.reshape(self.count, -1)], where)
 
     def _true_z(self) -> Float:
         z: Float = self.plant.state[0].take(self._z, axis=1)
@@ -164,10 +177,6 @@ class MachineDrive:
                 where = f"robot {self.setup.robot.spec.name}, {self.chain.actuated[k]}"
                 text = f"its FMU gives no pressure_{side}, from which the force is estimated (trial {trial})"
                 raise InputError(where, text, "map it under outputs of its [[actuation]]")
-
-    def _measured(self) -> Measured:
-        g, estimate = self.gauges, self.estimate
-        return Measured(g.z, g.rate, g.pressure_a, g.pressure_b, estimate.answered, estimate.sigma)
 
     def prepare(self) -> list[Broken]:
         """Swing in the air and identify friction and payload, then hold what was found."""
@@ -201,6 +210,7 @@ class MachineDrive:
         self.sigma.hold()
         self.estimator.calibrate(False)
         hold_identified(self.law, self.estimator.identification)
+        self._in_plane.hold(self.joint)
         self.findings = findings(self.law, self.load, self.estimator.identification, self.valves)
         self.bill.start()
         return broken
@@ -239,8 +249,7 @@ class MachineDrive:
         """Read the sensors, and the model's terms where the machine then is."""
         if self.faults is not None:
             self.faults.tick()
-        self.gauges.sample(self._true_z(), *self._true_pressures())
-        self._seen = self._measured()
+        self.gauges.read()
         self.terms = self.law.terms(self._seen)
 
     def _weigh(self) -> None:
@@ -250,16 +259,15 @@ class MachineDrive:
 
     def _estimate(self, force_counts: bool = True) -> None:
         """The force from what was sampled. In the air it is known to be zero."""
-        self._estimated = estimate = self.estimator.step(self._seen, self.terms)
-        nothing = np.zeros_like(estimate.force)
-        self.estimate = (
-            estimate if force_counts else estimate._replace(sigma=nothing, feedback=nothing, answered=nothing)
-        )
+        self.estimate = self._estimated = estimate = self.estimator.step(self._seen, self.terms)
+        if not force_counts:
+            nothing = np.zeros_like(estimate.force)
+            self.estimate = estimate._replace(sigma=nothing, feedback=nothing, answered=nothing)
 
     def _valve(self, reference: Reference) -> None:
         _, rate, pressure_a, pressure_b, _, _ = self._seen
-        now, estimate = self.gauges.now, self.estimate
-        measured = Measured(now, rate, pressure_a, pressure_b, estimate.answered, estimate.sigma)
+        estimate = self.estimate
+        measured = Measured(self.gauges.now, rate, pressure_a, pressure_b, estimate.answered, estimate.sigma)
         self._wanted = reference
         self.demand = self.law.step(measured, reference, self.active)
 
@@ -279,31 +287,19 @@ class MachineDrive:
         self.active = active
         self._sample()
         self._estimate()
-        self._seen_tool = self._observe(tick * self.dt)
-        return self._seen_tool
+        return self._in_plane.seen(tick * self.dt, self.plant.tool_pose().rotation)
 
     def act(self, command: Command, ramp: float) -> Float:
         """Valve commands of the law, and equation (1)'s wrench (N, 6) for limits and trace, returned."""
-        reference, self._wrench = plane_reference(command, self._seen_tool, ramp, self._plane, self.joint)
-        self._valve(reference)
-        return self._wrench
+        self._in_plane.aim(command, ramp)
+        measured, self._wanted = self.law.given
+        self.demand = self.law.step(measured, self._wanted, self.active)
+        return self._in_plane.law_wrench
 
     def violations(self, tick: int, active: Trials) -> list[Broken]:
         """The robot's limits, held to the estimate, and the energy that the coupling makes."""
-        seen = self._seen_tool
-        broken = self.guard.violations(seen.pose.position, seen.twist, seen.wrench, self._wrench, active)
+        broken = [] if self._in_plane.fine else self.guard.named(active)
         return [*self._watched(alarms=[one.row for one in broken]), *broken, *self.actuated.violations(tick, active)]
-
-    def _observe(self, time: float) -> Observation:
-        """Pose and twist as the encoders say, wrench as the pressures say."""
-        tool, plane = self.plant.tool_pose(), self._plane
-        position = tool.position.copy()
-        position[:, plane] = self.terms.tip + self.gauges.lag * self.terms.tip_rate
-        twist, wrench = np.zeros((self.count, 6)), np.zeros((self.count, 6))
-        twist[:, plane], wrench[:, plane] = self.terms.tip_rate, self.estimate.feedback
-        times = np.empty(self.count)
-        times.fill(time)
-        return Observation(times, self.dt, Pose(position, tool.rotation.copy()), twist, wrench)
 
     def _read(self, observation: Observation) -> Observation:
         """The same with the force as it is now, for the record. A skill that answers the force sees it late."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import casadi as ca
 import numpy as np
 
 from skillframe.frames import Float
@@ -33,12 +34,14 @@ class CompiledEstimator:
         dt: sample time [s].
         settings: see `ForceSettings`.
         use_compiler: False runs the same expressions in casadi's interpreter.
+        reads: the very arrays that `step` will be given every time, which are then read where they are.
 
     Attributes:
         identification: theta, its standard deviation, and how many rows it has seen.
         raw: (N, 2) the force before its Kalman filter [N].
         residual: (N, n) what is left for J^T f [Nm or N].
         regressors: (N, n, 2k + 1) phi, to be read and not kept.
+        estimate: the last one.
         calibrating: whether the tool is said to be in air.
         notes: a sentence where there is no compiler.
 
@@ -48,7 +51,7 @@ class CompiledEstimator:
 
     def __init__(
         self, chain: ClosedChain, cylinders: Cylinders, count: int, dt: float, settings: ForceSettings | None = None,
-        *, use_compiler: bool = True,
+        *, use_compiler: bool = True, reads: tuple[Measured, Terms] | None = None,
     ) -> None:  # fmt: skip
         self.settings = s = settings or ForceSettings()
         self._chain, self._cylinders, zeros = chain, cylinders, np.zeros
@@ -58,24 +61,26 @@ class CompiledEstimator:
         self._every, self._tick, self.calibrating = max(1, round(s.identify.period / dt)), 0, False
         self.raw, self.residual = zeros((count, 2)), zeros((count, n))
         shapes = ((n,), (k,), (k,), (n, n), (n,), (n,), (2, n), (k, n), (k,))
-        self._given = [zeros((count, *shape)) for shape in shapes]
+        self._reads = reads
+        self._given = _looked_at(*reads) if reads else tuple(zeros((count, *shape)) for shape in shapes)
         self._load, self._fresh = zeros((count, n)), np.ones(1)
         look = look_function(cylinders, s, n, dt)
         weigh = weigh_function(s, n, k, force_gain(s.feedback_corner, dt), dt)
         self._memory = [zeros((count, int(f.numel_out(f.n_out() - 1)))) for f in (look, weigh)]
-        self._next = [memory.copy() for memory in self._memory]
         self._seen = [zeros((count, *shape)) for shape in ((n,), (2, n), (n, 2 * k + 1), (k,), (n,))]
-        residual, jacobian, phi, _, variance = self._seen
-        self._theta = zeros((count, 2 * k + 1))
-        self._told = [self.residual, self.raw, *(zeros((count, 2)) for _ in range(4))]
-        inputs = [*self._given, self._load, self._memory[0], self._fresh]
-        self._look = Batch(
-            look, inputs, [*self._seen, self._next[0]], (len(inputs) - 1,), use_compiler=use_compiler
-        )  # fmt: skip
-        inputs = [residual, jacobian, phi, variance, self._theta, self._memory[1], self._fresh]
-        self._weigh = Batch(
-            weigh, inputs, [*self._told, self._next[1]], (len(inputs) - 1,), use_compiler=use_compiler
-        )  # fmt: skip
+        residual, jacobian, phi, level, variance = self._seen
+        self._theta, told = zeros((count, 2 * k + 1)), [zeros((count, 2)) for _ in range(4)]
+        force, sigma, feedback, answered = told
+        self.estimate = Estimate(force, sigma, level, feedback, answered)
+
+        def batch(function: ca.Function, inputs: list[Float], memory: Float, outputs: list[Float]) -> Batch:
+            last, carried = len(inputs) + 1, {function.n_out() - 1: len(inputs)}
+            arrays = [*inputs, memory, self._fresh], [*outputs, memory.copy()]
+            return Batch(function, *arrays, (last,), carried=carried, use_compiler=use_compiler)
+
+        self._look = batch(look, [*self._given, self._load], self._memory[0], self._seen)
+        weighed = [residual, jacobian, phi, variance, self._theta]
+        self._weigh = batch(weigh, weighed, self._memory[1], [self.residual, self.raw, *told])
         self.regressors, self._everyone, self.notes = phi, np.arange(count), self._look.notes
 
     def calibrate(self, on: bool) -> None:
@@ -99,24 +104,19 @@ class CompiledEstimator:
         due = self._tick % self._every == 0
         if due:
             self._load[:] = self._chain.load_gravity(measured.z)
-        _, rate, pressure_a, pressure_b, _, _ = measured
-        mass, drift, gravity, jacobian, arms, _, piston_rate, _, _ = terms
-        values = (rate, pressure_a, pressure_b, mass, drift, gravity, jacobian, arms, piston_rate)
-        for own, value in zip(self._given, values, strict=True):
-            own[...] = value
-        self._look(self._everyone)
-        residual, _, phi, sliding, _ = self._seen
+        if self._reads is None:
+            for own, value in zip(self._given, _looked_at(measured, terms), strict=True):
+                own[...] = value
+        self._look.run(self._everyone)
         if self.calibrating and due:
+            residual, _, phi, sliding, _ = self._seen
             rows = joint_force(np.abs(terms.arms), np.where(sliding > 0.0, 0.0, 1.0)) == 0.0
             self.identification.update(phi, residual, self._noise, rows)
         self._theta[...] = self.identification.theta
-        self._weigh(self._everyone)
-        for memory, after in zip(self._memory, self._next, strict=True):
-            memory[...] = after
+        self._weigh.run(self._everyone)
         self._fresh[0] = 0.0
         self._tick += 1
-        _, _, force, sigma, feedback, answered = self._told
-        return Estimate(force, sigma, sliding, feedback, answered)
+        return self.estimate
 
     def friction(self, terms: Terms) -> Float:
         """(N, k) of every cylinder as it is known now, nominal and what was identified [N]."""
@@ -124,3 +124,10 @@ class CompiledEstimator:
         shape = np.tanh(self._rate / self.settings.sliding_speed)
         coulomb: Float = (c.coulomb_friction + found.coulomb) * shape
         return coulomb + (c.viscous_friction + found.viscous) * terms.piston_rate
+
+
+def _looked_at(measured: Measured, terms: Terms) -> tuple[Float, ...]:
+    """What `look_function` takes of a sample, in its order."""
+    _, rate, pressure_a, pressure_b, _, _ = measured
+    mass, drift, gravity, jacobian, arms, _, piston_rate, _, _ = terms
+    return rate, pressure_a, pressure_b, mass, drift, gravity, jacobian, arms, piston_rate

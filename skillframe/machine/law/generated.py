@@ -8,8 +8,9 @@ up to rounding, and neither allocates. casadi's generated code keeps no state.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -23,20 +24,38 @@ Ids = NDArray[np.int64]
 
 _LOOP = """
 #include <stdint.h>
-__attribute__((visibility("default"))) void %(name)s_batch(
-    const double *const *in, const int64_t *in_size, double *const *out, const int64_t *out_size,
-    const int64_t *ids, int64_t count)
+#include <string.h>
+typedef struct {
+    const double *const *in;
+    double *const *out;
+    const int64_t *in_step, *out_step, *carried, *ids;
+    int64_t n_carried, count;
+} Call;
+__attribute__((visibility("default"))) void %(name)s_batch(const Call *c)
 {
     const double *arg[%(arg)d];
     double *res[%(res)d], w[%(w)d];
     casadi_int iw[%(iw)d];
-    for (int64_t n = 0; n < count; ++n) {
-        for (int j = 0; j < %(n_in)d; ++j) arg[j] = in[j] + ids[n] * in_size[j];
-        for (int j = 0; j < %(n_out)d; ++j) res[j] = out[j] + ids[n] * out_size[j];
+    for (int64_t n = 0; n < c->count; ++n) {
+        for (int j = 0; j < %(n_in)d; ++j) arg[j] = c->in[j] + c->ids[n] * c->in_step[j];
+        for (int j = 0; j < %(n_out)d; ++j) res[j] = c->out[j] + c->ids[n] * c->out_step[j];
         %(name)s(arg, res, iw, w, 0);
+        for (const int64_t *p = c->carried; p < c->carried + 3 * c->n_carried; p += 3)
+            memcpy((double *)c->in[p[1]] + c->ids[n] * c->in_step[p[1]],
+                   c->out[p[0]] + c->ids[n] * c->out_step[p[0]], p[2] * sizeof(double));
     }
 }
 """
+
+
+class _Call(ctypes.Structure):
+    """As in the C text. `kept` keeps alive what it points to."""
+
+    kept: object
+    _fields_ = [
+        *((name, ctypes.c_void_p) for name in ("into", "out", "in_step", "out_step", "carried", "ids")),
+        *((name, ctypes.c_int64) for name in ("n_carried", "count")),
+    ]  # fmt: skip
 
 
 def source(function: ca.Function) -> str:
@@ -55,69 +74,76 @@ class Batch:
 
     Args:
         function: of one trial; inputs and outputs are dense.
-        inputs, outputs: arrays in its order, C-contiguous doubles; (N, ...) holds trials, row by row as the function's
-            columns, and they are read and written at every call.
+        inputs, outputs: arrays in its order, doubles, each row of (N, ...) C-contiguous; it holds a trial, row by row
+            as the function's columns. They are read and written where they are at every call, nothing is copied.
         shared: which inputs are one for all trials.
+        carried: outputs that are a trial's memory, by number, and the inputs that they are copied to after its call.
         use_compiler: False takes the interpreter.
 
     Attributes:
+        run: computes the outputs of the trials whose numbers it is given.
         notes: a sentence where there is no compiler.
     """
 
     def __init__(
         self, function: ca.Function, inputs: Sequence[Float], outputs: Sequence[Float], shared: Sequence[int] = (),
-        *, use_compiler: bool = True,
+        *, carried: Mapping[int, int] | None = None, use_compiler: bool = True,
     ) -> None:  # fmt: skip
         self._function, self._arrays = function, (list(inputs), list(outputs))
-        self._shared = frozenset(shared)
+        self._shared, self._carried = frozenset(shared), dict(carried or {})
         self._check()
         library = build_library(function.name(), source(function)) if use_compiler else None
         self.notes: tuple[str, ...] = () if library else (NOTE,)
-        self._call = self._native(library) if library else self._interpreted()
-
-    def __call__(self, ids: Ids) -> None:
-        """Compute the outputs of some trials."""
-        self._call(ids)
+        self.run: Callable[[Ids], None] = self._native(library) if library else self._interpreted()
 
     def _check(self) -> None:
         inputs, outputs = self._arrays
         for j, array in enumerate([*inputs, *outputs]):
-            if not array.flags.c_contiguous or array.dtype != np.float64:
+            row = array if j in self._shared else array[:1]
+            if not row.flags.c_contiguous or array.dtype != np.float64:
                 raise ValueError(f"array {j} of {self._function.name()} is not contiguous doubles")
 
     def _native(self, library: Path) -> Callable[[Ids], None]:
         call = ctypes.CDLL(str(library))[f"{self._function.name()}_batch"]
         call.restype = None
-        tables = []
-        for arrays, shared in zip(self._arrays, (self._shared, frozenset[int]()), strict=True):
-            pointers = (ctypes.c_void_p * len(arrays))(*(a.ctypes.data for a in arrays))
-            sizes = (ctypes.c_int64 * len(arrays))(
-                *(0 if j in shared else a[0].size if len(a) else 0 for j, a in enumerate(arrays))
-            )
-            tables += [pointers, sizes]
-        self._tables = tables  # the C code reads them at every call
-        chosen, which = np.zeros(0, dtype=np.int64), (ctypes.c_void_p(), ctypes.c_int64())
+        inputs, outputs = self._arrays
+        steps = ([0 if j in self._shared else _step(a) for j, a in enumerate(inputs)], [_step(a) for a in outputs])
+        carried = [n for out, into in self._carried.items() for n in (out, into, self._function.numel_out(out))]
+        addresses = [[a.ctypes.data for a in arrays] for arrays in self._arrays]
+        tables: list[Any] = [(ctypes.c_void_p * len(numbers))(*numbers) for numbers in addresses]
+        tables += [(ctypes.c_int64 * len(numbers))(*numbers) for numbers in (*steps, carried)]
+        told = _Call(*map(ctypes.addressof, tables), None, len(self._carried), 0)
+        told.kept = tables, self._arrays  # the C code reads them at every call
+        at, chosen = ctypes.c_void_p(ctypes.addressof(told)), np.zeros(0, dtype=np.int64)
 
         def run(ids: Ids) -> None:
-            nonlocal chosen, which
+            nonlocal chosen
             if chosen is not ids:  # mostly the same array again
-                chosen, which = ids, (ctypes.c_void_p(ids.ctypes.data), ctypes.c_int64(len(ids)))
-            call(*tables, *which)
+                chosen, told.ids, told.count = ids, ids.ctypes.data, len(ids)
+            call(at)
 
         return run
 
     def _interpreted(self) -> Callable[[Ids], None]:
-        count, buffers = len(self._arrays[1][0]), []
-        for i in range(count):
+        (inputs, outputs), buffers = self._arrays, []
+        for i in range(len(outputs[0])):
             buffer, evaluate = self._function.buffer()
-            for j, array in enumerate(self._arrays[0]):
-                buffer.set_arg(j, (array if j in self._shared else array[i]).data)
-            for j, array in enumerate(self._arrays[1]):
-                buffer.set_res(j, array[i].data)
+            for j, array in enumerate(inputs):
+                buffer.set_arg(j, (array if j in self._shared else array[i : i + 1]).data)
+            for j, array in enumerate(outputs):
+                buffer.set_res(j, array[i : i + 1].data)
             buffers.append((buffer, evaluate))
+        carried = [(inputs[into], outputs[out]) for out, into in self._carried.items()]
 
         def run(ids: Ids) -> None:
             for i in ids:
                 buffers[i][1]()
+            for memory, after in carried:
+                memory[ids] = after[ids]
 
         return run
+
+
+def _step(array: Float) -> int:
+    """Doubles from a trial's row to the next one's."""
+    return array.strides[0] // array.itemsize if len(array) else 0

@@ -21,11 +21,14 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.either import copysign, maximum, minimum
 from skillframe.frames import Float
 from skillframe.machine.force.valve import ValveIdentification
+from skillframe.machine.law.generated import Batch
 from skillframe.machine.law.hydraulic import Measured, Terms
 from skillframe.machine.law.hydraulic_compiled import CompiledLaw
 from skillframe.machine.law.vdc_actuator import Cylinders
@@ -80,15 +83,24 @@ class FlowWatch:
     def __init__(
         self, cylinders: Cylinders, names: tuple[str, ...], count: int, period: float, noise: float = 0.0
     ) -> None:
-        self._c, self._names, self._period = cylinders, names, period
+        self._names, self._period, k = names, period, len(names)
         self._area: Float = np.stack([cylinders.area_a, cylinders.area_b])[:, None]
-        self._signed: Float = self._area * np.array([1.0, -1.0])[:, None, None]
-        self._soft: Float = self._area / cylinders.bulk_modulus
-        self._reach_b: Float = cylinders.arm_b + cylinders.stroke
         self._length = WINDOW + max(LAGS) + 1
         self._blur = SURE * np.sqrt(2.0) * noise
-        self._told: Float = np.zeros((self._length, 8, count, len(names)))
-        self._seen: Float = np.zeros((self._length, 3, count, len(names)))
+        self._told: Float = np.zeros((count, self._length, 8, k))
+        """Sums of (2) in all looks so far, into both chambers: volumes, their sizes, volumes for the least and for the
+        largest overlap. The latest look is the first row."""
+        self._seen: Float = np.zeros((count, self._length, 3, k))
+        """Pistons and both pressures, likewise."""
+        self._given = [np.zeros((count, k)) for _ in range(12)]
+        self._taken, self._squeezed = (np.zeros((count, 2, k)) for _ in range(2))
+        self._explained, self._everyone = np.zeros((count, 2)), np.arange(count)
+        inputs = [*self._given, self._told, self._seen]
+        after = [np.zeros_like(self._told), np.zeros_like(self._seen)]
+        self._balance = Batch(
+            balance_function(cylinders, period), inputs, [*after, self._taken, self._squeezed, self._explained],
+            carried={0: len(inputs) - 2, 1: len(inputs) - 1},
+        )  # fmt: skip
         self._looks, self._running = 0, 0
         self._vague: NDArray[np.int64] = np.zeros((count, len(names)), dtype=np.int64)
         """Looks for which what the valves let through is not known from below, (N, k)."""
@@ -103,56 +115,29 @@ class FlowWatch:
             knowledge: of the valves.
             swing: before the skill starts.
         """
-        pressures = np.stack([seen.pressure_a, seen.pressure_b])
-        now, before = self._looks % self._length, (self._looks - 1) % self._length
-        self._flows(valve, pressures, knowledge, out=self._told[now])
-        self._told[now] += self._told[before]
-        self._seen[now, 0], self._seen[now, 1:] = terms.piston, pressures
+        blur = self._blur * np.sqrt(np.vecdot(terms.arms, terms.arms))
+        given = (valve, *seen[2:4], terms.piston, *knowledge, FLOOR_IN_SWING if swing else FLOOR, SPOOL_FLOOR + blur)
+        for own, value in zip(self._given, given, strict=True):
+            own[...] = value
+        self._balance.run(self._everyone)
         self._looks += 1
         self._vague = np.where(knowledge.unsure > UNSURE, self._length, np.maximum(self._vague - 1, 0))
         self._running = 0 if swing else self._running + 1
+        closed, placed = (np.count_nonzero(self._explained[:, i]) == len(self._explained) for i in range(2))
         if self._looks < self._length:
             return []
-        taken, squeezed = self._taken(terms.piston)
-        found = self._judge(taken, squeezed, swing)
-        if self._running < self._length:
-            return found
-        blur = self._blur * np.sqrt(np.vecdot(terms.arms, terms.arms))
-        return found + self._judge_spools(taken, squeezed, SPOOL_FLOOR + blur)
-
-    def _flows(self, valve: Float, pressures: Float, known: Knowledge, out: Float) -> None:
-        """(2) over a period into both chambers: volumes, their sizes, and volumes for the least and largest overlap."""
-        c, extends = self._c, valve > 0.0
-        overlap = np.stack([known.overlap, known.least, known.most])
-        opening = np.minimum(np.maximum(np.abs(valve) - overlap, 0.0) / (1.0 - overlap), 1.0)
-        opening[1:] *= known.ratio
-        drains = pressures - c.return_pressure
-        supply = np.where(known.unsure > UNSURE, np.maximum(known.supply, c.supply_pressure), known.supply)
-        drop = np.where(np.stack([extends, ~extends]), pressures - supply, drains)
-        flows = (-self._period * c.edge * opening)[:, None] * np.copysign(np.sqrt(np.abs(drop)), drop)
-        out[:2], out[4:6], out[6:] = flows
-        np.abs(out[:2], out=out[2:4])
-
-    def _back(self, looks: int) -> int:
-        return (self._looks - 1 - looks) % self._length
+        found = [] if closed else self._judge()
+        return found if placed or self._running < self._length else found + self._judge_spools()
 
     def _told_at(self, lag: int) -> Float:
-        """(8, N, k) volumes that a balance would have, if the readings lagged so, in the order of `_flows`."""
-        told: Float = self._told[self._back(lag)] - self._told[self._back(lag + WINDOW)]
-        return told
+        """(8, N, k) volumes that a balance would have, if the readings lagged so, in the order of `_told`."""
+        told: Float = self._told[:, lag] - self._told[:, lag + WINDOW]
+        return told.swapaxes(0, 1)
 
-    def _taken(self, piston: Float) -> tuple[Float, Float]:
-        """(2, N, k) what the chambers have taken in over the window by (1), and what of it went into compression."""
-        gone, c = self._seen[self._back(0)] - self._seen[self._back(WINDOW)], self._c
-        self._gone: Float = gone[0]
-        squeezed: Float = self._soft * np.stack([c.arm_a + piston, self._reach_b - piston]) * gone[1:]
-        return self._signed * gone[0] + squeezed, squeezed
-
-    def _judge(self, taken: Float, squeezed: Float, swing: bool) -> list[Suspicion]:
-        spare = self._area * (FLOOR_IN_SWING if swing else FLOOR) + SHARE * np.abs(squeezed)
-        told = self._told_at(LAGS[0])
-        if (np.abs(taken - told[:2]) <= spare + SHARE * told[2:4]).all():  # the usual lag explains all, so more lags do
-            return []
+    def _judge(self) -> list[Suspicion]:
+        """Balances that no lag explains."""
+        taken, squeezed = self._taken.swapaxes(0, 1), self._squeezed.swapaxes(0, 1)
+        spare = self._area * self._given[_FLOOR] + SHARE * np.abs(squeezed)
         every = np.stack([self._told_at(lag) for lag in LAGS])
         low, high, most = every[:, :2].min(axis=0), every[:, :2].max(axis=0), every[:, 2:4].max(axis=0)
         vague = self._vague > 0  # a supply that may be so much lower, or was taken for higher, may feed nothing
@@ -163,12 +148,10 @@ class FlowWatch:
             for i, k in np.argwhere(beyond.any(axis=0))
         ]
 
-    def _judge_spools(self, taken: Float, squeezed: Float, floor: Float) -> list[Suspicion]:
-        """Spools that are not where they were told. The floor is (N, k) [m]."""
-        spare = self._area * floor + SHARE * np.abs(squeezed)
-        off = np.abs(taken - self._told_at(LAGS[0])[4:6])
-        if not (off > spare).all(axis=0).any():  # one lag and one overlap explain a chamber, so more of them do
-            return []
+    def _judge_spools(self) -> list[Suspicion]:
+        """Spools that are not where they were told."""
+        taken, squeezed = self._taken.swapaxes(0, 1), self._squeezed.swapaxes(0, 1)
+        spare = self._area * self._given[_SPOOL_FLOOR] + SHARE * np.abs(squeezed)
         every = np.concatenate([self._told_at(lag)[4:].reshape(2, *taken.shape) for lag in EVERY_LAG])
         low, high = every.min(axis=0), every.max(axis=0)
         meant = np.clip(taken, low, high)
@@ -180,11 +163,16 @@ class FlowWatch:
             for i, k in np.argwhere(wrong)
         ]
 
+    def _gone(self, i: int, k: int) -> Float:
+        """What a piston has moved by over the window [m]."""
+        gone: Float = self._seen[i, 0, 0, k] - self._seen[i, WINDOW, 0, k]
+        return gone
+
     def _finding(
         self, i: int, k: int, taken: Float, meant: Float, beyond: NDArray[np.bool_], spool: bool = False
     ) -> Suspicion:
         """What a balance that does not close looks like: a valve, if both chambers err as one spool makes them."""
-        name, span, areas, x = self._names[k], WINDOW * self._period, self._area[:, 0, k], float(self._gone[i, k])
+        name, span, areas, x = self._names[k], WINDOW * self._period, self._area[:, 0, k], float(self._gone(i, k))
         way = float(meant[0] / areas[0] if abs(meant[0]) > abs(meant[1]) else -meant[1] / areas[1])
         off = taken - meant
         if beyond.all() and off[0] * off[1] < 0.0:
@@ -203,3 +191,47 @@ class FlowWatch:
         ]  # fmt: skip
         text = f"in {span:.2g} s {' and '.join(sides)} than its valve let through"
         return Suspicion(i, False, f"watchdog: the oil of {name} does not balance: {text}")
+
+
+_FLOOR, _SPOOL_FLOOR = 10, 11
+"""Which of the given arrays these are."""
+
+
+def balance_function(c: Cylinders, period: float) -> ca.Function:
+    """A look at one machine with k cylinders: (1), the sums of (2), and whether the usual lag explains all.
+
+    Inputs, (k,) each: mean command since the last look, pressures a and b, piston; the fields of `Knowledge`; what does
+    not count [m] of a balance, and of a spool. Then sums of (2), and readings, at the last looks, rows of k.
+    Outputs: these with the new look first; what both chambers have taken in, and what of it went into compression;
+    1 where all balances are explained, and 1 where all spools may be where they were told.
+    """
+    k, length = len(c.area_a), WINDOW + max(LAGS) + 1
+    given = [ca.SX.sym(f"given{i}", k) for i in range(12)]
+    valve, p_a, p_b, piston, *known, floor, spool_floor = given
+    sums, readings = (ca.SX.sym(name, k, length * rows) for name, rows in (("sums", 8), ("readings", 3)))
+    passed = ca.horzcat(*_flows(c, period, valve, (p_a, p_b), Knowledge(*known)))
+    told, seen = ca.horzcat(passed + sums[:, :8], sums[:, :-8]), ca.horzcat(piston, p_a, p_b, readings[:, :-3])
+    gone = seen[:, :3] - seen[:, 3 * WINDOW : 3 * WINDOW + 3]
+    lagged, begun = 8 * LAGS[0], 8 * (LAGS[0] + WINDOW)
+    usual = told[:, lagged : lagged + 8] - told[:, begun : begun + 8]
+    areas = ca.horzcat(c.area_a, c.area_b)
+    soft = ca.horzcat(c.area_a / c.bulk_modulus, c.area_b / c.bulk_modulus)
+    squeezed = soft * ca.horzcat(c.arm_a + piston, (c.arm_b + c.stroke) - piston) * gone[:, 1:]
+    taken = areas * ca.horzcat(gone[:, 0], -gone[:, 0]) + squeezed
+    spare, loose = (areas * ca.horzcat(way, way) + SHARE * ca.fabs(squeezed) for way in (floor, spool_floor))
+    closed = ca.fabs(taken - usual[:, :2]) <= spare + SHARE * usual[:, 2:4]
+    off = ca.fabs(taken - usual[:, 4:6]) > loose
+    explained = ca.vertcat(ca.sum1(ca.sum2(closed)) >= 2 * k, ca.sum1(off[:, 0] * off[:, 1]) < 1)
+    return ca.Function("balance", [*given, sums, readings], [told, seen, taken, squeezed, explained])
+
+
+def _flows(c: Cylinders, period: float, valve: ca.SX, pressures: tuple[ca.SX, ca.SX], known: Knowledge) -> list[ca.SX]:
+    """(2) over a period into both chambers: volumes, their sizes, and volumes for the least and largest overlap."""
+    supply = ca.if_else(known.unsure > UNSURE, maximum(known.supply, c.supply_pressure), known.supply)
+    volumes = []
+    for overlap, ratio in ((known.overlap, 1.0), (known.least, known.ratio), (known.most, known.ratio)):
+        opening = minimum(maximum(ca.fabs(valve) - overlap, 0.0) / (1.0 - overlap), 1.0) * ratio
+        for pressure, fills in zip(pressures, (valve > 0.0, ca.logic_not(valve > 0.0)), strict=True):
+            drop = ca.if_else(fills, pressure - supply, pressure - c.return_pressure)
+            volumes.append(-period * c.edge * opening * copysign(ca.sqrt(ca.fabs(drop)), drop))
+    return [*volumes[:2], *map(ca.fabs, volumes[:2]), *volumes[2:]]

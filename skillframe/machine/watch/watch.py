@@ -45,6 +45,7 @@ class MachineWatch:
         self._flow = FlowWatch(cylinders, names[1], count, period, filtered)
         self._tool = ToolWatch(count, period)
         self._told: Float = np.zeros((count, len(names[1])))
+        self._known, self._swinging = knowledge(law, valves), True
 
     def due(self, valve: Float) -> bool:
         """Take in the command (N, k) of a tick. Is it one in which all are looked at?"""
@@ -73,8 +74,9 @@ class MachineWatch:
         raw = np.concatenate([last[turn:], last[:turn]])
         found = self._readings.look(raw, self._gauges.chambers, terms.piston_rate)
         if due:
-            known = knowledge(self._law, self._valves)
-            found += self._flow.look(self._told / RECENT, seen, terms, known, swing)
+            if swing or self._swinging:  # what is known is held afterwards
+                self._known, self._swinging = knowledge(self._law, self._valves), swing
+            found += self._flow.look(self._told / RECENT, seen, terms, self._known, swing)
             if not swing:  # a machine that swings by itself there is told so at its end, with what to lower
                 found += self._tool.look(terms.tip_rate, reference.position - terms.tip, seen.force, reference)
             self._told[:] = 0.0

@@ -247,13 +247,15 @@ def test_the_record_holds_the_force_as_it_is_now_and_the_law_gets_the_late_one(t
     """Fed back, a force that looks ahead made the crane bounce to its force limit."""
     trace = together.traces[0]
     loop = begin(Follow(diamond, MOVING), setup(), of(DRAWS, [0]), rngs([0]), 100.0)
-    force, feedback, answered = (np.array([row]) for row in ([3.0, 4.0], [1.0, 2.0], [0.5, 1.0]))
-    loop.drive.estimate = loop.drive.estimate._replace(force=force, feedback=feedback, answered=answered)
-    loop.drive.terms = loop.drive.law.terms(loop.drive._measured())
-    seen = loop.drive._observe(0.0)
+    drive, estimate = loop.drive, loop.drive.estimator.estimate
+    estimate.force[:], estimate.feedback[:], estimate.answered[:] = [3.0, 4.0], [1.0, 2.0], [0.5, 1.0]
+    drive.estimate = estimate
+    seen = drive._in_plane.seen(0.0, loop.plant.tool_pose().rotation)
+    loop.skill.start(seen, rngs([0]))
+    drive.act(loop.skill.step(seen), 1.0)
     np.testing.assert_array_equal(seen.wrench[0, [0, 2]], [1.0, 2.0])
     np.testing.assert_array_equal(loop.drive._read(seen).wrench[0, [0, 2]], [3.0, 4.0])
-    np.testing.assert_array_equal(loop.drive._measured().force, [[0.5, 1.0]])
+    np.testing.assert_array_equal(drive.law.given[0].force, [[0.5, 1.0]])
     assert trace.machine["force_sigma"].shape[1:] == (2,) and set(np.unique(trace.machine["force_valid"])) <= {0.0, 1.0}
 
 

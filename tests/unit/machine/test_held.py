@@ -6,19 +6,21 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from skillframe.execution.drives.machine import MachineDrive
-from skillframe.frames import Pose
+from skillframe.control.limits import LimitGuard
+from skillframe.execution.drives.machine_reference import PlaneTask
 from skillframe.machine.force.calibration import hold_identified
 from skillframe.machine.force.identification import Identification, IdentificationSettings
 from skillframe.machine.force.load import carrier
-from skillframe.machine.law.hydraulic import HydraulicGains
+from skillframe.machine.law.hydraulic import HydraulicGains, Measured, Reference
 from skillframe.machine.law.hydraulic_compiled import CompiledLaw
 from skillframe.machine.law.vdc_actuator import cylinders
 from skillframe.machine.sensors import MachineSensors
 from skillframe.robot.driven import MachineNoise
+from skillframe.robot.spec import Limits
 from tests.laws.vdc_loop import crane
 
 DT = 1e-3
+_REFERENCE = ((2,), (2,), (2, 2), (2, 2), (2,), (0,), (0,), (2,))
 
 
 @pytest.fixture(scope="module")
@@ -73,11 +75,13 @@ def test_a_skill_sees_the_tool_where_it_is_and_not_where_it_was_when_the_filters
     for k in range(500):
         place = np.full((1, 2), rate * k * DT)
         gauges.sample(place, np.zeros((1, 1)), np.zeros((1, 1)))
-    drive = SimpleNamespace(
-        count=1, dt=DT, gauges=gauges, _plane=slice(0, 3, 2), estimate=SimpleNamespace(feedback=np.zeros((1, 2))),
-        terms=SimpleNamespace(tip=gauges.z, tip_rate=gauges.rate),
-        plant=SimpleNamespace(tool_pose=lambda: Pose(np.zeros((1, 3)), np.eye(3)[None])),
+    zeros, force = (np.zeros((1, size)) for size in (2, 2, 1, 1, 2, 2)), np.zeros((1, 2))
+    law = SimpleNamespace(
+        at=SimpleNamespace(tip=gauges.z, tip_rate=gauges.rate),
+        given=(Measured(*zeros), Reference(*(np.zeros((1, *shape)) for shape in _REFERENCE))),
     )  # fmt: skip
-    seen = MachineDrive._observe(drive, 0.5)
+    estimator = SimpleNamespace(estimate=SimpleNamespace(feedback=force, answered=force, sigma=force))
+    task = PlaneTask(gauges, estimator, law, LimitGuard(Limits(), 1, DT), (0, 2), np.zeros((1, 3)), DT)
+    seen = task.seen(0.5, np.eye(3)[None])
     np.testing.assert_allclose(seen.pose.position[:, [0, 2]], place, atol=0.08 * rate * gauges.lag)
     np.testing.assert_allclose(seen.twist[:, [0, 2]], rate, rtol=1e-9)

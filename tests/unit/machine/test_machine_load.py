@@ -85,7 +85,7 @@ def test_a_machine_at_rest_is_weighed_exactly_and_to_what_friction_may_hide(payl
 def test_the_controller_is_told_of_a_load_by_the_nominal_payload():
     """Its model's terms are those of a robot made with that load, by Pinocchio; the true load is another matter."""
     own = loop({"robot.nominal_payload": np.array([475.0, 200.0, 0.0])})
-    seen = own.drive._measured()
+    seen = own.drive._seen
     found = own.drive.law.terms(seen)
     for i, payload in enumerate([475.0, 200.0, 0.0]):
         other = terms(crane(payload), seen.z[i : i + 1], seen.rate[i : i + 1])
