@@ -138,12 +138,41 @@ def matrix_from_quaternion(quaternion: ArrayLike) -> Float:
 _FIRST = np.array([0, 1, 2, 7, 1, 0, 5, 2, 2, 5, 0, 3, 7, 2, 3, 0])
 _SECOND = np.array([0, 3, 6, 5, 3, 0, 7, 6, 6, 7, 0, 1, 5, 6, 1, 0])
 _SIGN = np.array([1.0, 1, 1, -1, 1, 1, 1, -1, 1, 1, 1, -1, -1, -1, -1, 1])
+_FEW = 36
+"""Numbers up to which Python's own are faster than arrays: four matrices."""
 
 
 def quaternion_from_matrix(rotation: ArrayLike) -> Float:
     """Unit quaternions (..., 4), x, y, z, w with w >= 0, from rotation matrices (..., 3, 3) (Shepperd's method)."""
     r = np.asarray(rotation, dtype=float)
     flat = r.reshape(*r.shape[:-2], 9)
+    lines = [_line_of_quaternion(*row) for row in flat.reshape(-1, 9).tolist()] if flat.size <= _FEW else []
+    if not lines or None in lines:
+        return _quaternions(r, flat)
+    found = unit(np.array(lines)).reshape(*r.shape[:-2], 4)
+    few: Float = np.where(found[..., 3:] < 0.0, -found, found)
+    return few
+
+
+def _line_of_quaternion(
+    xx: float, xy: float, xz: float, yx: float, yy: float, yz: float, zx: float, zy: float, zz: float
+) -> tuple[float, float, float, float] | None:
+    """The best conditioned row of 4 q q^T, or None where it is not finite. As `_quaternions` has it, to the bit."""
+    trace = xx + yy + zz
+    if trace - trace != 0.0:  # not a number, or infinite
+        return None
+    largest = max(xx, yy, zz, trace)
+    if xx == largest:
+        return 1.0 + 2.0 * xx - trace, xy + yx, xz + zx, zy - yz
+    if yy == largest:
+        return yx + xy, 1.0 + 2.0 * yy - trace, yz + zy, xz - zx
+    if zz == largest:
+        return zx + xz, zy + yz, 1.0 + 2.0 * zz - trace, yx - xy
+    return zy - yz, xz - zx, yx - xy, 1.0 + trace
+
+
+def _quaternions(r: Float, flat: Float) -> Float:
+    """`quaternion_from_matrix` for many, and for what is not finite."""
     main = flat[..., ::4]
     trace = (main[..., 0] + main[..., 1] + main[..., 2])[..., None]
     outer = flat.take(_FIRST, axis=-1) + _SIGN * flat.take(_SECOND, axis=-1)  # 4 q q^T, row by row

@@ -8,19 +8,20 @@ pass on F v, the trapezoidal rule; the rest heats oil in valves and seals, or is
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import casadi as ca
 import numpy as np
 
+from skillframe.either import maximum
 from skillframe.frames import Float
+from skillframe.machine.law.generated import Batch
 
 if TYPE_CHECKING:
     from skillframe.fmu.actuator import Actuators
 
 __all__ = ["EnergyBill", "columns", "supply_pressures"]
-
-BLOCK = 100
-"""Samples that are added up at once."""
 
 
 def columns(k: int) -> dict[str, tuple[int, ...]]:
@@ -39,56 +40,53 @@ class EnergyBill:
     """
 
     def __init__(self, bank: Actuators, supply: Float, dt: float) -> None:
-        self._bank, self._dt = bank, dt
-        names = bank.outputs
+        (count, k), names = supply.shape, bank.outputs
         self._flows = [names.index(f"flow_{side}") for side in "ab"] if "flow_a" in names and "flow_b" in names else []
-        self._force = names.index("force")
-        self._price: Float = dt * np.repeat(supply, 2, axis=-1)  # (N, 2k), side by side as the flows
-        self._shown: Float = np.zeros((BLOCK, *bank.y.shape))
-        self._speed: Float = np.zeros((BLOCK, *supply.shape))
+        self._velocity: Float = np.zeros((count, k))
+        self._sums, after = np.zeros((count, 3)), np.zeros((count, 3))
+        self._fresh, self._everyone = np.ones(1), np.arange(count)
+        price: Float = dt * np.repeat(supply, 2, axis=-1)  # (N, 2k), side by side as the flows
+        function = bill_function(k, len(names), names.index("force"), self._flows, dt)
+        inputs = [bank.y.reshape(count, -1), self._velocity, price, self._fresh, self._sums]
+        self._bill = Batch(function, inputs, [after], (3,), carried={0: 4})
         self.start()
 
     def start(self) -> None:
         """Begin a new bill."""
-        count = len(self._price)
-        self._sums: list[Float] = [np.full(count, 0.0 if self._flows else np.nan), np.zeros(count)]
-        self._power: Float | None = None
-        self._length = 0
+        self._sums[:], self._fresh[0] = [0.0 if self._flows else np.nan, 0.0, 0.0], 1.0
 
     def step(self, velocity: Float) -> None:
-        """Add a sample. The pistons' velocity is (N, k). It is only noted, and added when someone asks."""
-        if self._length == BLOCK:
-            self._add_up()
-        self._shown[self._length], self._speed[self._length] = self._bank.y, velocity
-        self._length += 1
+        """Add a sample. The pistons' velocity is (N, k)."""
+        self._velocity[...] = velocity
+        self._bill.run(self._everyone)
+        self._fresh[0] = 0.0
 
     @property
     def supply(self) -> Float:
         """What (N,) the pump's line has given since `start` [J], NaN where it is not known."""
-        return self._add_up()[0]
+        return self._sums[:, 0].copy()
 
     @property
     def pistons(self) -> Float:
         """What (N,) the pistons have passed on since `start` [J]."""
-        return self._add_up()[1]
+        return self._sums[:, 1].copy()
 
-    def _add_up(self) -> list[Float]:
-        """The sums with all samples so far, one added after the other."""
-        if not self._length:
-            return self._sums
-        y, speed = self._shown[: self._length], self._speed[: self._length]
-        power: Float = np.vecdot(y[..., self._force].reshape(speed.shape), speed)
-        before = np.concatenate([(power[0] if self._power is None else self._power)[None], power[:-1]])
-        more = [None, (0.5 * self._dt) * (power + before)]
-        if self._flows:
-            flows = np.maximum(y.take(self._flows, axis=2), 0.0).reshape(len(y), *self._price.shape)
-            more[0] = np.vecdot(self._price, flows)
-        self._sums = [
-            total if rows is None else np.add.accumulate(np.concatenate([total[None], rows]), axis=0)[-1]
-            for total, rows in zip(self._sums, more, strict=True)
-        ]
-        self._power, self._length = power[-1], 0
-        return self._sums
+
+def bill_function(k: int, width: int, force: int, flows: Sequence[int], dt: float) -> ca.Function:
+    """A sample of (1) for one machine.
+
+    Inputs: outputs of its k cylinders, `width` each, with columns of force and flows; velocity (k,); p_S dt for each
+    flow (2k,); 1 at the first sample; the sums of (1), and the power of the last sample (3,). Output: these after it.
+    """
+    y, velocity, price = ca.SX.sym("y", width, k), ca.SX.sym("velocity", k), ca.SX.sym("price", 2 * k)
+    fresh, sums = ca.SX.sym("fresh"), ca.SX.sym("sums", 3)
+    power = ca.dot(y[force, :].T, velocity)
+    given = ca.reshape(y[list(flows), :], -1, 1)
+    inflow = ca.dot(price, maximum(given, 0.0)) if flows else 0.0
+    passed = 0.5 * dt * (power + ca.if_else(fresh > 0.0, power, sums[2]))
+    return ca.Function(
+        "bill", [y, velocity, price, fresh, sums], [ca.vertcat(sums[0] + inflow, sums[1] + passed, power)]
+    )
 
 
 def supply_pressures(parameters: list[dict[str, float]], known: Float, count: int) -> Float:

@@ -153,3 +153,19 @@ def test_cross_and_skew_are_the_cross_product():
 def test_a_zero_vector_has_no_direction_and_stays_zero():
     assert np.array_equal(frames.unit(np.zeros((2, 3))), np.zeros((2, 3)))
     np.testing.assert_allclose(frames.norm(frames.unit(POSITIONS)), 1.0, atol=ROUNDING)
+
+
+def test_the_quaternion_of_a_matrix_is_the_same_to_the_bit_alone_and_among_many():
+    """All four rows of Shepperd's method, their ties, and what is no rotation."""
+    rng = np.random.default_rng(0)
+    special = [np.eye(3), *(np.diag(d) for d in ([1.0, -1, -1], [-1.0, 1, -1], [-1.0, -1, 1])), np.zeros((3, 3))]
+    odd = [np.full((3, 3), value) for value in (np.nan, np.inf, 1.0)]
+    many = np.concatenate([frames.rotation_matrix(3.0 * rng.normal(size=(400, 3))), special, odd])
+    with np.errstate(invalid="ignore"):
+        together = frames.quaternion_from_matrix(many)
+        for count in (1, 2, 4):
+            for i in range(0, len(many) - count):
+                np.testing.assert_array_equal(
+                    frames.quaternion_from_matrix(many[i : i + count]), together[i : i + count]
+                )
+        np.testing.assert_array_equal(frames.quaternion_from_matrix(many[3]), together[3])
