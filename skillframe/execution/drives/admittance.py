@@ -68,6 +68,7 @@ class AdmittanceDrive(TorqueDrive):
     def prepare(self) -> list[Broken]:
         """Tare as an arm of ideal torques does, which yields where a trial was drawn to begin in contact."""
         broken = self._by_hand.prepare()
+        self.contact_at_tare = self._by_hand.contact_at_tare
         self._begin()
         return broken
 

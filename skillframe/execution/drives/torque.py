@@ -32,6 +32,11 @@ from skillframe.world.plant import Draws, Kinematics, Plant
 from skillframe.world.sensors import TARE_TICKS, Sensors, at_point
 
 HOLD = Impedance(np.diag([2000.0] * 3 + [100.0] * 3))
+TARED_IN_CONTACT = 0.5
+"""[N] of true contact, the mean while the sensor is tared, from which a trial says so.
+
+It is what the admittance law takes for no contact. A sensor alone cannot tell contact from its bias, and the simulator
+knows the contact (our choice)."""
 
 
 class Gauge(Protocol):
@@ -98,6 +103,8 @@ class TorqueDrive:
         self._delay: CommandDelay | None = None
         self._unstated = unstated(setup.robot) if limits else []
         self.guard = LimitGuard(setup.limits, self.rows, self.dt, self.motors)
+        self.contact_at_tare = np.zeros(self.plant.count)
+        """(N,) mean force that something put on the tool while its sensor was tared [N]: so far off all forces are."""
 
     def prepare(self) -> list[Broken]:
         """Hold still, let the readings settle, and take their mean as the sensor's bias."""
@@ -107,16 +114,18 @@ class TorqueDrive:
         hold = Pose(kinematics.pose.position.copy(), kinematics.pose.rotation.copy()).at(self.limb.point)
         still = np.zeros((self.rows, 6))
         command = Command(hold, still, HOLD, still, np.zeros(self.rows, dtype=np.int64), no_reasons(self.rows))
-        total = still.copy()
+        total, touch = still.copy(), np.zeros(self.plant.count)
         broken: list[Broken] = []
         for _ in range(TARE_TICKS):
             kinematics = self.limb.kinematics(active)
             pose, wrench = self.limb.sensors.sample(kinematics.pose)
             total += wrench
+            touch += self.plant.contact_force()
             self._reading = self._read(kinematics, pose.at(self.limb.point))
             self.act(command, 1.0)
             broken += self.limb.push(self._torque, active)
             active = np.setdiff1d(active, [one.row for one in broken]) if broken else active
+        self.contact_at_tare = touch / TARE_TICKS
         self.limb.sensors.set_tare(total / TARE_TICKS, self.limb.kinematics(active).pose.rotation)
         return broken
 
@@ -171,15 +180,21 @@ class TorqueDrive:
         return Shares(self.guard.energy, torque, speed, place, joints)
 
     def notes(self, i: int) -> list[str]:
-        """Whose motors and ranges count as unlimited."""
-        return list(self._unstated)
+        """Whose motors and ranges count as unlimited, and a sensor that was tared in contact."""
+        force = self.contact_at_tare[i]
+        if not force >= TARED_IN_CONTACT:
+            return list(self._unstated)
+        wrong = f"the tool touched something while its force sensor was tared: all forces are {force:.1f} N wrong"
+        return [*self._unstated, f"{wrong}; start higher"]
 
     def recording(self, every: int) -> Recorder:
         """A plain recorder."""
         return Recorder(self.plant, every, self.limb.point)
 
     def outcome(self, result: Result) -> Result:
-        """As it is."""
+        """As it is, the failures of trials that were tared in contact with that beside them."""
+        for i in np.flatnonzero((self.contact_at_tare >= TARED_IN_CONTACT) & ~result.success):
+            result.failure[i] = f"{result.failure[i]}, after a tare in contact"
         return result
 
     def _filtered(self, raw: Float, tick: int) -> Float:

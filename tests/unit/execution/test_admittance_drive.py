@@ -133,6 +133,27 @@ def test_a_trial_that_begins_in_contact_yields_while_it_is_tared_and_does_not_pr
     assert result.peak_force_n[0] < 20.0
 
 
+@pytest.mark.parametrize("kind", ["torque", "position"])
+def test_a_tare_in_contact_is_named_with_the_force_that_it_hides_and_one_in_the_air_is_not(kind):
+    """The sensor reads the valley's push on the tool and takes it for its bias, so that what is left of it is that.
+
+    The tool's inertia is read with it: 0.6 kg that leave at 50 mm/s have taken 0.3 N for the 100 ms of the tare.
+    """
+    low = {"start.offset_z": np.array([0.0, 0.02])}  # the tool starts 4 mm above the bottom, the slope is 5 mm higher
+    low["fixture.offset_x"] = np.full(2, 0.005)
+    loop = begin(HoldSkill(), setup(kind), low, generators(2))
+    loop.prepare()
+    hidden = np.linalg.norm(loop.drive.limb.sensors._bias[:, :3], axis=1)  # silent sensors have none of their own
+    force = loop.drive.contact_at_tare
+    assert force[0] > 2.0 and force[1] == 0.0
+    assert hidden[0] == pytest.approx(force[0], abs=0.3) and hidden[1] < 0.1
+    loop.run(0.02, None)
+    result = loop.result()
+    assert "after a tare in contact" in result.failure[0] and "tare" not in result.failure[1]
+    assert any(f"all forces are {force[0]:.1f} N wrong; start higher" in note for note in loop.drive.notes(0))
+    assert not any("tared" in note for note in loop.drive.notes(1))
+
+
 def test_time_limits_are_stretched_with_the_skills_clock_and_every_result_says_so():
     pace = KINDS["position"].pace()
     result = run("position", HoldSkill(), seconds=0.1)

@@ -152,7 +152,7 @@ def declared(tmp_path):
     ("text", "extra", "words"),
     [
         ("stiffness = 10.0\nturning_stiffness = 100.0", (), r"mount.stiffness: 10 N/m is beyond 1000N/m to 1e\+06N/m"),
-        ("stiffness = 2e4\nturning_stiffness = 100.0\ndamping_ratio = -0.1", (), "damping_ratio: -0.1 is beyond 0 to 2"),
+        ("stiffness = 2e4\nturning_stiffness = 100.0\ndamping_ratio = -1", (), "damping_ratio: -1 is beyond 0 to 2"),
         ("stiffness = 2e4\nturning_stiffness = 100.0", ("rate_hz = 1000", 'interface = "position"\nrate_hz = 500'),
          r"contact_stiffness: is 5e\+04 N/m, and the mount alone, .* yields with 2e\+04 N/m.*1\.5e\+04"),
         ("stiffness = 2e4\nturning_stiffness = 100.0", ('base = "fixed"', 'base = "free"'), "stands on a free base"),
