@@ -9,6 +9,7 @@ from skillframe.config import build
 from skillframe.extend.records import WorldType
 from skillframe.world.scene import Scene
 from skillframe.world.worlds import (
+    bayonet,
     corner,
     edge,
     free,
@@ -51,6 +52,10 @@ def world_types() -> Iterable[WorldType]:
     )  # fmt: skip
     yield WorldType(
         name="pit", summary="two or three faces that meet, in any attitude", params=pit.PitParams, build=pit.build,
+    )  # fmt: skip
+    yield WorldType(
+        name="bayonet", summary="a cap with two pins to push and turn at once", params=bayonet.BayonetParams,
+        build=bayonet.build,
     )  # fmt: skip
     yield WorldType(
         name="pallets", summary="a stack of pallets and a stop, for machines", params=pallets.PalletsParams,

@@ -54,8 +54,11 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Any]] = {
     "slide": _slide,
     "corner": lambda rng: _pit(rng, [(18, 24), (35, 45), (55, 63)], (0.12, 0.18)),
     "valley": lambda rng: _pit(rng, [(22, 28), (55, 63)], (0.18, 0.25)),
+    "bayonet": lambda rng: ("bayonet", {"lead": radians(rng.uniform(83, 87)), "friction": rng.uniform(0.18, 0.25)}),
 }
-NUMBERS = {"corner": 0, "hump": 1, "hump_low": 2, "skew": 3, "slide": 4, "steps": 5, "valley": 6}
+GENTLE_N = {"bayonet": 8.0}
+"""How hard people and pushes press where the tool drops, in place of 15 and 20 N."""
+NUMBERS = {"corner": 0, "hump": 1, "hump_low": 2, "skew": 3, "slide": 4, "steps": 5, "valley": 6, "bayonet": 7}
 """What a family adds to the seeds of its instances; a new family takes the next number."""
 
 
@@ -75,6 +78,8 @@ def starts(scene: Scene, turn: Float, rng: np.random.Generator, count: int, lift
     if not scene.params["slopes"][0]:  # a slide
         along, aside = rng.uniform(0.03, 0.06, count), rng.uniform(0.004, 0.025, count)
         return np.column_stack([-along, -aside, np.full(count, lift)]) @ turn.T
+    if scene.name == "bayonet":
+        return np.tile(-lift * np.array(scene.task.direction), (count, 1))
     nominal = np.array([[s.get(f"start.offset_{a}", 0.0) for a in "xyz"] for s in scene.task.starts])
     up = -lift * np.array(scene.task.direction)
     return nominal[rng.integers(len(nominal), size=count)] * rng.uniform(0.5, 1.2, (count, 1)) + up

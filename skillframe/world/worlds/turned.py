@@ -42,9 +42,14 @@ def _geom(geom: Geom, turn: Float) -> Geom:
 def _task(task: Task, turn: Float) -> Task:
     starts = []
     for start in task.starts:
-        offset = turn @ np.array([start.get(f"start.offset_{a}", 0.0) for a in "xyz"])
-        starts.append({f"start.offset_{a}": float(offset[i]) for i, a in enumerate("xyz")})
-    return replace(task, direction=_vector(turn @ np.array(task.direction)), starts=tuple(starts))
+        moved: dict[str, float] = {}
+        for kind in ("offset", "tilt"):
+            if kind == "offset" or any(key.startswith("start.tilt_") for key in start):
+                vector = turn @ np.array([start.get(f"start.{kind}_{a}", 0.0) for a in "xyz"])
+                moved |= {f"start.{kind}_{a}": float(vector[i]) for i, a in enumerate("xyz")}
+        starts.append(moved)
+    way = None if task.turn is None else _vector(turn @ np.array(task.turn))
+    return replace(task, direction=_vector(turn @ np.array(task.direction)), turn=way, starts=tuple(starts))
 
 
 def _seen(look: Callable[[State], _T], turn: Float) -> Callable[[State], _T]:

@@ -1,4 +1,4 @@
-"""Worlds that can be turned as a whole: a hump to pass and a pit of several faces."""
+"""Worlds that can be turned as a whole: a hump to pass, a pit of several faces and a bayonet."""
 
 from __future__ import annotations
 
@@ -15,18 +15,19 @@ from skillframe.world.scene import State
 RECORDS = {record.name: record for record in world_types()}
 TURN = (0.7, -1.9, 1.1)
 STEPS, SKEW = {"steps": radians(18.0), "friction": 0.2, "slope": radians(48.0)}, {"skew": radians(16.0)}
+CASES = [("hump", {}), ("hump", STEPS), ("hump", SKEW), ("pit", {}), ("bayonet", {})]
 
 
 def scene(world, **params):
     return make_scene(RECORDS[world], params)
 
 
-def at(*tips):
-    count = len(tips)
-    return State(Pose(np.array(tips), np.broadcast_to(np.eye(3), (count, 3, 3))), np.zeros((count, 6)))
+def at(*tips, attitude=None):
+    count, attitude = len(tips), np.eye(3) if attitude is None else attitude
+    return State(Pose(np.array(tips), np.broadcast_to(attitude, (count, 3, 3))), np.zeros((count, 6)))
 
 
-@pytest.mark.parametrize(("world", "params"), [("hump", {}), ("hump", STEPS), ("hump", SKEW), ("pit", {})])
+@pytest.mark.parametrize(("world", "params"), CASES)
 def test_a_turned_scene_is_the_same_scene_seen_from_elsewhere(world, params):
     plain, turned, turn = scene(world, **params), scene(world, **params, turn=TURN), rotation_matrix(np.array(TURN))
     np.testing.assert_allclose(turned.task.direction, turn @ plain.task.direction, atol=1e-12)
@@ -34,11 +35,12 @@ def test_a_turned_scene_is_the_same_scene_seen_from_elsewhere(world, params):
     for a, b in zip(plain.fixture, turned.fixture, strict=True):
         np.testing.assert_allclose(b.position, turn @ a.position, atol=1e-12)
     tips = np.random.default_rng(0).uniform(-0.03, 0.05, (50, 3))
-    np.testing.assert_array_equal(turned.goal(at(*(tips @ turn.T))), plain.goal(at(*tips)))
-    np.testing.assert_allclose(turned.goal_error(at(*(tips @ turn.T)))[0], plain.goal_error(at(*tips))[0], atol=1e-12)
+    np.testing.assert_array_equal(turned.goal(at(*(tips @ turn.T), attitude=turn)), plain.goal(at(*tips)))
+    far = turned.goal_error(at(*(tips @ turn.T), attitude=turn))[0]
+    np.testing.assert_allclose(far, plain.goal_error(at(*tips))[0], atol=1e-12)
 
 
-@pytest.mark.parametrize(("world", "params"), [("hump", {}), ("hump", STEPS), ("hump", SKEW), ("pit", {})])
+@pytest.mark.parametrize(("world", "params"), CASES)
 def test_no_start_in_a_turned_fixture_touches_anything_and_none_is_a_goal(plant, world, params):
     for start in scene(world, **params, turn=TURN).task.starts:
         now = plant("free_tool", world, start, **params, turn=TURN)
@@ -70,3 +72,37 @@ def test_the_pit_s_goal_is_the_ball_on_every_face():
     assert found.goal(at(centre))[0] and found.goal_error(at(centre))[0][0] < 1e-12
     assert not found.goal(at(centre + 0.002 * n[0], centre + 0.002 * n[1], centre + 0.002 * n[2])).any()
     np.testing.assert_allclose(found.goal_error(at(centre + 0.002 * n[2]))[0], 0.002, rtol=1e-6)
+
+
+def test_a_turned_bayonet_s_turn_and_starts_are_turned_with_it():
+    plain, there, turn = scene("bayonet"), scene("bayonet", turn=TURN), rotation_matrix(np.array(TURN))
+    np.testing.assert_allclose(there.task.turn, turn @ plain.task.turn, atol=1e-12)
+    for a, b in zip(plain.task.starts, there.task.starts, strict=True):
+        tilts = [[start.get(f"start.tilt_{axis}", 0.0) for axis in "xyz"] for start in (a, b)]
+        np.testing.assert_allclose(tilts[1], turn @ tilts[0], atol=1e-12)
+
+
+def test_a_bayonet_is_locked_when_both_pins_are_at_their_stops_on_the_bottom():
+    """A pin of 3 mm at 30 mm, 2 mm of play, 8 mm deep and 6 mm of lock."""
+    found, lead = scene("bayonet", lead=radians(80.0)), radians(80.0)
+    along = 0.006 + 0.002 + 0.008 * cos(lead) / sin(lead) + 0.006 - 0.003  # slot, the wall's foot, lock, less the pin
+    angle, height = np.arcsin(along / 0.03), -0.008 + 0.003
+
+    def state(turned, z, aside=0.0):
+        c, s = cos(turned), sin(turned)
+        rotation = np.array([[[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, -1.0]]])
+        return State(Pose(np.array([[0.0, aside, z]]), rotation), np.zeros((1, 6)))
+
+    assert found.goal(state(angle, height))[0] and found.goal_error(state(angle, height))[0][0] < 1e-12
+    assert found.goal_error(state(angle, height + 0.001))[0][0] == pytest.approx(0.001)
+    assert not found.goal(state(angle - 0.003 / 0.03, height))[0]  # both 3 mm short, 2 allowed
+    assert not found.goal(state(angle, height, aside=0.0025))[0]  # one pin is beyond, the other short
+    assert not found.goal(state(angle, height + 0.0025))[0]
+
+
+def test_a_bayonet_names_the_pushes_that_pass_and_refuses_a_lock_that_holds_nothing():
+    given = scene("bayonet", lead=radians(85.0), friction=0.2).analytic
+    assert given["least_push_angle_rad"] == pytest.approx(radians(85.0) + atan(0.2) - 0.5 * pi)
+    assert given["most_push_angle_rad"] == pytest.approx(0.5 * pi - atan(0.2))
+    with pytest.raises(InputError, match="lock > pin"):
+        scene("bayonet", lock=0.004)
