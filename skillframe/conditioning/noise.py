@@ -18,7 +18,7 @@ from skillframe.demonstration.record import Demonstration
 from skillframe.demonstration.stalls import alive as alive_samples
 from skillframe.errors import InputError
 from skillframe.frames import Float
-from skillframe.signals.kalman import WrenchModel, steady_gain
+from skillframe.signals.kalman import CHUNK, WrenchModel, chunks, steady_gain
 
 WINDOW, LEAST_SAMPLES = 0.25, 10
 FLOOR = np.repeat([1e-4, 1e-6], 3)
@@ -114,19 +114,25 @@ def estimate_model(time: Float, wrench: Float, alive: NDArray[np.bool_] | None =
 
 
 def _innovation_variance(corners: Float, wrench: Float, dt: float) -> Float:
-    """Mean squared one-step prediction error (C, 6) of the converged filters with these corners, run side by side."""
+    """Mean squared one-step prediction error (C, 6) of the converged filters with these corners, run side by side.
+
+    A long recording is cut into chunks that run side by side too. What a filter needs to settle in is left out of all
+    but the first.
+    """
     unit = np.ones((len(corners), 1))
-    model = unit * np.sqrt(dt) * (2.0 * np.pi * corners[:, None]) ** 2
-    gain = steady_gain(unit, model, dt)
-    value = np.broadcast_to(wrench[0], (len(corners), 6)).copy()
+    gain = steady_gain(unit, unit * np.sqrt(dt) * (2.0 * np.pi * corners[:, None]) ** 2, dt)
+    starts, rows = chunks(len(wrench))
+    counted = (rows >= starts[:, None]) & (rows < starts[:, None] + CHUNK) & (rows > 0)
+    value = np.broadcast_to(wrench[rows[:, 0], None], (len(rows), len(corners), 6)).copy()
     slope, total = np.zeros_like(value), np.zeros_like(value)
-    for measured in wrench[1:]:
+    for i in range(1, rows.shape[1]):
         value += dt * slope
-        error = measured - value
-        total += error**2
+        error = wrench[rows[:, i], None] - value
+        total += error**2 if counted[:, i].all() else error**2 * counted[:, i, None, None]
         value += gain.value * error
         slope += gain.slope * error
-    return total / max(1, len(wrench) - 1)
+    result: Float = total.sum(axis=0) / max(1, len(wrench) - 1)
+    return result
 
 
 def model_of(demonstration: Demonstration) -> WrenchModel:

@@ -10,8 +10,7 @@ converges to a constant (Anderson and Moore, Optimal Filtering, 1979), after whi
     w- = w + h s,     e = z - w-,     w = w- + k_1 e,     s = s + k_2 e                                   (1)
 
 It depends on \(q^2 h^3 / r^2\) alone, so on the corner frequency \(f = (q^2 / (r^2 h))^{1/4} / 2\pi\), and follows
-a ramp without lag. filterpy makes the filter over time and the smoother (offline); (1) runs in the loop and needs numpy
-only.
+a ramp without lag. (1) runs in the loop. Over a recording the gain is the time-varying one (`signals.over_time`).
 """
 
 from __future__ import annotations
@@ -20,13 +19,17 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skillframe.errors import SkillframeError
 from skillframe.frames import Float
+from skillframe.signals.over_time import run_filter, run_smoother
 
 FORCE_NOISE, TORQUE_NOISE, CORNER = 0.3, 0.02, 25.0
 """Noise of a wrist sensor on a moving robot [N, Nm] and a corner [Hz] at 1 kHz: our choice; 0.2-0.65 N are seen."""
-CHUNK, OVERLAP = 20_000, 2_000
+CHUNK, OVERLAP = 4_000, 2_000
+TOGETHER = 64
+"""Chunks that are filtered side by side, so that memory does not grow with length: some 200 MB for the smoother."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,6 +147,13 @@ class SteadyWrenchFilter:
         return self._value.copy()
 
 
+def chunks(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First samples (K,) of chunks of a recording, and the rows (K, L) of each with its overlaps, all of one length."""
+    starts = np.arange(0, count, CHUNK)
+    length = min(count, CHUNK + 2 * OVERLAP)
+    return starts, np.clip(starts - OVERLAP, 0, count - length)[:, None] + np.arange(length)
+
+
 class WrenchFilter:
     """The design: a wrench model at a sample time, as filterpy's filter and as its converged gain.
 
@@ -188,23 +198,15 @@ class WrenchFilter:
         return self._over(time, wrench, smooth=True)
 
     def _over(self, time: Float, wrench: Float, smooth: bool) -> Float:
-        """In chunks that overlap by far more than the filter's memory, so that memory does not grow with length."""
+        """In chunks that overlap by far more than the filter's memory, side by side: a step is one for all chunks."""
+        starts, rows = chunks(len(time))
+        first = rows[:, 0]
+        run = run_smoother if smooth else run_filter
         result = np.empty_like(wrench, dtype=float)
-        for start in range(0, len(time), CHUNK):
-            first, last = max(0, start - OVERLAP), min(len(time), start + CHUNK + OVERLAP)
-            part = self._chunk(time[first:last], wrench[first:last], smooth)
-            stop = min(len(time), start + CHUNK)
-            result[start:stop] = part[start - first : stop - first]
+        for some in np.array_split(np.arange(len(starts)), -(-len(starts) // TOGETHER)):
+            steps = np.concatenate([np.full((len(some), 1), self.dt), np.diff(time[rows[some]], axis=1)], axis=1)
+            parts = run(self.model, self.dt, steps, wrench[rows[some]])
+            for k, part in zip(some.tolist(), parts, strict=True):
+                stop = min(len(time), int(starts[k]) + CHUNK)
+                result[starts[k] : stop] = part[starts[k] - first[k] : stop - first[k]]
         return result
-
-    def _chunk(self, time: Float, wrench: Float, smooth: bool) -> Float:
-        kalman = self.kalman()
-        kalman.x = np.kron(wrench[0], [1.0, 0.0])[:, None]
-        matrices = {dt: self._matrices(dt) for dt in np.unique(np.diff(time))}
-        steps = [self.dt, *np.diff(time)]
-        matrices.setdefault(self.dt, self._matrices(self.dt))
-        fs, qs = [matrices[dt][0] for dt in steps], [matrices[dt][1] for dt in steps]
-        means, covariances, _, _ = kalman.batch_filter(list(wrench[:, :, None]), Fs=fs, Qs=qs)
-        if smooth:
-            means = kalman.rts_smoother(means, covariances, Fs=fs, Qs=qs)[0]
-        return np.asarray(means)[:, ::2, 0]
