@@ -25,6 +25,22 @@ DEPTH, SECONDS = 0.07, 9.0
 LIMIT = 15e3
 """[N] of the crane that ships."""
 
+IN_TIME = 0.2
+"""[s] of the rule: a fault ends its trial with its own reason within that, or is survived within limits."""
+WORDS = {
+    "pressure frozen": r"sensor: pressure_a of {piston} repeats [\d.]+ bar to the bit",
+    "pressure zero": r"sensor: pressure_a of {piston} (repeats 0 bar to the bit|reads .* below the return line's 10)",
+    "encoder step": r"sensor: the encoder of {joint} jumps by 0\.05\d* within a tick|.* jumps by 0\.049\d* within",
+    "encoder frozen": r"sensor: the encoder of {joint} repeats [-\d.]+ to the bit",
+    "stuck": r"watchdog: .* of {piston} ",
+    "runaway, extends": r"watchdog: .* of {piston} ",
+    "runaway, retracts": r"watchdog: .* of {piston} ",
+    "burst a": r"watchdog: the oil of {piston} does not balance: in 0\.1 s chamber a \d+ cm3 less",
+    "burst b": r"watchdog: the oil of {piston} does not balance: in 0\.1 s .*chamber b \d+ cm3 less",
+    "supply loss": r"watchdog: .* of (lift_piston|tilt_piston|extension) ",
+}
+"""How the reason of a fault begins, with the name of what broke. A lost supply starves any of them."""
+
 
 class Struck(NamedTuple):
     """A trial in which something broke.
@@ -90,7 +106,21 @@ def together(
         )  # fmt: skip
 
 
+def own_reason(one: Struck) -> bool:
+    """Did a sensor's check or a watchdog end it, and name the part that broke?"""
+    piston = one.cylinder if one.cylinder == CYLINDERS[2] else f"{one.cylinder}_piston"
+    words = WORDS[one.kind].format(joint=one.cylinder, piston=piston)
+    return one.ended in ("sensor", "watchdog") and re.match(words, one.reason) is not None
+
+
+def verdict(one: Struck) -> str:
+    """By the rule: "in time" with its own reason, "survived" without a force above the limit, or "neither"."""
+    if own_reason(one) and one.after <= IN_TIME:
+        return "in time"
+    held = one.force <= LIMIT and one.ended not in ("force", "true_force")
+    return "survived" if held else "neither"
+
+
 def fine(one: Struck) -> bool:
-    """Its own reason within 0.2 s, or no force above the limit until it ended."""
-    named = one.ended in ("sensor", "watchdog") and one.after <= 0.2
-    return named or (one.force <= LIMIT and one.ended not in ("force", "true_force"))
+    """Does it keep the rule?"""
+    return verdict(one) != "neither"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from skillframe_papers.rows import crane_runs
 
-from tests.figures.crane_faults import DEPTH, KINDS, LIMIT, SECONDS, Struck, conditions, fine, struck
+from tests.figures.crane_faults import DEPTH, KINDS, LIMIT, SECONDS, Struck, conditions, fine, struck, verdict
 from tests.figures.teaching import row
 from tests.fmu_cache import own_cache  # noqa: F401
 
@@ -23,7 +23,8 @@ def show(trials: list[Struck]) -> None:
     kind, codes = trials[0].kind, Counter(one.ended for one in trials)
     after = np.array([one.after for one in trials if one.ended in ("sensor", "watchdog")])
     last = f"to stop {np.median(after):.3f} s, {after.max():.3f} at most" if len(after) else "never stopped"
-    row(kind, dict(codes), last, f"largest true force {max(one.force for one in trials):.0f} N")
+    rule, force = dict(Counter(map(verdict, trials))), max(one.force for one in trials)
+    row(kind, rule, dict(codes), last, f"largest true force {force:.0f} N")
 
 
 @pytest.mark.parametrize("kind", KINDS)
