@@ -105,7 +105,7 @@ def rows(show):
         print("crane: no C compiler here")
         return
     best, mean = timed(1)
-    show("crane, one run: real time, fastest 0.25 s in contact", best, "x", 6.0, below=False)
+    show("crane, one run: real time, fastest 0.25 s in contact", best, "x", 10.0, below=False)
     show("crane, one run: real time, mean", mean, "x")
     with uncompiled():
         best, mean = timed(1)
