@@ -14,6 +14,7 @@ from skillframe_lmc.phase import speed
 from skillframe_lmc.runtime import build
 
 from skillframe.errors import InputError
+from skillframe.execution.prepare import load_robot_model, load_world, prepare
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, Pose, norm, rotation_matrix, rotation_vector, unit
 from skillframe.skill import Command, Observation, Skill, Status
@@ -102,6 +103,10 @@ def test_a_slow_arm_is_told_the_speed_of_the_push_and_nothing_where_there_is_non
     pushing["phases"][0]["translation"]["speed"] = 0.013
     turning["phases"][0]["translation"] = part(None, 0.0, [], 1000.0)
     assert (speed(pushing), speed(turning)) == (0.013, None)
+    pushing["type"] = "lmc"
+    _, setup = prepare(load_robot_model("ur5e_position"), load_world("valley", {}), pushing, "tip")
+    assert setup.skill_speed == 0.013
+    assert setup.pace == pytest.approx(0.013 / setup.robot.spec.control.admittance.speed)
 
 
 def test_a_turn_advances_about_its_axis_at_the_learned_speed() -> None:
