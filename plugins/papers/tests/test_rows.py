@@ -6,10 +6,11 @@ from math import atan, degrees, radians
 import numpy as np
 import pytest
 from skillframe_papers import bars, committed, document, refresh, store
-from skillframe_papers.rows import crane, nulls, skills
+from skillframe_papers.rows import crane, lmc, nulls, skills
 from skillframe_papers.rows.uneven import Valley, valley_scene
 
 from skillframe.demonstration.record import Demonstration
+from skillframe.extend.records import RowRun
 from skillframe.frames import Pose
 from skillframe.world.scene import State
 
@@ -90,6 +91,42 @@ def test_a_verdict_on_several_shares_is_the_worst_of_them_and_fails_beside_a_nul
     assert bars.together(["pass", "pass"], True) == "pass" and bars.together(["pass"], False) == "fail"
     assert bars.together(["pass", "reported"], True) == "reported"
     assert bars.together(["reported", "fail"], True) == "fail"
+
+
+def fake_document(number, fully=False):
+    part = {"desired_direction": [0.0, 0.0, -1.0], "compliant_axes": [[1.0, 0.0, 0.0]], "fully_compliant": fully,
+            "evidence": {"work_environment_j": 1.0, "work_teacher_j": 0.0}}  # fmt: skip
+    turn = {**part, "desired_direction": None, "fully_compliant": False}
+    return {"number": number, "phases": [{"translation": part, "rotation": turn}]}
+
+
+@pytest.mark.parametrize(("flange", "rigid", "expected"), [(True, False, "pass"), (False, False, "fail"),
+                                                          (True, True, "fail")])  # fmt: skip
+def test_the_coupler_s_row_fails_if_a_pair_tips_over_or_a_stiff_one_aligns_as_well(
+    flange, rigid, expected, monkeypatch
+):
+    monkeypatch.setattr(lmc, "_taught", lambda job, world, params, pairs, each=2: ([()] * pairs, "0"))
+    monkeypatch.setattr(lmc, "_documents", lambda groups: [fake_document(i) for i in range(len(groups))])
+    monkeypatch.setattr(lmc, "stiff", lambda document, part, stiffness: {"number": "stiff"})
+    monkeypatch.setattr(lmc, "by_hand", lambda **given: {"number": "hand"})
+    monkeypatch.setattr(lmc, "pictures", lambda document: [])
+    monkeypatch.setattr(lmc, "_align", lambda job, params, document, coc: [
+        rigid if document["number"] == "stiff" else flange or document["number"] != 3] * 2)  # fmt: skip
+    assert lmc.hose(RowRun(settings={"world.friction": 0.2})).verdict == expected
+
+
+def test_pushes_are_told_by_how_far_they_are_off_where_they_align_and_where_not():
+    pushes = [{"desired_direction": [np.sin(t), 0.0, -np.cos(t)]} for t in np.radians([1.0, -2.0, 4.0])]
+    told = lmc._lever(pushes, [True, True, False])
+    assert "align 1.0 to 2.0, where they do not 4.0 to 4.0." in told
+    assert "up to 11.3 degrees, of which 8 are the start's: 3.3 are left" in told  # atan(30 / 150)
+
+
+@pytest.mark.parametrize(("ours", "null", "expected"), [(20, 10, "pass"), (20, 19, "fail"), (17, 5, "reported"),
+                                                       (10, 0, "fail")])  # fmt: skip
+def test_an_executed_skill_is_judged_by_its_count_and_by_its_lead_over_the_null(ours, null, expected):
+    found = {name: skills.Ran(np.arange(20)[None] < hits) for name, hits in (("learned", ours), ("stiff", null))}
+    assert skills._judged(RowRun(settings={}), found, "stiff", "runs", "").verdict == expected
 
 
 def test_a_tool_that_is_late_is_off_by_the_path_s_largest_speed():

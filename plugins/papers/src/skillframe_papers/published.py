@@ -58,7 +58,8 @@ def _learning_from_force() -> Iterable[RowType]:
         name="4", topic=topic,
         summary="hose coupler: a push, no turn; one compliant axis each; aligned from both starts",
         published="translation yes, rotation no; 1 + 1 axes; both starts aligned", source=OVERVIEW,
-        bar="the same in 95 % of the pairs, and both starts of every pair that is run, steered at the flange",
+        bar="the same in 95 % of the pairs (by count), and both starts of every pair, steered at the flange, but not "
+        "so if stiff in rotation",
         settings=NOISE,
         run=Lazy("skillframe_papers.rows.lmc:hose"),
     )  # fmt: skip

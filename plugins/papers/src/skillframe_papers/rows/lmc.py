@@ -23,20 +23,14 @@ from skillframe.extend.registry import registry
 from skillframe.frames import Float
 from skillframe.teaching.sessions import record
 from skillframe.teaching.teacher import TeacherSettings
-from skillframe_papers.bars import reached
+from skillframe_papers.bars import counted, reached
+from skillframe_papers.rows.skills import STIFF_TURN_NM_RAD, WRIST, by_hand, stiff
 
 DOWN, X, Y = np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 SHARE = 0.95
 REDRAWN = "demonstrations that failed and were redrawn"
 START_DEG = 8.0
 FACE_M, LEVER_M = 0.030, 0.150
-LEVER = (
-    "The verdict takes the flange, where the paper has its tool point and centre of compliance. Ours lies 150 mm "
-    "behind a face of 30 mm radius: from 8 degrees the edge touches only 9 mm beside the line of the push, so that a "
-    f"learned push {degrees(atan(FACE_M / LEVER_M)) - START_DEG:.1f} degrees off to that side tips the coupler over "
-    "instead of flush; two demonstrations with this "
-    "noise of the aim leave more than that in some pairs. Steered at the tip, the push has its full lever."
-)
 
 
 def _taught(
@@ -103,6 +97,8 @@ def sector_width(job: RowRun) -> RowResult:
         verdict="pass" if worst <= 1.0 else "fail", values={"largest_difference_deg": worst},
         head=("friction", "90 - atan(friction) [degrees]", "median width [degrees]", "over demonstrations [degrees]"),
         rows=rows,
+        difference="Null: a sector of 90 degrees, which knows of no friction, is off by up to "
+        f"{degrees(atan(2.0 * middle)):.1f} degrees.",
     )  # fmt: skip
 
 
@@ -150,6 +146,8 @@ def valley_boundary(job: RowRun) -> RowResult:
         verdict="pass" if worst <= 2.0 else "fail", values={"largest_difference_deg": worst},
         head=("friction", "slope - atan(friction) [degrees]", "from one side [degrees]", "from the other [degrees]"),
         rows=rows,
+        difference="Null: the slope itself, which knows of no friction, is off by up to "
+        f"{degrees(atan(2.0 * middle)):.1f} degrees.",
     )  # fmt: skip
 
 
@@ -164,22 +162,43 @@ def hose(job: RowRun) -> RowResult:
         and len(p["compliant_axes"]) == len(t["compliant_axes"]) == 1
         for p, t in zip(pushes, turns, strict=True)
     )  # fmt: skip
-    run = documents[: job.count(12, 3)]
-    both = {coc: sum(all(_align(job, params, document, coc)) for document in run) for coc in (None, "tip")}
-    passed = reached(as_told, pairs, SHARE, quick=job.quick) and both[None] == len(run)
-    rows = [
-        ("flags and counts as published", f"{as_told} of {pairs} pairs"),
-        ("aligned from +8 and -8 degrees, steered at the flange as in the paper", f"{both[None]} of {len(run)} pairs"),
-        ("the same skills, steered at the tip (its face)", f"{both['tip']} of {len(run)} pairs"),
-        (REDRAWN, failed),
-    ]
+    rigid_ones = [stiff(each, "rotation", STIFF_TURN_NM_RAD) for each in documents]
+    given: dict[str, tuple[list[Document], str | None]] = {
+        "learned, steered at the flange as in the paper": (documents, None),
+        "learned, steered at the tip": (documents, "tip"),
+        "the same, stiff in rotation, at the flange": (rigid_ones, None),
+        "by hand: straight down, free along x, turning about y": ([by_hand(turn="y", at=WRIST)], "wrist"),
+    }  # fmt: skip
+    flush = {name: [all(_align(job, params, d, coc)) for d in made] for name, (made, coc) in given.items()}
+    flange, tip, rigid, straight = flush.values()
+    passed = reached(as_told, pairs, SHARE, quick=job.quick) and all(flange) and not all(rigid)
+    rows = [("flags and counts as published", counted(as_told, pairs))]
+    rows += [(f"aligned from +8 and -8 degrees: {name}", counted(sum(f), len(f))) for name, f in flush.items()]
     return RowResult(
-        ours=f"as published in {as_told} of {pairs} pairs; both starts aligned with {both[None]} of {len(run)} steered "
-        f"at the flange, {both['tip']} at the tip",
-        verdict="pass" if passed else "fail", head=("", "ours"), rows=rows, pictures=pictures(documents[0]),
-        difference="" if both[None] == len(run) else LEVER,
-        values={"as_published": as_told / pairs, "aligned": both[None] / len(run), "tip": both["tip"] / len(run)},
+        ours=f"as published in {counted(as_told, pairs)} pairs; both starts aligned with {counted(sum(flange), pairs)} "
+        f"steered at the flange, {sum(tip)} at the tip",
+        verdict="pass" if passed else "fail", head=("", "pairs"), rows=[*rows, (REDRAWN, failed)],
+        pictures=pictures(documents[0]),
+        difference=f"{_lever(pushes, flange)} Nulls, both starts aligned: stiff in rotation {sum(rigid)} of {pairs}; a "
+        f"push by hand {'yes' if straight[0] else 'no'}.",
+        values={"as_published": as_told / pairs, "aligned": sum(flange) / pairs, "tip": sum(tip) / pairs},
     )  # fmt: skip
+
+
+def _lever(pushes: Sequence[dict[str, Any]], flush: Sequence[bool]) -> str:
+    """How far the pushes of pairs that align are off, and of those that do not, in the plane of the tilt."""
+    push = np.array([p["desired_direction"] or (np.nan,) * 3 for p in pushes])
+    off, good = np.abs(np.degrees(np.arctan2(push[:, 0], -push[:, 2]))), np.array(flush)
+    told = [
+        f"{what} {off[which].min():.1f} to {off[which].max():.1f}"
+        for what, which in (("align", good), ("do not", ~good)) if which.any()
+    ]  # fmt: skip
+    most = degrees(atan(FACE_M / LEVER_M))
+    return (
+        f"Pushes are off by so many degrees in the plane of the tilt where starts {', where they '.join(told)}. The "
+        f"flange lies {1e3 * LEVER_M:g} mm behind a face of {1e3 * FACE_M:g} mm radius, so that a push rights the "
+        f"coupler up to {most:.1f} degrees, of which {START_DEG:g} are the start's: {most - START_DEG:.1f} are left."
+    )
 
 
 def _align(job: RowRun, params: dict[str, Any], document: Document, coc: str | None) -> list[bool]:

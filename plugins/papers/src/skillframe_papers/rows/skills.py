@@ -31,7 +31,7 @@ SHARE = 0.9
 REACH_M = 0.06
 TILTS_DEG = (4.0, 8.0, 12.0)
 WRIST, TIP = [0.0, 0.0, 0.0], [0.0, 0.0, 0.2]
-STIFF_N_M, STIFF_NM_RAD = 1000.0, 20.0
+STIFF_N_M, STIFF_NM_RAD, STIFF_TURN_NM_RAD = 1000.0, 20.0, 100.0
 
 
 class Ran(NamedTuple):
