@@ -7,6 +7,7 @@ import pytest
 from skillframe_baselines.acp import Estimator
 
 from plugins.baselines.tests.demonstrations import GOAL, approach, both_sides
+from skillframe.demonstration.record import Demonstration
 from skillframe.document.source import learned
 from skillframe.errors import InputError
 from skillframe.extend.records import LearnOptions
@@ -74,6 +75,16 @@ def test_at_the_end_it_presses_as_the_demonstrations_did():
     # the noise tips the force by 0.05 / 8 rad, and 2000 N/m times its square is far below 1 N/m
     assert stiffness[2, 2] == pytest.approx(200.0, abs=1.0) and stiffness[0, 0] == pytest.approx(2000.0, abs=1.0)
     assert not last.feedforward.any()
+
+
+def test_the_force_is_the_mean_of_the_demonstrations():
+    hard, other = both_sides()
+    soft = Demonstration(
+        time=other.time, position=other.position, quaternion=other.quaternion, wrench=0.25 * other.wrench
+    )
+    last = played(learn([hard, soft]), [0.0, 2.29])[-1]
+    # (8 + 2) / 2 = 5 N over 200 N/m, as above
+    assert last.pose.position[0, 2] - GOAL[2] == pytest.approx(-0.025, abs=1.5e-3)
 
 
 def test_before_contact_it_is_a_stiff_motion_that_starts_where_the_tool_is():
