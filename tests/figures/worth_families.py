@@ -75,11 +75,11 @@ def starts(scene: Scene, turn: Float, rng: np.random.Generator, count: int, lift
     if scene.name == "hump":
         before = rng.choice([0.012, 0.030, 0.040, 0.055], count) if not lift else rng.uniform(0.012, 0.055, count)
         return np.column_stack([0.03 - before, np.zeros(count), np.full(count, lift)]) @ turn.T
+    if scene.name == "bayonet":
+        return np.tile(-lift * np.array(scene.task.direction), (count, 1))
     if not scene.params["slopes"][0]:  # a slide
         along, aside = rng.uniform(0.03, 0.06, count), rng.uniform(0.004, 0.025, count)
         return np.column_stack([-along, -aside, np.full(count, lift)]) @ turn.T
-    if scene.name == "bayonet":
-        return np.tile(-lift * np.array(scene.task.direction), (count, 1))
     nominal = np.array([[s.get(f"start.offset_{a}", 0.0) for a in "xyz"] for s in scene.task.starts])
     up = -lift * np.array(scene.task.direction)
     return nominal[rng.integers(len(nominal), size=count)] * rng.uniform(0.5, 1.2, (count, 1)) + up
@@ -128,6 +128,7 @@ def _attempt(scene: Scene, people: list[Person], begin: list[Float], rng: np.ran
         robot=robot.guided(), scene=scene, center_of_compliance=np.array(scene.tool.frames["grip"]),
         filter_wrench=False, stop_when=scene.goal,
     )  # fmt: skip
-    hands = People(scene.task, fixture_poses(robot, draws, len(people)), people)
+    most = TeacherSettings(force_max=GENTLE_N.get(scene.name, TeacherSettings().force_max))
+    hands = People(scene.task, fixture_poses(robot, draws, len(people)), people, most)
     result = simulate(hands, setup, draws, rng.spawn(len(people)), duration_s=12.0, trace_hz=500.0)
     return result.traces, result.success
