@@ -59,18 +59,22 @@ def build_source(source: Path) -> Path | None:
     return build_library(source.stem, source.read_text(encoding="utf-8"))
 
 
-def build_library(name: str, text: str) -> Path | None:
-    """The shared library of C text, from the cache if it is there, or None where it cannot be built."""
+def build_library(name: str, text: str, include: Path | None = None) -> Path | None:
+    """The shared library of C text, from the cache if it is there, or None where it cannot be built.
+
+    `include` is a folder with headers of others; what they are is not part of the key, so the text has to say it.
+    """
     compiler = find_compiler()
     if compiler is None:
         return None
+    extra = [] if include is None else ["-I", str(include)]
     library = cache_dir(name) / _digest(text, " ".join([*compiler, *FLAGS]))[:24] / f"{name}.so"
     if not library.is_file():
         library.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=library.parent) as work:
             (Path(work) / f"{name}.c").write_text(text, encoding="utf-8")
             try:
-                compile_library([f"{name}.c"], f"{name}.so", Path(work))
+                compile_library([f"{name}.c"], f"{name}.so", Path(work), extra)
             except CompilerFailed:
                 return None
             os.replace(Path(work) / f"{name}.so", library)

@@ -101,22 +101,32 @@ def check_walls(fit: PartsFit, plug: MeshPart, socket: MeshPart) -> None:
             raise InputError(part.name, what, "a part could be pushed through it; make it thicker")
 
 
-def check_pieces(pieces: ConvexPieces, fit: PartsFit, part: MeshPart) -> None:
-    """Refuse a part that convex pieces do not hold well enough.
-
-    Raises:
-        InputError: says how many pieces or which error.
-    """
+def unfit_pieces(pieces: ConvexPieces, fit: PartsFit, part: MeshPart) -> InputError | None:
+    """Why convex pieces do not hold a part well enough, how many it takes or which error, or None."""
     allowed = 1000.0 * SHARE * fit.clearance
     limit = f"{allowed:.2g} mm, a quarter of the clearance"
     fix = "leave out roundings that do not touch, or draw it as extrusions"
     if not pieces.hulls:
-        raise InputError(part.name, f"is too curved to be cut into convex pieces within {limit}", fix)
+        return InputError(part.name, f"is too curved to be cut into convex pieces within {limit}", fix)
     if len(pieces.hulls) > MOST_PIECES:
         what = f"takes {len(pieces.hulls)} convex pieces to stay within {limit}, and {MOST_PIECES} are the most"
-        raise InputError(part.name, what, fix)
+        return InputError(part.name, what, fix)
     if pieces.error > SHARE * fit.clearance:
-        what = (
-            f"its contact error is {1000.0 * pieces.error:.2g} mm: more than {limit} of {1000.0 * fit.clearance:.2g} mm"
-        )
-        raise InputError(part.name, what, f"jam angles would not be right; {fix}")
+        return InputError(part.name, *_inexact(pieces.error, fit, fix))
+    return None
+
+
+def check_error(error: float, fit: PartsFit, part: MeshPart) -> None:
+    """Refuse a part whose contact is less exact than its play needs.
+
+    Raises:
+        InputError: says how exact.
+    """
+    if error > SHARE * fit.clearance:
+        raise InputError(part.name, *_inexact(error, fit, "give the hole more play"))
+
+
+def _inexact(error: float, fit: PartsFit, fix: str) -> tuple[str, str]:
+    allowed, play = 1000.0 * SHARE * fit.clearance, 1000.0 * fit.clearance
+    what = f"its contact error is {1000.0 * error:.2g} mm: more than {allowed:.2g} mm, a quarter of the clearance "
+    return f"{what}of {play:.2g} mm", f"jam angles would not be right; {fix}"

@@ -7,7 +7,7 @@ from typing import Any
 
 from skillframe.errors import InputError
 from skillframe.parts.checks import SHARE
-from skillframe.parts.load import CutPart, LoadedParts
+from skillframe.parts.load import LoadedParts, PreparedPart
 
 FILE = """\
 # Two parts that are put together. skillframe worlds check {name} says what is found in them.
@@ -55,9 +55,10 @@ def values(loaded: LoadedParts) -> dict[str, Any]:
     found = loaded.fit
     return {
         "name": loaded.name, "axis": list(found.axis), "depth_m": found.depth, "clearance_m": found.clearance,
-        "least_clearance_m": float(found.gaps.min()), "backend": "pieces",
-        "contact_error_m": max(loaded.plug.pieces.error, loaded.socket.pieces.error),
-        "pieces": {"tool": len(loaded.plug.pieces.hulls), "fixture": len(loaded.socket.pieces.hulls)},
+        "least_clearance_m": float(found.gaps.min()), "backend": loaded.backend,
+        "contact_error_m": loaded.contact_error,
+        "pieces": {"tool": _count(loaded.plug), "fixture": _count(loaded.socket)},
+        "memory_bytes": loaded.plug.memory + loaded.socket.memory,
         "mass_kg": loaded.mass, "notes": list(loaded.notes), "sha256": dict(loaded.hashes),
     }  # fmt: skip
 
@@ -67,18 +68,33 @@ def lines(loaded: LoadedParts) -> list[str]:
     found = loaded.fit
     out = ", ".join(f"{-x + 0.0:g}" for x in found.axis)
     least, play = (1000.0 * x for x in (float(found.gaps.min()), found.clearance))
-    error = 1e6 * max(loaded.plug.pieces.error, loaded.socket.pieces.error)
     plug, socket = loaded.file.tool.mesh, loaded.file.fixture.mesh
     return [
         f"{plug} goes {1000.0 * found.depth:.3g} mm deep into {socket} and comes out along ({out})",
         f"clearance along the way {play:.3g} mm (median; least {least:.3g} mm)",
-        f"contact by convex pieces: {_pieces(loaded.plug)} of {plug}, {_pieces(loaded.socket)} of {socket}; "
-        f"contact error {error:.2g} um (at most {1e6 * SHARE * found.clearance:.3g} um is let pass)",
+        f"contact by {_contact(loaded)}; contact error {1e6 * loaded.contact_error:.2g} um "
+        f"(at most {1e6 * SHARE * found.clearance:.3g} um is let pass)",
         f"{plug} weighs {1000.0 * loaded.mass:.3g} g",
         *(f"note: {note}" for note in loaded.notes),
     ]  # fmt: skip
 
 
-def _pieces(side: CutPart) -> str:
+def _contact(loaded: LoadedParts) -> str:
+    plug, socket = loaded.file.tool.mesh, loaded.file.fixture.mesh
+    if loaded.backend == "pieces":
+        return f"convex pieces: {_pieces(loaded.plug)} of {plug}, {_pieces(loaded.socket)} of {socket}"
+    grids = [side.surface for side in (loaded.plug, loaded.socket) if side.surface is not None]
+    cells = ", ".join(f"{1000.0 * surface.grids[0].cell:.2g}" for surface in grids)
+    points = sum(len(surface.points) for surface in grids)
+    memory = (loaded.plug.memory + loaded.socket.memory) / 1e6
+    return f"our own generator: {points:,} points in grids of {cells} mm, {memory:.0f} MB"
+
+
+def _count(side: PreparedPart) -> int:
+    return 0 if side.pieces is None else len(side.pieces.hulls)
+
+
+def _pieces(side: PreparedPart) -> str:
+    assert side.pieces is not None
     more = " (of what the other part can reach)" if side.rest is not None else ""
     return f"{len(side.pieces.hulls)}{' after thinning' if side.pieces.thinned else ''}{more}"

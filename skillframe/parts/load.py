@@ -10,19 +10,23 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from skillframe.errors import InputError
 from skillframe.frames import Float
 from skillframe.parts.checks import (
     HEAVY,
     SHARE,
     check_clearance,
+    check_error,
     check_facets,
-    check_pieces,
     check_walls,
+    unfit_pieces,
 )
 from skillframe.parts.declared import DENSITY, FixtureFile, mesh_files, read_fixture
+from skillframe.parts.field import error_of, memory_of, surface_of
 from skillframe.parts.fit import PartsFit, corners, fit, lowest, tilted
 from skillframe.parts.pieces import MOST_PIECES, ConvexPieces, pieces_of
 from skillframe.parts.solid import MeshPart, arrays_of, read_part
+from skillframe.world.surfaces import Surface, available
 
 SIDEWAYS = 6e-3
 """How far beside the held part a cropped standing part is still touched [m]."""
@@ -31,16 +35,24 @@ _FREE = 1e-5
 _TRIES = (1.0, 0.75, 0.5, 0.25, 0.0)
 
 
-class CutPart(NamedTuple):
-    """A part as it collides and is drawn.
+class PreparedPart(NamedTuple):
+    """A part as it collides and is drawn, in the fixture frame, assembled.
 
     Attributes:
-        pieces: what it collides with, in the fixture frame, assembled.
+        solid: all of it.
+        error: of its contact [m].
+        pieces: what it collides with, or None where both parts have a surface.
         rest: the solid that is only drawn, because the other part cannot come there; None if all of it collides.
+        surface: what it collides with otherwise.
+        memory: bytes that the surface takes.
     """
 
-    pieces: ConvexPieces
-    rest: Any
+    solid: Any
+    error: float
+    pieces: ConvexPieces | None = None
+    rest: Any = None
+    surface: Surface | None = None
+    memory: int = 0
 
 
 class LoadedParts(NamedTuple):
@@ -59,14 +71,24 @@ class LoadedParts(NamedTuple):
     name: str
     file: FixtureFile
     fit: PartsFit
-    plug: CutPart
-    socket: CutPart
+    plug: PreparedPart
+    socket: PreparedPart
     mass: float
     center: Float
     inertia: Float
     starts: tuple[tuple[float, Float], ...]
     notes: tuple[str, ...]
     hashes: Mapping[str, str]
+
+    @property
+    def backend(self) -> str:
+        """How contact is made: "pieces" (convex pieces) or "surface" (our own contact generator)."""
+        return "pieces" if self.plug.pieces is not None else "surface"
+
+    @property
+    def contact_error(self) -> float:
+        """Of the worse of the two parts [m]."""
+        return max(self.plug.error, self.socket.error)
 
 
 def name_of(path: Path) -> str:
@@ -97,7 +119,7 @@ def _load(path: Path, hashes: tuple[tuple[str, str], ...]) -> LoadedParts:
     check_clearance(found)
     check_facets(found, plug, socket)
     check_walls(found, plug, socket)
-    held, standing = (_side(part, solid, found) for part, solid in ((plug, found.plug), (socket, found.socket)))
+    held, standing = _prepared(plug, socket, found)
     mass, center, inertia, notes = _inertia(found, plug, file)
     return LoadedParts(
         name_of(path), file, found, held, standing, mass, center, inertia, _starts(found, file),
@@ -105,7 +127,31 @@ def _load(path: Path, hashes: tuple[tuple[str, str], ...]) -> LoadedParts:
     )  # fmt: skip
 
 
-def _side(part: MeshPart, solid: Any, found: PartsFit) -> CutPart:
+def _prepared(plug: MeshPart, socket: MeshPart, found: PartsFit) -> tuple[PreparedPart, PreparedPart]:
+    """Both parts as convex pieces where these are exact enough, else both as surfaces.
+
+    Raises:
+        InputError: neither is, or there is no compiler for surfaces.
+    """
+    pairs = ((plug, found.plug), (socket, found.socket))
+    made = []
+    for part, solid in pairs:
+        side = _in_pieces(solid, found)
+        assert side.pieces is not None
+        refused = unfit_pieces(side.pieces, found, part)
+        if refused is not None and not available():
+            what = f"{refused.problem}, and without a C compiler there is no other contact"
+            raise InputError(part.name, what, refused.fix)
+        if refused is not None:
+            break
+        made.append(side)
+    else:
+        return made[0], made[1]
+    surfaces = [_as_surface(part, solid, found) for part, solid in pairs]
+    return surfaces[0], surfaces[1]
+
+
+def _in_pieces(solid: Any, found: PartsFit) -> PreparedPart:
     """The pieces of a whole part, or, where they are too many, of what the other part can reach of it."""
     allowed = SHARE * found.clearance
     pieces, rest = pieces_of(solid, allowed), None
@@ -114,8 +160,15 @@ def _side(part: MeshPart, solid: Any, found: PartsFit) -> CutPart:
         near = solid ^ box
         if not near.is_empty() and near.volume() < 0.999 * solid.volume():
             pieces, rest = pieces_of(near, allowed), solid - box
-    check_pieces(pieces, found, part)
-    return CutPart(pieces, rest)
+    return PreparedPart(solid, pieces.error, pieces, rest)
+
+
+def _as_surface(part: MeshPart, solid: Any, found: PartsFit) -> PreparedPart:
+    low, high = np.reshape(_reach(found).bounding_box(), (2, 3))
+    surface = surface_of(solid, low, high)
+    error = error_of(surface, low, high)
+    check_error(error, found, part)
+    return PreparedPart(solid, error, surface=surface, memory=memory_of(surface))
 
 
 def _reach(found: PartsFit) -> Any:

@@ -18,7 +18,7 @@ from skillframe.config.fields import require_ranges
 from skillframe.frames import Float, norm
 from skillframe.parts.declared import FixtureFile, read_fixture
 from skillframe.parts.fit import corners, lowest
-from skillframe.parts.load import CutPart, LoadedParts, load
+from skillframe.parts.load import LoadedParts, PreparedPart, load
 from skillframe.parts.solid import arrays_of
 from skillframe.world.scene import Geom, Scene, State, Task, Tool, Vector
 from skillframe.world.shapes import FIXTURE_COLOUR, TOOL_COLOUR, shaft
@@ -111,11 +111,11 @@ def build_world(path: Path, params: PartsParams) -> Scene:
 
 def stated(loaded: LoadedParts) -> dict[str, Any]:
     """What every result says of a world of a file besides its parameters: figures [m] and hashes."""
-    sides = (loaded.plug, loaded.socket)
+    pieces = [len(side.pieces.hulls) for side in (loaded.plug, loaded.socket) if side.pieces is not None]
     return {
-        "depth": loaded.fit.depth, "clearance": loaded.fit.clearance, "backend": "pieces",
-        "contact_error": max(side.pieces.error for side in sides),
-        "pieces": sum(len(side.pieces.hulls) for side in sides), "origin": [float(x) for x in loaded.fit.origin],
+        "depth": loaded.fit.depth, "clearance": loaded.fit.clearance, "backend": loaded.backend,
+        "contact_error": loaded.contact_error, "pieces": sum(pieces),
+        "origin": [float(x) for x in loaded.fit.origin],
         **{f"sha256 of {name}": value for name, value in loaded.hashes.items()},
     }  # fmt: skip
 
@@ -127,8 +127,13 @@ def _start(height: float, tilt: Float, params: PartsParams, points: Float) -> di
     return {"start.offset_z": beyond, **turned}
 
 
-def _geoms(side: CutPart, turn: Float, shift: Float, rgba: tuple[float, float, float, float]) -> tuple[Geom, ...]:
-    """The pieces of a part, which collide, and its rest, which is drawn."""
+def _geoms(side: PreparedPart, turn: Float, shift: Float, rgba: tuple[float, float, float, float]) -> tuple[Geom, ...]:
+    """What collides of a part, and its rest, which is drawn."""
+    if side.surface is not None:
+        vertices, faces = arrays_of(side.solid)
+        placed = dataclasses.replace(side.surface, turn=turn, shift=shift)
+        return (Geom(kind="mesh", vertices=vertices @ turn.T + shift, faces=faces, rgba=rgba, surface=placed),)
+    assert side.pieces is not None
     shapes = [(hull.vertices, hull.faces, True) for hull in side.pieces.hulls]
     if side.rest is not None and not side.rest.is_empty():
         shapes.append((*arrays_of(side.rest), False))

@@ -19,6 +19,7 @@ from skillframe.robot.model import RobotModel
 from skillframe.robot.mount import Mount
 from skillframe.world.loops import close_loops
 from skillframe.world.scene import Geom, Holder, Scene, Sprung, Tool
+from skillframe.world.surfaces import number_of
 
 TIMESTEP = 0.001
 SOLREF = (0.004, 1.0)  # 4 time steps, critically damped
@@ -210,8 +211,11 @@ def add_geom(
     if geom.kind == "mesh":
         assert geom.vertices is not None
         mesh = spec.add_mesh(name=f"{name}_mesh")
-        mesh.uservert = geom.vertices.ravel()
         made.meshname = mesh.name
+        if geom.surface is None:
+            mesh.uservert = geom.vertices.ravel()
+        else:
+            _add_surface(spec, mesh, made, geom)
     else:
         made.size[: len(geom.size)] = geom.size
     made.contype, made.conaffinity = (contype, conaffinity) if geom.collide else (0, 0)
@@ -220,3 +224,15 @@ def add_geom(
     made.solref = SOLREF
     made.solimp = SOLIMP
     made.mass = 0.0
+
+
+def _add_surface(spec: mujoco.MjSpec, mesh: Any, made: Any, geom: Geom) -> None:
+    """A geom that our contact generator knows by its number. Of its shape MuJoCo needs no more than a box around it."""
+    assert geom.vertices is not None
+    assert geom.surface is not None
+    low, high = geom.vertices.min(axis=0), geom.vertices.max(axis=0)
+    mesh.uservert = np.array([[(low, high)[(c >> x) & 1][x] for x in range(3)] for c in range(8)]).ravel()
+    mesh.needsdf, mesh.octree_maxdepth = True, 1
+    made.type = mujoco.mjtGeom.mjGEOM_SDF
+    spec.nuser_geom = 1
+    made.userdata = [float(number_of(geom.surface))]

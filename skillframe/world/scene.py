@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from skillframe.errors import InputError, UnknownName
 from skillframe.frames import Float, Pose
 from skillframe.robot.convexity import unfit_to_collide
+from skillframe.world.surfaces import Surface
 
 Vector = tuple[float, float, float]
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
@@ -32,6 +33,8 @@ class Geom:
         size: in MuJoCo's meaning for the kind; empty for a mesh.
         position: (3,) [m]; quaternion: x, y, z, w.
         vertices: (V, 3) of a convex mesh; faces: (F, 3) its triangles, closed; without them the hull is meant.
+        surface: of a mesh that collides as it is, convex or not, with others that have one, and with nothing else;
+            it lies in its body's frame, not turned or moved.
         collide: takes part in contact; a geom that does not is there to be seen.
         visible: is drawn.
     """
@@ -43,6 +46,7 @@ class Geom:
     rgba: tuple[float, float, float, float] = (0.6, 0.65, 0.7, 1.0)
     vertices: NDArray[np.float64] | None = None
     faces: NDArray[np.int64] | None = None
+    surface: Surface | None = None
     collide: bool = True
     visible: bool = True
 
@@ -215,5 +219,7 @@ def _check(geom: Geom, where: str) -> None:
         return
     if geom.vertices is None:
         raise InputError(where, "has no vertices", "give them as (V, 3) in metres")
-    if geom.collide and (unfit := unfit_to_collide(geom.vertices, geom.faces)):
+    if geom.surface is not None and (any(geom.position) or geom.quaternion != IDENTITY):
+        raise InputError(where, "has a surface and a place of its own", "turn and move the surface")
+    if geom.collide and geom.surface is None and (unfit := unfit_to_collide(geom.vertices, geom.faces)):
         raise InputError(where, *unfit)

@@ -1,12 +1,13 @@
-"""Contact of convex pieces against boxes: which tilted pegs jam and where, at two clearances."""
+"""Contact of pieces and of surfaces against boxes: which tilted pegs jam and where, at two clearances."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from skillframe.parts.field import error_of, surface_of
 from skillframe.parts.pieces import pieces_of
-from skillframe.parts.solid import solid_of
+from skillframe.parts.solid import arrays_of, solid_of
 from skillframe.world.scene import Geom
 from tests import part_meshes
 from tests.laws.pushing import Push
@@ -24,6 +25,25 @@ def of_pieces(nominal, clearance):
     assert max(each.error for each in found) < 1e-9  # exact: the hole is an extrusion, the peg convex
     geoms = [tuple(Geom(kind="mesh", vertices=h.vertices, faces=h.faces) for h in each.hulls) for each in found]
     return replace(nominal, fixture=geoms[0], tool=replace(nominal.tool, geoms=(*geoms[1], *drawn)))
+
+
+def of_surfaces(nominal, clearance):
+    """The same as surfaces, fine where the peg comes."""
+    hole = part_meshes.in_metres(part_meshes.hole(16.5 + 1e3 * clearance, 60.0, SIDES, half=42.0, bottom=20.0))
+    (peg, *drawn) = nominal.tool.geoms
+    beside, geoms = 6e-3, []
+    for solid, length in ((hole, np.array([-0.0165, 0.0165])), (solid_of(peg.vertices, peg.faces), None)):
+        low, high = np.reshape(solid.bounding_box(), (2, 3))
+        if length is not None:
+            low, high = np.array([*[length[0] - beside] * 2, -0.062]), np.array([*[length[1] + beside] * 2, 0.002])
+        else:
+            low[2] = high[2] - 0.062
+        surface = surface_of(solid, low, high)
+        print(f"contact error {1e6 * error_of(surface, low, high):.1f} um, {len(surface.points)} points")
+        vertices, faces = arrays_of(solid)
+        geoms.append(Geom(kind="mesh", vertices=vertices, faces=faces, surface=surface))
+    drawn = [replace(each, collide=False) for each in drawn]
+    return replace(nominal, fixture=(geoms[0],), tool=replace(nominal.tool, geoms=(geoms[1], *drawn)))
 
 
 def heights(setting):
@@ -53,3 +73,15 @@ def test_pegs_jam_in_pieces_where_they_jam_between_boxes(clearance):
     assert ((boxed < INSERTED) == (pieced < INSERTED)).all()
     jammed = boxed > INSERTED  # who is in after 4 s may still sink by what is left of the way
     assert np.abs(boxed - pieced)[jammed].max() < 5e-4  # measured before with another program: 0.4 mm at most
+
+
+@pytest.mark.figures
+@pytest.mark.parametrize(("clearance", "deeper"), [(2.5e-4, 2e-3), (5e-5, 3e-3)])
+def test_pegs_jam_between_surfaces_where_they_jam_between_boxes(clearance, deeper):
+    """What is let pass is what was asked for before: 2 mm, and 3 mm at 0.05 mm of clearance."""
+    boxes = setup("free_tool", "peg_in_hole", params={"clearance": clearance, "segments": 96, "boxes": 128})
+    boxed, found = (heights(each) for each in (boxes, replace(boxes, scene=of_surfaces(boxes.scene, clearance))))
+    for case, one, two in zip(CASES, boxed, found, strict=True):
+        print(f"{1e3 * clearance:g} mm: {case}: boxes {1e3 * one:.2f} mm, surfaces {1e3 * two:.2f} mm")
+    assert ((boxed < INSERTED) == (found < INSERTED)).all()
+    assert np.abs(boxed - found)[boxed > INSERTED].max() < deeper

@@ -69,6 +69,7 @@ SET_UP = {  # finds, builds and unpacks FMUs before a run, simulates one alone, 
 } | {
     f"skillframe/execution/{name}.py" for name in ("prepare", "scores", "trace", "tracemeta")
 }  # before a run, and after it
+SET_UP |= {"skillframe/world/surfaces.py"}  # builds the contact generator, before a run
 SET_UP |= {f"skillframe/teaching/{name}.py" for name in ("sessions", "blind_sessions", "machine_sessions")}
 
 

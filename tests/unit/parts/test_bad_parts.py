@@ -162,9 +162,10 @@ def test_parts_without_play_are_refused(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_part_that_pieces_do_not_hold_is_refused_with_how_many_it_takes(tmp_path, monkeypatch):
+def test_a_part_that_pieces_do_not_hold_is_refused_without_a_compiler_with_how_many_it_takes(tmp_path, monkeypatch):
     for module in ("checks", "load", "pieces"):
         monkeypatch.setattr(f"skillframe.parts.{module}.MOST_PIECES", 5)
+    monkeypatch.setattr("skillframe.parts.load.available", lambda: False)
     words = ("socket.stl: takes 13 convex pieces", "0.093 mm, a quarter of the clearance", "5 are the most")
     refused(pair(tmp_path, *round_pair()), *words)
 

@@ -1,0 +1,216 @@
+/* Grids of signed distance from triangles.
+
+   Distances are exact up to `BAND` cells from the surface; farther out they grow from node to node, which is never too
+   small and at most a tenth too large. Inside is where two of three rays, along x, y and z, cross the surface an odd
+   number of times, so that small holes in a mesh do no harm. A cell in which distance is no linear function, because an
+   edge or a corner is near, gets the list of all triangles that can be nearest within it. */
+#include "surfaces.h"
+
+#include <stdlib.h>
+
+#define BAND 2.5
+#define REACH 4.0  /* cells; how far from a listed cell's centre its triangles lie, at most */
+#define FAR 1e9f
+
+typedef void (*Visit)(void* what, int64_t node, int64_t triangle, const double* corner, const double* place);
+
+/* Call a function at every node (at cell centres: shift 0.5) whose distance from a triangle's plane, and box, is small. */
+static void near_triangle(const Grid* g, const Mesh* mesh, int64_t t, double reach, double shift, Visit visit, void* what) {
+  const double *corner = mesh->corner + 9 * t, *n = mesh->normal + 21 * t;
+  int64_t low[3], high[3], at[3];
+  int a = 0;
+  for (int x = 0; x < 3; x++) {
+    double least = fmin(corner[x], fmin(corner[3 + x], corner[6 + x])) - reach;
+    double most = fmax(corner[x], fmax(corner[3 + x], corner[6 + x])) + reach;
+    double first = ceil((least - g->origin[x]) / g->cell - shift), last = floor((most - g->origin[x]) / g->cell - shift);
+    if (last < 0 || first > (double)(g->size[x] - 1)) return;
+    low[x] = first > 0 ? (int64_t)first : 0;
+    high[x] = last < (double)(g->size[x] - 1) ? (int64_t)last : g->size[x] - 1;
+    if (fabs(n[x]) > fabs(n[a])) a = x;
+  }
+  int u = (a + 1) % 3, v = (a + 2) % 3;
+  double place[3], level = dot(n, corner), across = reach / fmax(fabs(n[a]), 0.5);
+  for (at[u] = low[u]; at[u] <= high[u]; at[u]++)
+    for (at[v] = low[v]; at[v] <= high[v]; at[v]++) {
+      place[u] = g->origin[u] + g->cell * ((double)at[u] + shift);
+      place[v] = g->origin[v] + g->cell * ((double)at[v] + shift);
+      double height = (level - n[u] * place[u] - n[v] * place[v]) / n[a];
+      double first = ceil((height - across - g->origin[a]) / g->cell - shift);
+      double last = floor((height + across - g->origin[a]) / g->cell - shift);
+      int64_t k = first > (double)low[a] ? (first < 1e9 ? (int64_t)first : high[a] + 1) : low[a];
+      int64_t end = last < (double)high[a] ? (last > -1e9 ? (int64_t)last : -1) : high[a];
+      for (; k <= end; k++) {
+        at[a] = k;
+        place[a] = g->origin[a] + g->cell * ((double)k + shift);
+        visit(what, node_of(g, at[0], at[1], at[2]), t, corner, place);
+      }
+    }
+}
+
+static void lower(void* what, int64_t node, int64_t t, const double* corner, const double* place) {
+  (void)t;
+  float* value = (float*)what + node;
+  float d = (float)distance_to(corner, place);
+  if (d < *value) *value = d;
+}
+
+/* Beyond the band: distance by steps to the 26 neighbours, from one corner of the grid and back. */
+static void spread(const Grid* g, float* value) {
+  int64_t nx = g->size[0], ny = g->size[1], nz = g->size[2];
+  for (int pass = 0; pass < 2; pass++) {
+    int way = pass ? 1 : -1;
+    for (int64_t a = 0; a < nx; a++)
+      for (int64_t b = 0; b < ny; b++)
+        for (int64_t c = 0; c < nz; c++) {
+          int64_t i = pass ? nx - 1 - a : a, j = pass ? ny - 1 - b : b, k = pass ? nz - 1 - c : c;
+          float *here = value + node_of(g, i, j, k), best = *here;
+          if (best < (float)(BAND * g->cell)) continue;
+          for (int di = 0; di < 2; di++)
+            for (int dj = di ? -1 : 0; dj < 2; dj++)
+              for (int dk = (di || dj) ? -1 : 1; dk < 2; dk++) {
+                if (!di && dj < 0) continue;
+                int64_t x = i + way * di, y = j + way * dj, z = k + way * dk;
+                if (x < 0 || y < 0 || z < 0 || x >= nx || y >= ny || z >= nz) continue;
+                float d = value[node_of(g, x, y, z)] + (float)(g->cell * sqrt((double)(di * di + dj * dj + dk * dk)));
+                if (d < best) best = d;
+              }
+          *here = best;
+        }
+  }
+}
+
+/* Add a vote for each node that lies inside as seen along axis a. */
+static void cast(const Grid* g, const Mesh* mesh, int a, uint8_t* crossed, uint8_t* votes) {
+  int u = (a + 1) % 3, v = (a + 2) % 3;
+  int64_t step = a == 0 ? g->size[1] * g->size[2] : a == 1 ? g->size[2] : 1;
+  double su = g->origin[u] + 3.1e-5 * g->cell, sv = g->origin[v] + 5.7e-5 * g->cell;  /* off the mesh's own corners */
+  memset(crossed, 0, (size_t)(g->size[0] * g->size[1] * g->size[2]));
+  for (int64_t t = 0; t < mesh->count; t++) {
+    const double *p = mesh->corner + 9 * t, *q = p + 3, *r = p + 6;
+    double area = (q[u] - p[u]) * (r[v] - p[v]) - (q[v] - p[v]) * (r[u] - p[u]);
+    if (area == 0) continue;
+    double lu = fmax(ceil((fmin(p[u], fmin(q[u], r[u])) - su) / g->cell), 0);
+    double lv = fmax(ceil((fmin(p[v], fmin(q[v], r[v])) - sv) / g->cell), 0);
+    double hu = fmin(floor((fmax(p[u], fmax(q[u], r[u])) - su) / g->cell), (double)(g->size[u] - 1));
+    double hv = fmin(floor((fmax(p[v], fmax(q[v], r[v])) - sv) / g->cell), (double)(g->size[v] - 1));
+    for (int64_t i = (int64_t)lu; i <= (int64_t)hu; i++)
+      for (int64_t j = (int64_t)lv; j <= (int64_t)hv; j++) {
+        double x = su + g->cell * (double)i, y = sv + g->cell * (double)j;
+        double wp = (q[u] - x) * (r[v] - y) - (q[v] - y) * (r[u] - x);
+        double wq = (r[u] - x) * (p[v] - y) - (r[v] - y) * (p[u] - x);
+        double wr = (p[u] - x) * (q[v] - y) - (p[v] - y) * (q[u] - x);
+        if (!((wp > 0 && wq > 0 && wr > 0) || (wp < 0 && wq < 0 && wr < 0))) continue;
+        double k = ceil(((wp * p[a] + wq * q[a] + wr * r[a]) / (wp + wq + wr) - g->origin[a]) / g->cell);
+        if (k > (double)(g->size[a] - 1)) continue;
+        int64_t at[3];
+        at[a] = k > 0 ? (int64_t)k : 0, at[u] = i, at[v] = j;
+        crossed[node_of(g, at[0], at[1], at[2])] ^= 1;
+      }
+  }
+  int64_t total = g->size[0] * g->size[1] * g->size[2];
+  for (int64_t node = 0; node < total; node++) {
+    int64_t index = (node / step) % g->size[a];
+    if (index) crossed[node] ^= crossed[node - step];
+    votes[node] += crossed[node];
+  }
+}
+
+/* Fill a grid's values; returns 0, or 1 where there is no memory, and how many nodes' rays disagree. */
+EXPORT int skillframe_values(const Grid* g, const Mesh* mesh, float* value, int64_t* disagree) {
+  int64_t total = g->size[0] * g->size[1] * g->size[2];
+  uint8_t* votes = calloc((size_t)total, 2);
+  if (!votes) return 1;
+  for (int64_t node = 0; node < total; node++) value[node] = FAR;
+  for (int64_t t = 0; t < mesh->count; t++) near_triangle(g, mesh, t, BAND * g->cell, 0.0, lower, value);
+  spread(g, value);
+  for (int a = 0; a < 3; a++) cast(g, mesh, a, votes + total, votes);
+  *disagree = 0;
+  for (int64_t node = 0; node < total; node++) {
+    if (votes[node] > 1) value[node] = -value[node];
+    *disagree += votes[node] == 1 || votes[node] == 2;
+  }
+  free(votes);
+  return 0;
+}
+
+/* Mark the cells near the surface in which distance is no linear function within a tolerance; returns how many. */
+EXPORT int64_t skillframe_mark(const Grid* g, double tolerance, uint64_t* listed) {
+  int64_t found = 0;
+  for (int64_t i = 0; i + 1 < g->size[0]; i++)
+    for (int64_t j = 0; j + 1 < g->size[1]; j++)
+      for (int64_t k = 0; k + 1 < g->size[2]; k++) {
+        double v[8], mean = 0, slope[3] = {0, 0, 0}, low = FAR, high = -FAR, off = 0;
+        for (int c = 0; c < 8; c++) {
+          v[c] = g->value[node_of(g, i + (c >> 2), j + (c >> 1 & 1), k + (c & 1))];
+          mean += v[c] / 8, low = fmin(low, v[c]), high = fmax(high, v[c]);
+          for (int x = 0; x < 3; x++) slope[x] += (c >> (2 - x) & 1 ? 0.25 : -0.25) * v[c];
+        }
+        if (low > g->cell || high < -2 * g->cell) continue;
+        for (int c = 0; c < 8; c++) {
+          double plane = mean;
+          for (int x = 0; x < 3; x++) plane += (c >> (2 - x) & 1 ? 0.5 : -0.5) * slope[x];
+          off = fmax(off, fabs(v[c] - plane));
+        }
+        if (off <= tolerance && fabs(sqrt(dot(slope, slope)) - g->cell) <= 4 * tolerance) continue;
+        int64_t node = node_of(g, i, j, k);
+        listed[node >> 6] |= (uint64_t)1 << (node & 63);
+        found++;
+      }
+  return found;
+}
+
+typedef struct {
+  const Grid* grid;
+  float* nearest;
+  int32_t *count, *triangle;
+} Lists;
+
+static int64_t rank_of(const Grid* g, int64_t node) {
+  uint64_t word = g->listed[node >> 6], bit = (uint64_t)1 << (node & 63);
+  return word & bit ? (int64_t)g->before[node >> 6] + __builtin_popcountll(word & (bit - 1)) : -1;
+}
+
+static void shorten(void* what, int64_t node, int64_t t, const double* corner, const double* place) {
+  Lists* lists = what;
+  int64_t rank = rank_of(lists->grid, node);
+  (void)t;
+  if (rank >= 0) lists->nearest[rank] = fminf(lists->nearest[rank], (float)distance_to(corner, place));
+}
+
+static void enlist(void* what, int64_t node, int64_t t, const double* corner, const double* place) {
+  Lists* lists = what;
+  int64_t rank = rank_of(lists->grid, node);
+  if (rank < 0 || distance_to(corner, place) > (double)lists->nearest[rank] + 1.7321 * lists->grid->cell) return;
+  if (lists->triangle) lists->triangle[lists->grid->start[rank] + lists->count[rank]] = (int32_t)t;
+  lists->count[rank]++;
+}
+
+/* The lists of a grid's marked cells. With `triangle` NULL they are counted alone, with `nearest` (cells,) for later. */
+EXPORT void skillframe_lists(const Grid* g, const Mesh* mesh, float* nearest, int32_t* count, int32_t* triangle) {
+  Lists lists = {g, nearest, count, triangle};
+  for (int64_t t = 0; !triangle && t < mesh->count; t++)
+    near_triangle(g, mesh, t, REACH * g->cell, 0.5, shorten, &lists);
+  for (int64_t t = 0; t < mesh->count; t++) near_triangle(g, mesh, t, REACH * g->cell, 0.5, enlist, &lists);
+}
+
+/* Exact signed distances of points (count, 3) from a closed mesh, triangle by triangle. */
+EXPORT void skillframe_exact(const Mesh* mesh, int64_t count, const double* point, double* out) {
+  for (int64_t i = 0; i < count; i++) {
+    const double* p = point + 3 * i;
+    double best = FAR, c[3], d[3];
+    for (int64_t t = 0; t < mesh->count; t++) {
+      const double* corner = mesh->corner + 9 * t;
+      double away = 0;
+      for (int x = 0; x < 3 && away < best; x++) {
+        double low = fmin(corner[x], fmin(corner[3 + x], corner[6 + x]));
+        double high = fmax(corner[x], fmax(corner[3 + x], corner[6 + x]));
+        away = fmax(away, fmax(low - p[x], p[x] - high));
+      }
+      if (away >= best) continue;
+      int feature = nearest_on(corner, p, c);
+      for (int x = 0; x < 3; x++) d[x] = p[x] - c[x];
+      double size = sqrt(dot(d, d));
+      if (size < best) best = size, out[i] = dot(d, mesh->normal + 21 * t + 3 * feature) < 0 ? -size : size;
+    }
+  }
+}

@@ -1,0 +1,262 @@
+/* Contacts of two parts for MuJoCo's solver: points of each looked up in the other's signed distance.
+
+   Contact: dist = distance, normal = its gradient, position half the depth from the point along it. The deepest comes
+   first, then whichever is farthest from those taken, in place and in normal, so that few contacts carry all.
+   The names and the call are those of MuJoCo's table of collision functions; its version is checked when this is built. */
+#include <mujoco/mujoco.h>
+
+#include "surfaces.h"
+
+#if mjVERSION_HEADER != SKILLFRAME_MUJOCO
+#error "these are headers of another MuJoCo than the one that runs"
+#endif
+
+#define PARTS 1024
+#define MOST 24          /* contacts of a pair */
+#define CANDIDATES 4096
+#define TURNING 0.010    /* m; by how much normals of 90 degrees apart count as farther apart in place, over sqrt 2 */
+#define SURELY 0.5       /* cells; what interpolates to more is outside, whatever edge is near (it is off by a quarter) */
+#define LOOSE 1.15       /* distances far from the surface are at most this much too large */
+
+static const Part* parts[PARTS];
+
+typedef struct {
+  double turn[9], shift[3];
+} Frame;
+
+typedef struct {
+  double dist, pos[3], normal[3], apart;
+} Candidate;
+
+static _Thread_local Candidate candidates[CANDIDATES];
+
+static void apply(const Frame* f, const double* p, double* out) {
+  for (int x = 0; x < 3; x++) out[x] = dot(f->turn + 3 * x, p) + f->shift[x];
+}
+
+/* a after b */
+static Frame after(const Frame* a, const Frame* b) {
+  Frame out;
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++)
+      out.turn[3 * i + j] = a->turn[3 * i] * b->turn[j] + a->turn[3 * i + 1] * b->turn[3 + j] + a->turn[3 * i + 2] * b->turn[6 + j];
+  apply(a, b->shift, out.shift);
+  return out;
+}
+
+static Frame inverse(const Frame* f) {
+  Frame out;
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) out.turn[3 * i + j] = f->turn[3 * j + i];
+  for (int i = 0; i < 3; i++) out.shift[i] = -dot(out.turn + 3 * i, f->shift);
+  return out;
+}
+
+/* The cell of a point and where it lies in it; false outside, and for what is no number. */
+static int cell_at(const Grid* g, const double* p, int64_t* at, double* part) {
+  for (int x = 0; x < 3; x++) {
+    double place = (p[x] - g->origin[x]) / g->cell;
+    if (!(place >= 0 && place < (double)(g->size[x] - 1))) return 0;
+    at[x] = (int64_t)place;
+    part[x] = place - (double)at[x];
+  }
+  return 1;
+}
+
+static double in_list(const Part* part, const Grid* g, int64_t rank, const double* p, double* normal) {
+  double best = 1e9, c[3], d[3], out[3] = {0, 0, 0};
+  const double* face = part->mesh.normal;
+  int inside = 0;
+  for (int32_t n = g->start[rank]; n < g->start[rank + 1]; n++) {
+    int64_t t = g->triangle[n];
+    const double* corner = part->mesh.corner + 9 * t;
+    int feature = nearest_on(corner, p, c);
+    for (int x = 0; x < 3; x++) d[x] = p[x] - c[x];
+    double size = dot(d, d);
+    if (size >= best) continue;
+    best = size, face = part->mesh.normal + 21 * t + 3 * feature, inside = dot(d, face) < 0;
+    memcpy(out, d, sizeof out);
+  }
+  best = sqrt(best);
+  for (int x = 0; x < 3; x++) normal[x] = best > 1e-9 ? (inside ? -out[x] : out[x]) / best : face[x];
+  return inside ? -best : best;
+}
+
+static double in_cell(const Part* part, const Grid* g, const int64_t* at, const double* w, const double* p, double* normal) {
+  int64_t node = node_of(g, at[0], at[1], at[2]), sx = g->size[1] * g->size[2], sy = g->size[2];
+  const float* v = g->value + node;
+  double a00 = v[0] + w[2] * (v[1] - v[0]), a01 = v[sy] + w[2] * (v[sy + 1] - v[sy]);
+  double a10 = v[sx] + w[2] * (v[sx + 1] - v[sx]), a11 = v[sx + sy] + w[2] * (v[sx + sy + 1] - v[sx + sy]);
+  double b0 = a00 + w[1] * (a01 - a00), b1 = a10 + w[1] * (a11 - a10), value = b0 + w[0] * (b1 - b0);
+  if (value > SURELY * g->cell) return value;
+  uint64_t word = g->listed[node >> 6], bit = (uint64_t)1 << (node & 63);
+  if (word & bit)
+    return in_list(part, g, (int64_t)g->before[node >> 6] + __builtin_popcountll(word & (bit - 1)), p, normal);
+  if (value < 0) {
+    double z00 = v[1] - v[0], z01 = v[sy + 1] - v[sy], z10 = v[sx + 1] - v[sx], z11 = v[sx + sy + 1] - v[sx + sy];
+    double z0 = z00 + w[1] * (z01 - z00), z1 = z10 + w[1] * (z11 - z10);
+    normal[0] = b1 - b0;
+    normal[1] = (a01 - a00) + w[0] * ((a11 - a10) - (a01 - a00));
+    normal[2] = z0 + w[0] * (z1 - z0);
+    double size = sqrt(dot(normal, normal));
+    for (int x = 0; x < 3; x++) normal[x] = size > 0 ? normal[x] / size : x == 2;
+  }
+  return value;
+}
+
+/* What points are looked up in: a part, or a box of these half sizes. */
+typedef struct {
+  const Part* part;
+  const double* half;
+} Shape;
+
+/* Depth of a point in a box, below zero, and the normal of the face that is nearest; above zero outside. */
+static double in_box(const double* half, const double* p, double* normal) {
+  double value = -1e9;
+  int face = 0;
+  for (int x = 0; x < 3; x++)
+    if (fabs(p[x]) - half[x] > value) value = fabs(p[x]) - half[x], face = x;
+  for (int x = 0; x < 3; x++) normal[x] = x == face ? (p[x] < 0 ? -1 : 1) : 0;
+  return p[0] == p[0] ? value : 1e9;
+}
+
+/* Signed distance of a point of a shape's frame, and its gradient where that is negative. */
+static double distance_at(Shape in, const double* p, double* normal) {
+  double w[3];
+  int64_t at[3];
+  if (in.half) return in_box(in.half, p, normal);
+  for (int level = 0; level < 2; level++)
+    if (cell_at(in.part->grid + level, p, at, w)) return in_cell(in.part, in.part->grid + level, at, w, p, normal);
+  return 1e9;
+}
+
+/* Whether no point of a ball can be in a shape. */
+static int is_clear(Shape in, const double* centre, double radius) {
+  const Part* part = in.part;
+  int64_t at[3];
+  double w[3];
+  if (in.half) return in_box(in.half, centre, w) > radius;
+  for (int level = 0; level < 2; level++) {
+    const Grid* g = part->grid + level;
+    if (cell_at(g, centre, at, w))
+      return (double)g->value[node_of(g, at[0], at[1], at[2])] > LOOSE * (radius + 1.8 * g->cell);
+  }
+  for (int level = 0; level < 2; level++) {
+    const Grid* g = part->grid + level;
+    double away = 0;
+    for (int x = 0; x < 3 && g->size[x] > 1; x++) {
+      double high = g->origin[x] + g->cell * (double)(g->size[x] - 1);
+      away = fmax(away, fmax(g->origin[x] - centre[x], centre[x] - high));
+    }
+    if (g->size[0] > 1 && !(away > radius)) return 0;
+  }
+  return 1;
+}
+
+/* Add what the points of one part find in the other; `sign` turns gradients to normals from the first to the second. */
+static int look(const Part* of, const Frame* pose_of, Shape in, const Frame* pose_in, double sign, int found) {
+  Frame back = inverse(pose_in), across = after(&back, pose_of);
+  for (int64_t b = 0; b < of->blocks; b++) {
+    double centre[3], p[3], normal[3];
+    apply(&across, of->ball + 4 * b, centre);
+    if (is_clear(in, centre, of->ball[4 * b + 3])) continue;
+    for (int64_t i = of->first[b]; i < of->first[b + 1] && found < CANDIDATES; i++) {
+      apply(&across, of->point + 3 * i, p);
+      double dist = distance_at(in, p, normal);
+      if (!(dist < 0)) continue;
+      Candidate* c = candidates + found++;
+      for (int x = 0; x < 3; x++) p[x] -= 0.5 * dist * normal[x];
+      apply(pose_in, p, c->pos);
+      for (int x = 0; x < 3; x++) c->normal[x] = sign * dot(pose_in->turn + 3 * x, normal);
+      c->dist = dist, c->apart = 1e9;
+    }
+  }
+  return found;
+}
+
+/* Write the deepest candidate, then the farthest from those written, while any is farther than `apart`. */
+static int choose(int found, double apart, mjPreContact* con) {
+  int count = 0, next = -1;
+  for (int i = 0; i < found; i++)
+    if (next < 0 || candidates[i].dist < candidates[next].dist) next = i;
+  while (next >= 0 && count < MOST) {
+    Candidate taken = candidates[next];
+    mjPreContact* out = con + count++;
+    out->dist = taken.dist;
+    for (int x = 0; x < 3; x++) out->pos[x] = taken.pos[x], out->normal[x] = taken.normal[x], out->tangent[x] = 0;
+    next = -1;
+    for (int i = 0; i < found; i++) {
+      Candidate* c = candidates + i;
+      double away[3], turned[3];
+      for (int x = 0; x < 3; x++) {
+        away[x] = c->pos[x] - taken.pos[x];
+        turned[x] = TURNING * (c->normal[x] - taken.normal[x]);
+      }
+      c->apart = fmin(c->apart, sqrt(dot(away, away)) + sqrt(dot(turned, turned)));
+      if (c->apart > apart && (next < 0 || c->apart > candidates[next].apart)) next = i;
+    }
+  }
+  return count;
+}
+
+static const Part* part_of(const mjModel* m, const mjData* d, int geom, Frame* pose) {
+  int slot = m->nuser_geom ? (int)m->geom_user[geom * m->nuser_geom] - 1 : -1;
+  if (slot < 0 || slot >= PARTS || !parts[slot]) {
+    mju_error("geom %d has no surface in skillframe's table of parts", geom);
+    return NULL;
+  }
+  Frame body, own;
+  memcpy(body.turn, d->xmat + 9 * m->geom_bodyid[geom], sizeof body.turn);
+  memcpy(body.shift, d->xpos + 3 * m->geom_bodyid[geom], sizeof body.shift);
+  memcpy(own.turn, parts[slot]->turn, sizeof own.turn);
+  memcpy(own.shift, parts[slot]->shift, sizeof own.shift);
+  *pose = after(&body, &own);
+  return parts[slot];
+}
+
+static int collide(const mjModel* m, mjData* d, mjPreContact* con, int g1, int g2, mjtNum margin) {
+  Frame f1, f2;
+  const Part *one = part_of(m, d, g1, &f1), *two = part_of(m, d, g2, &f2);
+  (void)margin;
+  if (!one || !two) return 0;
+  int found = look(one, &f1, (Shape){two, NULL}, &f2, -1.0, 0);
+  found = look(two, &f2, (Shape){one, NULL}, &f1, 1.0, found);
+  return choose(found, fmin(one->apart, two->apart), con);
+}
+
+/* A box, as a table, and a part: the part's points alone, since no edge of a table is sampled. */
+static int collide_box(const mjModel* m, mjData* d, mjPreContact* con, int g1, int g2, mjtNum margin) {
+  Frame box, pose;
+  const Part* part = part_of(m, d, g2, &pose);
+  (void)margin;
+  if (!part) return 0;
+  memcpy(box.turn, d->geom_xmat + 9 * g1, sizeof box.turn);
+  memcpy(box.shift, d->geom_xpos + 3 * g1, sizeof box.shift);
+  return choose(look(part, &pose, (Shape){NULL, m->geom_size + 3 * g1}, &box, 1.0, 0), part->apart, con);
+}
+
+EXPORT int skillframe_version(void) { return mjVERSION_HEADER; }
+
+/* Take the pairs (sdf, sdf) and (box, sdf) of MuJoCo's table. */
+EXPORT void skillframe_install(mjfCollision table[mjNGEOMTYPES][mjNGEOMTYPES]) {
+  table[mjGEOM_SDF][mjGEOM_SDF] = collide;
+  table[mjGEOM_BOX][mjGEOM_SDF] = collide_box;
+}
+
+/* Put a part into the first free slot; returns its number from 1 on, 0 where all are taken. */
+EXPORT int skillframe_add(const Part* part) {
+  for (int slot = 0; slot < PARTS; slot++)
+    if (!parts[slot]) {
+      parts[slot] = part;
+      return slot + 1;
+    }
+  return 0;
+}
+
+EXPORT void skillframe_remove(int number) { parts[number - 1] = NULL; }
+
+/* Signed distances of points (count, 3) as contacts see them. */
+EXPORT void skillframe_look_up(const Part* part, int64_t count, const double* point, double* out) {
+  double normal[3];
+  for (int64_t i = 0; i < count; i++) out[i] = distance_at((Shape){part, NULL}, point + 3 * i, normal);
+}

@@ -1,0 +1,278 @@
+"""Parts of any shape in contact: our own contact generator, `narrow_phase.c`, in MuJoCo's table of collision functions.
+
+A `Surface` is a part as contact needs it: its triangles, signed distance on a grid, and points. The points of each of
+two parts are looked up in the distance of the other, and what lies inside goes to MuJoCo's solver. The C text is built
+once for the MuJoCo that is installed, into the user's cache. Nothing is built where no compiler is.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import weakref
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.errors import SkillframeError
+from skillframe.fmu.build import build_library
+from skillframe.frames import Float, cross, norm
+
+Ints = NDArray[np.int64]
+TOLERANCE = 1e-6
+"""A cell of the grid is taken as it is where distance is linear in it within this [m]; ours."""
+SOURCES = ("surfaces.h", "distance_grid.c", "narrow_phase.c")
+
+
+class _Mesh(ctypes.Structure):
+    _fields_ = (("count", ctypes.c_int64), ("corner", ctypes.c_void_p), ("normal", ctypes.c_void_p))
+
+
+class _Grid(ctypes.Structure):
+    _fields_ = (
+        ("origin", ctypes.c_double * 3), ("cell", ctypes.c_double), ("size", ctypes.c_int64 * 3),
+        *((name, ctypes.c_void_p) for name in ("value", "listed", "before", "start", "triangle")),
+    )  # fmt: skip
+
+
+class _Part(ctypes.Structure):
+    _fields_ = (
+        ("mesh", _Mesh), ("grid", _Grid * 2), ("turn", ctypes.c_double * 9), ("shift", ctypes.c_double * 3),
+        ("apart", ctypes.c_double), ("points", ctypes.c_int64),
+        ("blocks", ctypes.c_int64), *((name, ctypes.c_void_p) for name in ("point", "ball", "first")),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Triangles:
+    """A closed mesh for exact distances.
+
+    Attributes:
+        corners: (T, 3, 3) [m].
+        normals: (T, 7, 3) unit normals of the face, of edges ab, bc, ca and of corners a, b, c. Those of an edge are
+            the mean of its faces', those of a corner are weighted by angles, so that they tell inside from outside
+            (J. A. Baerentzen and H. Aanaes, IEEE TVCG 11(3), 2005).
+    """
+
+    corners: Float
+    normals: Float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DistanceGrid:
+    """Signed distance on a grid.
+
+    Attributes:
+        origin: (3,) of the first node [m]; cell: [m].
+        value: (X, Y, Z) at the nodes [m], below zero inside.
+        listed: one bit a node, whether the cell that begins there has a list; before: listed cells before each word.
+        start: (cells + 1,) into triangle: those that can be nearest within a listed cell.
+        disagree: share of the nodes whose three rays disagree on what is inside.
+    """
+
+    origin: Float
+    cell: float
+    value: NDArray[np.float32]
+    listed: NDArray[np.uint64]
+    before: NDArray[np.uint32]
+    start: NDArray[np.int32]
+    triangle: NDArray[np.int32]
+    disagree: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Surface:
+    """A part as contact needs it. `turn` (3, 3) and `shift` (3,) take its own frame to that of the body it is on.
+
+    Attributes:
+        triangles: of the part.
+        grids: one, or a fine one where parts can meet and a coarse one of all.
+        points: (P, 3) on the surface [m], block by block; first: (B + 1,) where each block begins.
+        balls: (B, 4) centre and radius of each block [m].
+        apart: least distance of two contacts [m].
+    """
+
+    triangles: Triangles
+    grids: tuple[DistanceGrid, ...]
+    points: Float
+    first: Ints
+    balls: Float
+    apart: float
+    turn: Float
+    shift: Float
+
+    def look_up(self, points: Float) -> Float:
+        """Signed distances (P,) of points (P, 3) of the part's frame, as contacts see them [m]."""
+        points = np.ascontiguousarray(points, dtype=np.float64)
+        out = np.empty(len(points))
+        _require().skillframe_look_up(ctypes.byref(_part(self)), len(points), _at(points), _at(out))
+        return out
+
+
+def available() -> bool:
+    """Whether there is a contact generator: it was built, or can be."""
+    return library() is not None
+
+
+@lru_cache(maxsize=1)
+def library() -> ctypes.CDLL | None:
+    """The contact generator, in MuJoCo's table from now on, or None where it cannot be built."""
+    folder = Path(__file__).parent
+    text = {name: (folder / name).read_text(encoding="utf-8") for name in SOURCES}
+    inside = Path(mujoco.__file__).parent
+    header = f"#define SKILLFRAME_MUJOCO {mujoco.mj_version()}\n"
+    whole = header + "".join(text[name].replace('#include "surfaces.h"', "") for name in SOURCES)
+    built = build_library("contacts", whole, include=inside / "include")
+    if built is None:
+        return None
+    found = ctypes.CDLL(str(built), mode=ctypes.RTLD_LOCAL) if _loaded_engine() else None
+    if found is None or found.skillframe_version() != mujoco.mj_version():
+        return None
+    found.skillframe_mark.restype = ctypes.c_int64
+    found.skillframe_mark.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
+    table = (ctypes.c_void_p * 1).in_dll(_engine(), "mjCOLLISIONFUNC")
+    found.skillframe_install(ctypes.byref(table))
+    return found
+
+
+def _engine() -> ctypes.CDLL:
+    """MuJoCo's own library, which Python's bindings have loaded."""
+    return ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("libmujoco.*"))), mode=ctypes.RTLD_GLOBAL)
+
+
+def _loaded_engine() -> bool:
+    """Let the generator find MuJoCo's functions."""
+    try:
+        _engine()
+    except (OSError, StopIteration):
+        return False
+    return True
+
+
+def _require() -> Any:
+    found = library()
+    if found is None:
+        raise SkillframeError("contact of curved parts needs a C compiler (cc, gcc, clang or $CC): pip install ziglang")
+    return found
+
+
+def _at(array: NDArray[Any]) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)
+
+
+def _mesh(triangles: Triangles) -> _Mesh:
+    return _Mesh(len(triangles.corners), _at(triangles.corners), _at(triangles.normals))
+
+
+def _grid(grid: DistanceGrid) -> _Grid:
+    lists = (_at(each) for each in (grid.value, grid.listed, grid.before, grid.start, grid.triangle))
+    return _Grid((ctypes.c_double * 3)(*grid.origin), grid.cell, (ctypes.c_int64 * 3)(*grid.value.shape), *lists)
+
+
+def _part(surface: Surface) -> _Part:
+    made = _Part(mesh=_mesh(surface.triangles), apart=surface.apart)
+    for level, grid in enumerate(surface.grids):
+        made.grid[level] = _grid(grid)
+    made.turn[:] = surface.turn.ravel().tolist()
+    made.shift[:] = surface.shift.tolist()
+    made.points, made.blocks = len(surface.points), len(surface.balls)
+    made.point, made.ball, made.first = (_at(each).value for each in (surface.points, surface.balls, surface.first))
+    return made
+
+
+_NUMBERS: weakref.WeakKeyDictionary[Surface, int] = weakref.WeakKeyDictionary()
+
+
+def number_of(surface: Surface) -> int:
+    """The number by which the generator knows a surface, as long as that is there.
+
+    Raises:
+        SkillframeError: there is no compiler, or there are a thousand surfaces already.
+    """
+    if surface not in _NUMBERS:
+        part = _part(surface)
+        number = int(_require().skillframe_add(ctypes.byref(part)))
+        if not number:
+            raise SkillframeError("a thousand parts are in contact already, which is all that there is room for")
+        weakref.finalize(surface, _removed, number, part)
+        _NUMBERS[surface] = number
+    return _NUMBERS[surface]
+
+
+def _removed(number: int, part: _Part) -> None:
+    """Forget a surface. The record, which the generator points at, lives as long as this call waits."""
+    _require().skillframe_remove(number)
+
+
+def triangles_of(vertices: Float, faces: Ints) -> Triangles:
+    """Triangles and normals of a closed mesh (V, 3), (F, 3). Those without area are left out."""
+    raw = cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
+    size = norm(raw)
+    faces, raw, size = faces[size > 1e-18], raw[size > 1e-18], size[size > 1e-18]
+    face = raw / size[:, None]
+    corners = np.ascontiguousarray(vertices[faces])
+    at_edges, at_corners = np.zeros((len(faces), 3, 3)), np.zeros((len(vertices), 3))
+    ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    _, edge = np.unique(ends, axis=0, return_inverse=True)
+    edge = edge.reshape(-1, 3)
+    of_edge = np.zeros((edge.max() + 1, 3))
+    for k in range(3):
+        np.add.at(of_edge, edge[:, k], face)
+        one, two = (corners[:, (k + step) % 3] - corners[:, k] for step in (1, 2))
+        angle = np.arctan2(norm(cross(one, two)), (one * two).sum(axis=-1))
+        np.add.at(at_corners, faces[:, k], angle[:, None] * face)
+    at_edges = of_edge[edge]
+    normals = np.concatenate([face[:, None], at_edges, at_corners[faces]], axis=1)
+    length = norm(normals)[..., None]
+    return Triangles(corners=corners, normals=np.ascontiguousarray(normals / np.where(length > 0.0, length, 1.0)))
+
+
+def grid_of(triangles: Triangles, low: Float, high: Float, cell: float) -> DistanceGrid:
+    """Signed distance of triangles on a grid over a box [m].
+
+    Raises:
+        SkillframeError: there is no compiler, or no memory.
+    """
+    found = _require()
+    size = np.maximum(np.ceil((high - low) / cell).astype(int) + 1, 2)
+    mesh, value = _mesh(triangles), np.empty(size, dtype=np.float32)
+    listed, disagree = np.zeros(value.size // 64 + 1, dtype=np.uint64), ctypes.c_int64()
+    none = np.zeros(1, dtype=np.int32)
+    grid = DistanceGrid(
+        origin=np.array(low, dtype=float), cell=cell, value=value, listed=listed,
+        before=np.zeros(1, dtype=np.uint32), start=none, triangle=none, disagree=0.0,
+    )  # fmt: skip
+    made = _grid(grid)
+    if found.skillframe_values(ctypes.byref(made), ctypes.byref(mesh), _at(value), ctypes.byref(disagree)):
+        raise SkillframeError(f"a grid of {value.size:,} nodes for contact does not fit into memory; take larger cells")
+    count = int(found.skillframe_mark(ctypes.byref(made), TOLERANCE, _at(listed)))
+    bits = np.bitwise_count(listed) if hasattr(np, "bitwise_count") else _bits(listed)
+    before = (np.cumsum(bits, dtype=np.uint32) - bits).astype(np.uint32)
+    made.before = _at(before).value
+    nearest, many = np.full(max(count, 1), 1e9, dtype=np.float32), np.zeros(max(count, 1), dtype=np.int32)
+    found.skillframe_lists(ctypes.byref(made), ctypes.byref(mesh), _at(nearest), _at(many), None)
+    start = np.concatenate([[0], np.cumsum(many)]).astype(np.int32)
+    triangle = np.zeros(max(int(start[-1]), 1), dtype=np.int32)
+    made.start, many[:] = _at(start).value, 0
+    found.skillframe_lists(ctypes.byref(made), ctypes.byref(mesh), _at(nearest), _at(many), _at(triangle))
+    return DistanceGrid(
+        origin=grid.origin, cell=cell, value=value, listed=listed, before=before, start=start, triangle=triangle,
+        disagree=disagree.value / value.size,
+    )  # fmt: skip
+
+
+def _bits(words: NDArray[np.uint64]) -> NDArray[np.uint8]:
+    found: NDArray[np.uint8] = np.unpackbits(words.view(np.uint8)).reshape(-1, 64).sum(axis=1).astype(np.uint8)
+    return found
+
+
+def exact_distances(triangles: Triangles, points: Float) -> Float:
+    """Signed distances (P,) of points (P, 3) from a closed mesh, triangle by triangle [m]."""
+    points = np.ascontiguousarray(points, dtype=np.float64)
+    out = np.empty(len(points))
+    _require().skillframe_exact(ctypes.byref(_mesh(triangles)), ctypes.c_int64(len(points)), _at(points), _at(out))
+    return out

@@ -1,0 +1,123 @@
+"""Contact of parts of any shape: distances against closed forms, and that they agree with every triangle's."""
+
+import manifold3d
+import numpy as np
+import pytest
+
+from skillframe.parts.field import error_of, surface_of
+from skillframe.parts.points import points_of
+from skillframe.parts.solid import arrays_of
+from skillframe.world.surfaces import available, exact_distances, triangles_of
+from tests.part_meshes import box, hole, in_metres, rod
+
+pytestmark = pytest.mark.skipif(not available(), reason="needs a C compiler")
+CUBE = in_metres(box((-4, -3, -2), (4, 3, 2)))
+HALF = np.array([4e-3, 3e-3, 2e-3])
+
+
+@pytest.fixture(autouse=True, scope="module")
+def few():
+    """Larger cells, which are faster: what is exact is exact in them too."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("skillframe.parts.field.MOST_NODES", 1e5)
+        patch.setattr("skillframe.parts.field._COARSE_NODES", 2e4)
+        yield
+
+
+def prepared(solid, beyond=1e-3):
+    low, high = np.reshape(solid.bounding_box(), (2, 3))
+    return surface_of(solid, low - beyond, high + beyond)
+
+
+def box_distance(points):
+    """Signed distance of a box, in closed form."""
+    away = np.abs(points) - HALF
+    return np.linalg.norm(np.maximum(away, 0.0), axis=1) + np.minimum(away.max(axis=1), 0.0)
+
+
+@pytest.fixture(scope="module")
+def cube():
+    return prepared(CUBE)
+
+
+def test_distance_is_that_of_a_box_at_its_edges_and_corners_too(cube):
+    rng = np.random.default_rng(1)
+    points = rng.uniform(-1.0, 1.0, (4000, 3)) * (HALF + 1e-4)
+    points[:2000] = np.sign(points[:2000]) * HALF + rng.uniform(-1e-4, 1e-4, (2000, 3))  # corners
+    points[2000:3000, :2] = np.sign(points[2000:3000, :2]) * HALF[:2] + rng.uniform(-1e-4, 1e-4, (1000, 2))  # edges
+    true = box_distance(points)
+    near = (true < 0.0) & (true > -1e-4)  # farther outside nothing but the sign counts
+    assert near.sum() > 500 and (np.sign(cube.look_up(points)) == np.sign(true))[np.abs(true) > 1e-6].all()
+    # linear cells within 1 um at their corners, floats of 1e-8 m; a grid alone is off by a quarter of its cell
+    np.testing.assert_allclose(cube.look_up(points)[near], true[near], atol=2e-6)
+
+
+def test_exact_distance_is_that_of_a_box():
+    vertices, faces = arrays_of(CUBE)
+    points = np.random.default_rng(2).uniform(-6e-3, 6e-3, (3000, 3))
+    np.testing.assert_allclose(exact_distances(triangles_of(vertices, faces), points), box_distance(points), atol=1e-12)
+
+
+def test_a_point_far_away_or_nowhere_is_outside(cube):
+    points = np.array([[1.0, 0.0, 0.0], [np.nan, 0.0, 0.0], [np.inf, -np.inf, 0.0], [0.0, 0.0, 3e-3]])
+    assert (cube.look_up(points) > 0.0).all()
+
+
+def test_inside_is_inside_a_concave_part():
+    """A ring: its hole is outside, its wall inside, by closed form of the two circles."""
+    surface = prepared(in_metres(rod(8.0, 0.0, 6.0, 64) - rod(5.0, -1.0, 7.0, 64)))
+    angle = np.linspace(0.0, 6.28, 200)
+    for radius, sign in ((4.8e-3, 1), (5.2e-3, -1), (7.8e-3, -1), (8.2e-3, 1)):
+        circle = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.full(200, 3e-3)])
+        assert (np.sign(surface.look_up(circle)) == sign).all()
+
+
+def test_the_stated_error_is_not_exceeded_where_it_was_not_measured():
+    solid = in_metres(hole(5.2, 12.0, 48))
+    low, high = np.reshape(solid.bounding_box(), (2, 3))
+    surface = surface_of(solid, low, high)
+    rng = np.random.default_rng(3)
+    points = surface.points[rng.integers(len(surface.points), size=5000)] + rng.uniform(-1e-4, 1e-4, (5000, 3))
+    exact = exact_distances(surface.triangles, points)
+    off = np.abs(surface.look_up(points) - exact)[(exact < 0.0) & (exact > -1e-4)]
+    # other points of the same kind; a grid alone is off by a quarter of its cell at edges
+    assert off.max() < 2.0 * error_of(surface, low, high) < 0.08 * surface.grids[0].cell
+
+
+def test_where_the_other_part_cannot_come_a_coarse_grid_still_tells_inside():
+    solid = in_metres(hole(5.2, 12.0, 24))
+    surface = surface_of(solid, np.array([-6e-3, -6e-3, -13e-3]), np.array([6e-3, 6e-3, 1e-3]))
+    fine, coarse = surface.grids
+    assert fine.cell < coarse.cell
+    assert surface.look_up(np.array([[14e-3, 0.0, -5e-3]]))[0] < 0.0 < surface.look_up(np.array([[14e-3, 0, 1e-3]]))[0]
+
+
+def test_points_lie_on_the_surface_and_leave_no_gap(cube):
+    vertices, faces = arrays_of(CUBE)
+    found = points_of(vertices, faces, -HALF - 1e-3, HALF + 1e-3)
+    np.testing.assert_allclose(box_distance(found.points), 0.0, atol=1e-9)
+    rng = np.random.default_rng(4)
+    some = rng.uniform(-1.0, 1.0, (500, 3)) * HALF
+    axis = rng.integers(3, size=500)
+    some[np.arange(500), axis] = np.sign(some[np.arange(500), axis]) * HALF[axis]
+    gap = np.linalg.norm(some[:, None] - found.points, axis=-1).min(axis=1)
+    assert gap.max() < np.sqrt(3.0) * found.spacing  # a point in every cube that the surface passes, up to its corners
+    for corner in vertices:
+        assert np.linalg.norm(found.points - corner, axis=1).min() < 1e-9  # corners are kept
+
+
+def test_blocks_hold_their_points(cube):
+    for k, (x, y, z, radius) in enumerate(cube.balls):
+        block = cube.points[cube.first[k] : cube.first[k + 1]]
+        assert len(block) and np.linalg.norm(block - [x, y, z], axis=1).max() < radius + 1e-12
+    assert cube.first[-1] == len(cube.points)
+
+
+def test_a_ball_has_the_distance_of_a_ball():
+    radius, sides = 6e-3, 96
+    surface = prepared(manifold3d.Manifold.sphere(radius, sides))
+    way = np.random.default_rng(5).normal(size=(2000, 3))
+    way /= np.linalg.norm(way, axis=1)[:, None]
+    sag = radius * (1.0 - np.cos(np.pi / sides)) * 2.0  # facets of a triangulated sphere lie inside it
+    found = surface.look_up(way * (radius - 5e-5))
+    assert (found > -5e-5 - 3e-6).all() and (found < -5e-5 + 2.0 * sag).all()

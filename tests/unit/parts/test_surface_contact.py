@@ -1,0 +1,122 @@
+"""Parts as surfaces in MuJoCo: chosen where pieces do not hold, a block's weight and height, the same in a batch."""
+
+import mujoco
+import mujoco.batch
+import numpy as np
+import pytest
+
+from skillframe.errors import InputError
+from skillframe.parts.field import surface_of
+from skillframe.parts.found import lines, values
+from skillframe.parts.load import load
+from skillframe.parts.solid import arrays_of
+from skillframe.parts.world import stated
+from skillframe.world.convert import add_geom
+from skillframe.world.scene import Geom
+from skillframe.world.surfaces import available
+from tests.part_meshes import FILE, box, hole, in_metres, rod, round_pair, write
+
+needs_compiler = pytest.mark.skipif(not available(), reason="needs a C compiler")
+
+
+@pytest.fixture(autouse=True)
+def few(monkeypatch):
+    monkeypatch.setattr("skillframe.parts.field.MOST_NODES", 1e5)
+    monkeypatch.setattr("skillframe.parts.field._COARSE_NODES", 2e4)
+
+
+def pieces_are_few(monkeypatch):
+    for module in ("checks", "load", "pieces"):
+        monkeypatch.setattr(f"skillframe.parts.{module}.MOST_PIECES", 1)
+
+
+def geom_of(solid):
+    low, high = np.reshape(solid.bounding_box(), (2, 3))
+    vertices, faces = arrays_of(solid)
+    return Geom(kind="mesh", vertices=vertices, faces=faces, surface=surface_of(solid, low - 0.01, high + 0.01))
+
+
+def dropped(below, above, height, mass=0.1):
+    """A free body of 0.1 kg over a fixed one."""
+    spec = mujoco.MjSpec()
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    fixed, free = spec.worldbody.add_body(), spec.worldbody.add_body(pos=[0.0, 0.0, height])
+    free.add_freejoint()
+    free.mass, free.inertia, free.explicitinertial = mass, [1e-5, 1e-5, 1e-5], True
+    add_geom(spec, fixed, below, "below", contype=1, conaffinity=2, friction=0.3)
+    add_geom(spec, free, above, "above", contype=2, conaffinity=1, friction=0.3)
+    return spec.compile()
+
+
+@needs_compiler
+@pytest.mark.parametrize("table", [False, True])
+def test_a_block_comes_to_rest_on_what_is_below_with_its_weight(table):
+    """On a part with a hole, over which it reaches, and on a box. Contacts sink by less than 0.1 mm."""
+    below = Geom(kind="box", size=(0.05, 0.05, 0.01), position=(0.0, 0.0, -0.01)) if table else None
+    below = below or geom_of(in_metres(hole(5.0, 6.0, 24)))
+    above = geom_of(in_metres(box((-8, -8, 0), (8, 8, 6))))
+    model = dropped(below, above, 2e-4)
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 600)
+    assert -1e-4 < data.qpos[2] < 0.0 and np.abs(data.qpos[:2]).max() < 2e-4  # it slid less than it fell
+    assert np.abs(data.qvel).max() < 1e-3  # m/s and rad/s: the whole fall was 0.06 m/s
+    force = np.zeros(6)
+    up = 0.0
+    for index in range(data.ncon):
+        mujoco.mj_contactForce(model, data, index, force)
+        up += force[:3] @ data.contact[index].frame.reshape(3, 3)[:, 2]
+    assert up == pytest.approx(0.1 * 9.81, rel=1e-3)  # at rest
+    del above, below  # the generator knows them by number as long as they live
+
+
+@needs_compiler
+def test_what_is_in_the_hole_does_not_touch_and_what_is_beside_it_does():
+    """MuJoCo alone takes the hull of a block with a hole, in which a pin would collide everywhere."""
+    below, pin = geom_of(in_metres(hole(5.2, 12.0, 24))), geom_of(in_metres(rod(5.0, -3.0, 8.0, 24)))
+    model = dropped(below, pin, 0.0)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 0
+    data.qpos[0] = 3e-4  # a corner of the pin, at 5.3 mm, between two walls at 5.2 mm
+    mujoco.mj_forward(model, data)
+    assert data.ncon and min(data.contact.dist) == pytest.approx(5.2e-3 - 5.3e-3 * np.cos(np.pi / 24), abs=2e-6)
+    for contact in data.contact:  # from the wall at +x to the pin
+        assert contact.frame[0] < -0.5
+    del below, pin
+
+
+@needs_compiler
+def test_trials_are_the_same_to_the_bit_alone_and_in_a_batch():
+    below, pin = geom_of(in_metres(hole(5.2, 12.0, 24))), geom_of(in_metres(rod(5.0, -3.0, 8.0, 24)))
+    model = dropped(below, pin, 1e-4)
+    shift = np.array([-1e-4, 2e-4, 4e-4])
+    ends = []
+    for chosen in (shift, shift[:1], shift[1:]):
+        batch = mujoco.batch.Batch(model, len(chosen), nthread=1, persistent=True)
+        place, speed = batch.bind("qpos"), batch.bind("qvel")
+        batch.reset()
+        place[:, 0], speed[:, 0] = chosen, 0.3
+        for _ in range(100):
+            batch.step()
+        ends.append(np.array(place))
+    np.testing.assert_array_equal(ends[0], np.concatenate([ends[1], ends[2]]))
+    assert not np.array_equal(ends[0][0], ends[0][1])
+    del below, pin
+
+
+@needs_compiler
+def test_a_pair_that_pieces_do_not_hold_gets_surfaces_and_says_so(tmp_path, monkeypatch):
+    pieces_are_few(monkeypatch)
+    loaded = load(write(tmp_path, *round_pair()))
+    assert loaded.backend == stated(loaded)["backend"] == values(loaded)["backend"] == "surface"
+    assert stated(loaded)["pieces"] == 0 and 0.0 < stated(loaded)["contact_error"] < 0.25 * loaded.fit.clearance
+    assert any("contact by our own generator" in line and "contact error" in line for line in lines(loaded))
+
+
+def test_without_a_compiler_there_are_pieces_alone_and_one_sentence(tmp_path, monkeypatch):
+    pieces_are_few(monkeypatch)
+    monkeypatch.setattr("skillframe.parts.load.available", lambda: False)
+    with pytest.raises(InputError, match=r"socket\.stl: takes .* convex pieces .*without a C compiler") as caught:
+        load(write(tmp_path, *round_pair(), FILE))
+    assert "\n" not in str(caught.value)
