@@ -63,6 +63,7 @@ def test_a_point_far_away_or_nowhere_is_outside(cube):
     assert (cube.look_up(points) > 0.0).all()
 
 
+@pytest.mark.slow
 def test_inside_is_inside_a_concave_part():
     """A ring: its hole is outside, its wall inside, by closed form of the two circles."""
     surface = prepared(in_metres(rod(8.0, 0.0, 6.0, 64) - rod(5.0, -1.0, 7.0, 64)))
@@ -72,6 +73,7 @@ def test_inside_is_inside_a_concave_part():
         assert (np.sign(surface.look_up(circle)) == sign).all()
 
 
+@pytest.mark.slow
 def test_the_stated_error_is_not_exceeded_where_it_was_not_measured():
     solid = in_metres(hole(5.2, 12.0, 48))
     low, high = np.reshape(solid.bounding_box(), (2, 3))
@@ -84,6 +86,7 @@ def test_the_stated_error_is_not_exceeded_where_it_was_not_measured():
     assert off.max() < 2.0 * error_of(surface, low, high) < 0.08 * surface.grids[0].cell
 
 
+@pytest.mark.slow
 def test_where_the_other_part_cannot_come_a_coarse_grid_still_tells_inside():
     solid = in_metres(hole(5.2, 12.0, 24))
     surface = surface_of(solid, np.array([-6e-3, -6e-3, -13e-3]), np.array([6e-3, 6e-3, 1e-3]))
@@ -113,6 +116,7 @@ def test_blocks_hold_their_points(cube):
     assert cube.first[-1] == len(cube.points)
 
 
+@pytest.mark.slow
 def test_a_ball_has_the_distance_of_a_ball():
     radius, sides = 6e-3, 96
     surface = prepared(manifold3d.Manifold.sphere(radius, sides))

@@ -49,6 +49,7 @@ def dropped(below, above, height, mass=0.1):
     return spec.compile()
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("table", [False, True])
 def test_a_block_comes_to_rest_on_what_is_below_with_its_weight(table):
@@ -86,6 +87,7 @@ def test_what_is_in_the_hole_does_not_touch_and_what_is_beside_it_does():
     del below, pin
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_trials_are_the_same_to_the_bit_alone_and_in_a_batch():
     below, pin = geom_of(in_metres(hole(5.2, 12.0, 24))), geom_of(in_metres(rod(5.0, -3.0, 8.0, 24)))
@@ -105,6 +107,7 @@ def test_trials_are_the_same_to_the_bit_alone_and_in_a_batch():
     del below, pin
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_a_pair_that_pieces_do_not_hold_gets_surfaces_and_says_so(tmp_path, monkeypatch):
     pieces_are_few(monkeypatch)
@@ -114,6 +117,7 @@ def test_a_pair_that_pieces_do_not_hold_gets_surfaces_and_says_so(tmp_path, monk
     assert any("contact by our own generator" in line and "contact error" in line for line in lines(loaded))
 
 
+@pytest.mark.slow
 def test_without_a_compiler_there_are_pieces_alone_and_one_sentence(tmp_path, monkeypatch):
     pieces_are_few(monkeypatch)
     monkeypatch.setattr("skillframe.parts.load.available", lambda: False)
