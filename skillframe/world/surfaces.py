@@ -118,18 +118,27 @@ def available() -> bool:
     return library() is not None
 
 
+def opened() -> ctypes.CDLL | None:
+    """The generator's library, built if it is not there or does not open, or None where it cannot be built."""
+    folder = Path(__file__).parent
+    text = {name: (folder / name).read_text(encoding="utf-8") for name in SOURCES}
+    header = f"#define SKILLFRAME_MUJOCO {mujoco.mj_version()}\n"
+    whole = header + "".join(text[name].replace('#include "surfaces.h"', "") for name in SOURCES)
+    for _ in range(2):
+        built = build_library("contacts", whole, include=Path(mujoco.__file__).parent / "include")
+        if built is None or not _loaded_engine():
+            return None
+        try:
+            return ctypes.CDLL(str(built), mode=ctypes.RTLD_LOCAL)
+        except OSError:  # damaged in the cache
+            built.unlink(missing_ok=True)
+    return None
+
+
 @lru_cache(maxsize=1)
 def library() -> ctypes.CDLL | None:
     """The contact generator, in MuJoCo's table from now on, or None where it cannot be built."""
-    folder = Path(__file__).parent
-    text = {name: (folder / name).read_text(encoding="utf-8") for name in SOURCES}
-    inside = Path(mujoco.__file__).parent
-    header = f"#define SKILLFRAME_MUJOCO {mujoco.mj_version()}\n"
-    whole = header + "".join(text[name].replace('#include "surfaces.h"', "") for name in SOURCES)
-    built = build_library("contacts", whole, include=inside / "include")
-    if built is None:
-        return None
-    found = ctypes.CDLL(str(built), mode=ctypes.RTLD_LOCAL) if _loaded_engine() else None
+    found = opened()
     if found is None or found.skillframe_version() != mujoco.mj_version():
         return None
     found.skillframe_mark.restype = ctypes.c_int64

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from skillframe.errors import InputError
+from skillframe.fmu.build import build_library
 from skillframe.parts.field import surface_of
 from skillframe.parts.found import lines, values
 from skillframe.parts.load import load
@@ -13,7 +14,7 @@ from skillframe.parts.solid import arrays_of
 from skillframe.parts.world import stated
 from skillframe.world.convert import add_geom
 from skillframe.world.scene import Geom
-from skillframe.world.surfaces import available
+from skillframe.world.surfaces import available, opened
 from tests.part_meshes import FILE, box, hole, in_metres, rod, round_pair, write
 
 needs_compiler = pytest.mark.skipif(not available(), reason="needs a C compiler")
@@ -124,3 +125,22 @@ def test_without_a_compiler_there_are_pieces_alone_and_one_sentence(tmp_path, mo
     with pytest.raises(InputError, match=r"socket\.stl: takes .* convex pieces .*without a C compiler") as caught:
         load(write(tmp_path, *round_pair(), FILE))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.slow
+@needs_compiler
+def test_a_library_that_is_damaged_in_the_cache_is_built_again(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    built = []
+
+    def damaged_once(*args, **options):
+        built.append(build_library(*args, **options))
+        if len(built) == 1:
+            built[0].write_bytes(b"damaged")
+        return built[-1]
+
+    monkeypatch.setattr("skillframe.world.surfaces.build_library", damaged_once)
+    found = opened()
+    assert found is not None
+    assert found.skillframe_version() == mujoco.mj_version()
+    assert len(built) == 2
