@@ -101,6 +101,16 @@ class Composition(Skill):
         self._due[row] = part
         self._note(row, time, f"{self.parts[part].name}: {why}")
 
+    def leave(self, row: int, time: float, status: int, reason: str) -> None:
+        """Let a trial leave its part with a status, for what follows it, or for the end of the whole."""
+        part = int(self.current[row])
+        following, whole, why = self.follows(row, part, status, reason)
+        if following != END:
+            self.switch(row, following, time, why)
+            return
+        self._status[row], self._reason[row] = whole, f"{self.parts[part].name}: {why}"
+        self._note(row, time, f"ended: {why}")
+
     def _note(self, row: int, time: float, text: str) -> None:
         self._journal[row].append((time, text))
 
@@ -134,14 +144,8 @@ class Composition(Skill):
 
     def _after(self, observation: Observation, command: Command) -> Command:
         for i in np.flatnonzero((command.status != Status.RUNNING) & (self._status == Status.RUNNING)).tolist():
-            part, time = int(self.current[i]), float(observation.time[i])
             status, reason = self._judged(i, int(command.status[i]), str(command.reason[i]), observation)
-            following, whole, why = self.follows(i, part, status, reason)
-            if following != END:
-                self.switch(i, following, time, why)
-                continue
-            self._status[i], self._reason[i] = whole, f"{self.parts[part].name}: {why}"
-            self._note(i, time, f"ended: {why}")
+            self.leave(i, float(observation.time[i]), status, reason)
         return command._replace(status=self._status.copy(), reason=_told(self._status, self._reason))
 
     def _judged(self, row: int, status: int, reason: str, observation: Observation) -> tuple[int, str]:

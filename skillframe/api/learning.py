@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -139,7 +139,7 @@ Skills = LearnedSkill | File | Mapping[str, Any]
 
 def learn(
     demonstrations: Demonstrations, skill: str = "lmc", *, at: str | None = None, hand: str | None = None,
-    axes: str = "base", **settings: Any,
+    axes: str = "base", exception: str | None = None, blind: Sequence[File] = (), **settings: Any,
 ) -> LearnedSkill:  # fmt: skip
     """Learn a skill from demonstrations of one phase. For a whole task see `segment`.
 
@@ -151,13 +151,34 @@ def learn(
         at: where it is learned: a frame's name or "x,y,z" [m] in the tool frame; None for the recorded tool point.
         hand: where the hand held, for the work of torques; None for the recording's own, else the learning point.
         axes: "base", or "phase_start": the tool's attitude at the start of the phase.
+        exception: kind of skill that searches where this one stalls, "search" or "spiral"; makes a "seat" of it.
+        blind: files of blind searches to learn that of `exception` from.
         **settings: of the learner; `skillframe plugins show lmc` lists them [SI].
 
     Raises:
         InputError: a demonstration or a setting cannot be used, or demonstrations do not fit together.
         UnknownName: no such kind of skill, frame or setting.
     """
-    return learn_with(demonstrations, skill, LearnOptions(at=at, hand=hand, axes=axes, settings=settings))
+    options = LearnOptions(at=at, hand=hand, axes=axes, settings=settings)
+    if exception is not None:
+        skill, options = seating(skill, exception, blind, options)
+    return learn_with(demonstrations, skill, options)
+
+
+def seating(skill: str, exception: str, blind: Sequence[File], options: LearnOptions) -> tuple[str, LearnOptions]:
+    """The kind of skill that a learned one becomes with a search where it stalls, and its options.
+
+    Args:
+        skill: kind that pushes.
+        exception: kind that searches.
+        blind: files that the search is learned from.
+        options: of the one that pushes.
+
+    Raises:
+        UnknownName: no such kind of skill is installed.
+    """
+    own = {"skill": skill, "exception": exception, "blind": [os.fspath(file) for file in blind]}
+    return registry().skill("seat").name, replace(options, settings={**options.settings, **own})
 
 
 def learn_with(demonstrations: Demonstrations, skill: str, options: LearnOptions) -> LearnedSkill:

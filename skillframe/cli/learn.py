@@ -40,10 +40,18 @@ OF_ONE_PHASE = "lmc"
     metavar="NAME=VALUE",
     help="A setting of the learner (skillframe plugins show lmc lists them; repeatable).",
 )
+@click.option(
+    "--exception", shell_complete=names.skills,
+    help="Kind of skill that searches where the learned one stalls: search, spiral, or a plug-in's.",
+)  # fmt: skip
+@click.option(
+    "--blind", multiple=True, type=click.Path(path_type=Path),
+    help="A recorded blind search, to learn that of --exception from (repeatable).",
+)  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print the skill document as JSON on stdout as well.")
 def command(
     files: tuple[Path, ...], out: Path, skill: str, at: str | None, hand: str | None, axes: str,
-    settings: tuple[str, ...], as_json: bool,
+    settings: tuple[str, ...], exception: str | None, blind: tuple[Path, ...], as_json: bool,
 ) -> int:  # fmt: skip
     """Learn a skill from FILES, demonstrations of one phase, and say in words what was learned.
 
@@ -54,20 +62,27 @@ def command(
       skillframe learn demo1.npz demo2.npz --out slide.skill.json
       skillframe learn left.csv right.csv --at wrist --out peg.skill.json
       skillframe learn demo.npz --axes phase_start --set moving_m=0.002 --out snap.skill.json
+      skillframe learn demo1.npz demo2.npz --exception search --set shift=0.001 --out seat.skill.json
     """
     from skillframe.api.inputs import demonstrations_of
-    from skillframe.api.learning import learn_with
+    from skillframe.api.learning import learn_with, seating
     from skillframe.config import parse_setting
+    from skillframe.errors import InputError
     from skillframe.extend.records import LearnOptions
     from skillframe.extend.registry import registry
 
     options = LearnOptions(at=at, hand=hand, axes=axes, settings=dict(parse_setting(text) for text in settings))
     registry().behaviour(skill)  # an unknown one is told before any file is read
+    kind = skill
+    if exception is not None:
+        kind, options = seating(skill, exception, blind, options)
+    elif blind:
+        raise InputError("--blind", "is for the search of --exception", "give --exception search as well")
     demonstrations = demonstrations_of(files)
     with warned():
-        learned = learn_with(demonstrations, skill, options)
+        learned = learn_with(demonstrations, kind, options)
     learned.save(out)
-    if skill == OF_ONE_PHASE:
+    if kind == OF_ONE_PHASE:
         _point_to_segment(demonstrations)
     made = f"{out}: {learned.type} from {len(files)} demonstration{'s' * (len(files) != 1)}"
     tell([made, *learned.words], err=as_json)

@@ -14,7 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from skillframe.conformance import beginning, running
+from skillframe.conformance import beginning, running, stalls
 from skillframe.conformance.examples import example_demonstrations
 from skillframe.conformance.play import (
     AGREEMENT,
@@ -231,4 +231,5 @@ CHECKS: Mapping[str, Callable[[SkillType, Document], Iterable[str]]] = {
     "starts again": beginning.starts_again,
     "restarts some trials": beginning.restarts_some_trials,
     "tells its journal": beginning.tells_its_journal,
+    "finds the way on": stalls.finds_the_way_on,
 }

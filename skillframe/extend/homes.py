@@ -10,7 +10,7 @@ HOMES = {
     "skill:lmc": "lmc",
     "skill:policy": "segmenter",
     **{f"segmenter:{name}": "segmenter" for name in ("wrench_hmm", "pose_hmm", "zvc")},
-    **{f"skill:{name}": "search" for name in ("search", "spiral", "random_walk")},
+    **{f"skill:{name}": "search" for name in ("search", "spiral", "random_walk", "seat")},
     **{f"skill:{name}": "baselines" for name in ("acp", "replay", "dmp", "gmr", "seds")},
     "coordinator:dual_arm": "dualarm",
     "skill:dual_arm": "dualarm",  # asked for as any other behaviour

@@ -15,6 +15,7 @@ from skillframe.extend.outputs import MovingImpedance as MovingImpedance
 from skillframe.extend.outputs import ReportFiles as ReportFiles
 from skillframe.extend.outputs import ScoreType as ScoreType
 from skillframe.extend.outputs import SectionType as SectionType
+from skillframe.extend.stalled import Stalled as Stalled
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -97,6 +98,8 @@ class SkillType:
             takes on arms that must move slowly; None for one that moves nothing, or if it is not known.
         example: a small valid document to try the type with, for a type that is not learned, or that the example
             demonstrations of `skillframe.testing` do not suit.
+        exception: a document's body for finding the way on where another skill has stalled, as `extend.stalled` says;
+            None: this kind is no exception strategy.
     """
 
     name: str
@@ -112,6 +115,7 @@ class SkillType:
     area: Callable[[Document], Float] | None = None
     speed: Callable[[Document], float | None] | None = None
     example: Callable[[], Document] | None = None
+    exception: Callable[[Stalled], Document] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

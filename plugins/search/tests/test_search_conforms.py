@@ -1,6 +1,7 @@
 """The three searches obey the laws of the loop's contract."""
 
 import numpy as np
+import pytest
 
 from skillframe.extend.registry import registry
 from skillframe.skill import rows_of
@@ -17,6 +18,11 @@ class TestSpiral(SkillConformance):
 
 class TestRandomWalk(SkillConformance):
     skill_type = "random_walk"
+
+
+@pytest.mark.slow
+class TestSeat(SkillConformance):
+    skill_type = "seat"
 
 
 def test_a_trial_that_begins_anew_does_what_it_would_alone():

@@ -16,7 +16,7 @@ from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
 
 pytestmark = pytest.mark.needs_plugins
-KINDS = ["lmc", "replay", "dmp", "gmr", "seds", "search", "spiral", "random_walk", "dual_arm"]
+KINDS = ["lmc", "replay", "dmp", "gmr", "seds", "search", "spiral", "random_walk", "seat", "dual_arm"]
 
 
 @pytest.fixture

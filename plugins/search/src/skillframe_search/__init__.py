@@ -2,8 +2,9 @@
 
 Read in this order: `contact` (what a blind demonstration says), `exploration` and `forces` (what is learned), `tour`
 and `ergodic` (where to go), `smoothing` (how fast), `plan` (all of it as one trajectory), `watch` (has it fallen in?),
-`runtime` (the skill that runs). `simple` holds the baselines. This module is all that is imported when plug-ins are
-listed.
+`runtime` (the skill that runs). `simple` holds the baselines, `deadband` what friction does to them. Then the skill
+that seats a part, and searches where it stalls: `seat_document`, `seat_learner`, `fallback` (the search where none was
+shown), `reach`, `seat`. This module is all that is imported when plug-ins are listed.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ SUMMARIES = {
     "spiral": "searches along an Archimedean spiral around the start, a baseline",
     "random_walk": "searches by random steps around the start, a baseline",
 }
+STRATEGIES = ("search", "spiral")
+"""Those that can find the way on where another skill has stalled."""
 
 
 @hookimpl
@@ -38,4 +41,16 @@ def skillframe_skills() -> Iterable[SkillType]:
             explain=Lazy("skillframe_search.pictures:explain"),
             example=partial(Lazy("skillframe_search.example:example"), kind),
             area=Lazy("skillframe_search.plan:area"),
+            exception=partial(Lazy("skillframe_search.fallback:strategy"), kind=kind) if kind in STRATEGIES else None,
         )
+    yield SkillType(
+        name="seat",
+        summary="seats a part: approaches, pushes as learned, searches where the push stalls, and pushes on",
+        build=Lazy("skillframe_search.seat:build"),
+        check=Lazy("skillframe_search.seat_document:check"),
+        learn=Lazy("skillframe_search.seat_learner:learn"),
+        settings=Lazy("skillframe_search.seat_learner:SeatSettings").load,
+        describe=Lazy("skillframe_search.seat_words:describe"),
+        explain=Lazy("skillframe_search.seat_words:explain"),
+        example=Lazy("skillframe_search.example:seating"),
+    )

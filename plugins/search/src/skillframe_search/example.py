@@ -43,6 +43,31 @@ def searching(
     )  # fmt: skip
 
 
+def seating() -> Document:
+    """A seating, learned from two made-up demonstrations of a plug."""
+    from skillframe.document.source import learned
+    from skillframe.extend.registry import registry
+
+    return learned(registry().skill("seat"), [seated(0.14), seated(-0.14, 1)], LearnOptions())
+
+
+def seated(tilt: float, seed: int = 0) -> Demonstration:
+    """10 mm down in free air, tilted about y [rad], then 12 mm in contact, upright at the end, tip at (0.4, 0, 0.2)."""
+    time = np.arange(0.0, 3.0, 1.0 / (2.0 * RATE))
+    down = np.interp(time, [0.0, 0.5, 1.5, 3.0], [0.0, 0.0, 0.010, 0.022])
+    angle = np.interp(time, [0.0, 1.5, 2.7], [tilt, tilt, 0.0])
+    tip = np.array([0.4, 0.0, 0.222]) - down[:, None] * np.array([0.0, 0.0, 1.0])
+    axis = np.stack([-np.sin(angle), 0.0 * angle, -np.cos(angle)], axis=1)  # of a tool that points down
+    noise = np.random.default_rng(seed).standard_normal((len(time), 6)) * np.repeat([0.05, 0.002], 3)
+    noise[:, 2] += np.where(time > 1.5, PUSH, 0.0)
+    half = 0.5 * angle
+    return Demonstration(
+        time=time, position=tip - 0.2 * axis, wrench=noise,
+        quaternion=np.stack([np.cos(half), 0.0 * half, -np.sin(half), 0.0 * half], axis=1),
+        meta={"task": "plug", "rate": 2.0 * RATE, "contact": True, "frames": {"tip": [0.0, 0.0, 0.2]}},
+    )  # fmt: skip
+
+
 def _wander(rng: np.random.Generator, count: int) -> Float:
     """(count, 2) a smooth wandering of unit variance: two Ornstein-Uhlenbeck filters of 0.5 s, one after the other."""
     values, state, inner = np.empty((count, 2)), np.zeros(2), np.zeros(2)

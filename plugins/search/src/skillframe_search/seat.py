@@ -1,0 +1,243 @@
+r"""Seating a part: approach, push, search where the push stalls, push on.
+
+Primitives and a search as their exception strategy are the papers' structure. How they are joined here is ours.
+
+    approach   to a place above the first contact, then                                              `reach`
+    push       the learned skill, with what is added to it below; at rest and within `short` of the end: SUCCESS
+    search     where it came to rest short of the end, about the nominal axis; on success the push starts again
+    lost       more than `lost` beyond the end is beside the hole: lift, return over the axis, push again
+
+What is added to the push is a wrench F at the centre of compliance, u the way, rho the turn from the nominal attitude:
+
+    catch      - c max(0, v.u - v_max) u                     so that a part that lets go does not fall in
+    lean       - k_0 rho - k_1 max(0, |rho| - tilt) rho/|rho|    so that it does not lie down; k_0 on the rim only
+    rock       m (a cos wt + b sin wt),  a, b across u           in the hole, where it rests short of the end
+
+In the hole the attitude wanted follows the measured one, low-passed and never farther from the nominal one than the
+stated tilt: the hole knows better. All of this is ours. Searches and returns are counted together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.document.frame import read_frame
+from skillframe.extend.records import Document
+from skillframe.extend.registry import registry
+from skillframe.frames import Float, Pose, norm, rotation_matrix, rotation_vector
+from skillframe.sequence import END, Composition, Part
+from skillframe.skill import Command, Observation, Skill, Status
+from skillframe_search.contact import surface_axes
+from skillframe_search.reach import Reach
+from skillframe_search.seat_document import PUSH, SEARCH, Seat, part_of, read_seat
+
+APPROACH, PUSHING, SEARCHING = 0, 1, 2
+FARTHEST_M = 0.08  # an approach may be longer than the demonstrated one by this
+REST_S = 0.3  # without progress, near the end
+ENTERED_M = 0.002  # deeper than the first contact was by this is in the hole: rocked before it is searched for
+
+
+def build(document: Document) -> Seating:
+    """The runnable seating of a checked document.
+
+    Raises:
+        InputError: the document's block `seat`, or a phase, is not as it should be.
+    """
+    push, search = (_maker(part_of(document, i)) for i in (PUSH, SEARCH))
+    seat = read_seat(document)
+    return Seating(seat, read_frame(document).center_of_compliance - np.array(seat.point), push, search)
+
+
+def _maker(document: Document) -> Callable[[], Skill]:
+    kind = registry().skill(document["type"])
+    return lambda: kind.build(document)
+
+
+class Seating(Composition):
+    """N trials of seating one part.
+
+    Args:
+        seat: where it belongs and what is added to the push.
+        shift: (3,) from the seat's point to the centre of compliance, tool axes.
+        push: makes the skill that pushes.
+        search: makes the skill that searches where it has stalled.
+    """
+
+    def __init__(self, seat: Seat, shift: Float, push: Callable[[], Skill], search: Callable[[], Skill]) -> None:
+        self._seat, self._way = seat, np.array(seat.way)
+        self._upright = rotation_matrix(np.array(seat.attitude))
+        self._end, self._start = (np.array(place) + self._upright @ shift for place in (seat.end, seat.start))
+        self._axes = surface_axes(self._way)
+        super().__init__([Part("approach", self._reach), Part("push", push), Part("search", search)])
+
+    def _reach(self) -> Skill:
+        seat, above = self._seat, -self._seat.above_m * self._way
+        farthest = FARTHEST_M + float(norm(self._start - self._end - above))
+        return Reach(self._ends + above, self._upright, self._way, seat.approach_speed, farthest)
+
+    def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
+        """Begin with the approach, or with the push where there is none."""
+        n = len(rngs)
+        self._ends = np.tile(self._end, (n, 1))
+        if self._seat.place == "start":
+            self._ends += observation.pose.position - self._start
+        self._tried = np.zeros(n, dtype=np.intp)
+        self._searched, self._urged = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+        self._held = observation.pose.rotation.copy()
+        self._best, self._since, self._rim = np.full(n, -np.inf), observation.time.copy(), np.zeros(n)
+        super().start(observation, rngs)
+        if not self._seat.approach:
+            self._due = np.full(n, PUSHING)
+            self._journal = [[(time, "push: begins")] for time in observation.time.tolist()]
+
+    def step(self, observation: Observation) -> Command:
+        """Let the parts answer, look how the push gets on, and add to it."""
+        self._deep = _dot(observation.pose.position - self._ends, self._way)
+        moved = self._deep > self._best + self._seat.progress_m
+        self._best, self._since = (
+            np.where(moved, self._deep, self._best),
+            np.where(moved, observation.time, self._since),
+        )
+        command = self._followed(observation, super().step(observation))
+        self._look(observation, command.status == Status.RUNNING)
+        if self._status.any():
+            told = np.where(self._status == Status.RUNNING, "", self._reason)
+            command = command._replace(status=self._status.copy(), reason=told)
+        return command._replace(feedforward=command.feedforward + self._added(observation))
+
+    def switch(self, row: int, part: int, time: float, why: str) -> None:
+        """Enter a part, and watch its progress afresh."""
+        super().switch(row, part, time, why)
+        self._best[row], self._since[row] = -np.inf, time
+
+    def follows(self, row: int, part: int, status: int, reason: str) -> tuple[int, int, str]:
+        """The push after approach and search, the search after a push that ends short of the end."""
+        if part != PUSHING:
+            if status != Status.SUCCESS:
+                return END, status, reason
+            self._searched[row] |= part == SEARCHING
+            return PUSHING, Status.RUNNING, f"begins, as the {self.parts[part].name} ended: {reason}"
+        left = -1e3 * float(self._deep[row])
+        entered = self._deep[row] > -self._seat.contact_m + ENTERED_M
+        if status == Status.SUCCESS and left > 1e3 * self._seat.short_m and entered and not self._urged[row]:
+            self._urged[row] = True
+            return PUSHING, Status.RUNNING, f"goes on and rocks, {left:.1f} mm short of the end: {reason}"
+        if status == Status.SUCCESS and self._near()[row]:
+            return END, status, f"seated, {abs(left):.1f} mm from the demonstrated end: {reason}"
+        if status != Status.SUCCESS:
+            return END, status, reason
+        if not self._seat.search or self._tried[row] >= self._seat.tries:
+            tried = f" after {self._tried[row]} searches and returns" if self._seat.search else ""
+            return END, Status.FAILURE, f"stalled {left:.1f} mm short of the demonstrated end{tried}: {reason}"
+        self._tried[row] += 1
+        return SEARCHING, Status.RUNNING, f"begins, as the push stalled {left:.1f} mm short of the end: {reason}"
+
+    def _near(self) -> NDArray[np.bool_]:
+        result: NDArray[np.bool_] = self._deep >= -(self._seat.short_m + self._seat.height_m)
+        return result
+
+    def _aside(self, observation: Observation) -> Float:
+        """(N,) distance from the nominal axis [m]."""
+        away = observation.pose.position - self._ends
+        return np.sqrt(np.maximum(_dot_rows(away) - self._deep * self._deep, 0.0))
+
+    def _look(self, observation: Observation, running: NDArray[np.bool_]) -> None:
+        """Whose push has stalled, is at the end, or has gone past it, and whose search has sunk."""
+        time = observation.time
+        here = running & (self._status == Status.RUNNING)
+        if self._due is not None:
+            here &= self._due == END
+        idle = time - self._since
+        lost = here & (self.current != APPROACH) & (self._deep > self._seat.lost_m + self._seat.height_m)
+        still = here & ~lost & (self.current == PUSHING)
+        patience = np.where(self._in_hole(), self._seat.patience_s, self._seat.stall_s)
+        still &= (idle >= patience) | ((self._deep >= -self._seat.short_m) & (idle >= REST_S))
+        for i in np.flatnonzero(still).tolist():
+            self.leave(i, float(time[i]), Status.SUCCESS, f"no progress for {idle[i]:.1f} s")
+        sunk = self._deep - self._rim - self._seat.sunk_m - np.tan(self._seat.tilt_rad) * self._aside(observation)
+        for i in np.flatnonzero(here & ~lost & (self.current == SEARCHING) & (sunk > 0.0)).tolist():
+            deeper = 1e3 * float(self._deep[i] - self._rim[i])
+            self.leave(i, float(time[i]), Status.SUCCESS, f"sank {deeper:.1f} mm")
+        for i in np.flatnonzero(lost).tolist():
+            self._return(i, float(time[i]))
+
+    def _return(self, row: int, time: float) -> None:
+        past = f"went {1e3 * self._deep[row]:.1f} mm past the end, which is beside the hole"
+        self._tried[row] += 1
+        if self._tried[row] > self._seat.tries:
+            self._status[row], self._reason[row] = Status.FAILURE, f"{self.parts[self.current[row]].name}: {past}"
+            return
+        self.switch(row, APPROACH, time, f"lifts and returns, as the tool {past}")
+
+    def _enter(self, observation: Observation, due: NDArray[np.intp]) -> None:
+        """Begin a search about the nominal axis, and a push in an attitude within the stated tilt."""
+        position, rotation = observation.pose.position.copy(), observation.pose.rotation.copy()
+        rows = np.flatnonzero(due == SEARCHING)
+        self._rim[rows] = self._deep[rows]
+        position[rows] = self._ends[rows] + self._deep[rows, None] * self._way
+        rotation[rows] = self._upright
+        rows = np.flatnonzero(due == PUSHING)
+        self._held[rows] = rotation[rows] = self._within(rotation[rows])
+        super()._enter(observation._replace(pose=Pose(position, rotation)), due)
+
+    def _within(self, rotation: Float) -> Float:
+        """Attitudes (N, 3, 3) no farther from the nominal one than the stated tilt."""
+        turn = rotation_vector(rotation @ self._upright.T)
+        share = np.minimum(1.0, self._seat.tilt_rad / np.maximum(norm(turn), 1e-9))
+        return rotation_matrix(share[:, None] * turn) @ self._upright
+
+    def _followed(self, observation: Observation, command: Command) -> Command:
+        """The command, its attitude following the measured one where a part in the hole does not turn on purpose."""
+        rows = np.flatnonzero((self.current == PUSHING) & self._in_hole() & ~command.twist[:, 3:].any(axis=1))
+        if not len(rows) or not self._seat.follow_s:
+            return command
+        share = observation.dt / (self._seat.follow_s + observation.dt)
+        turn = rotation_vector(observation.pose.rotation[rows] @ np.swapaxes(self._held[rows], -1, -2))
+        self._held[rows] = self._within(rotation_matrix(share * turn) @ self._held[rows])
+        rotation = command.pose.rotation.copy()
+        rotation[rows] = self._held[rows]
+        return command._replace(pose=Pose(command.pose.position, rotation))
+
+    def _in_hole(self) -> NDArray[np.bool_]:
+        """Who has been searched for, or has gone beyond the first contact and stalled there."""
+        result: NDArray[np.bool_] = self._searched | self._urged
+        return result
+
+    def _added(self, observation: Observation) -> Float:
+        """(N, 6) the wrench that is added to the push: catch, lean and rock."""
+        seat, pushing = self._seat, self.current == PUSHING
+        added = np.zeros((len(pushing), 6))
+        if not pushing.any():
+            return added
+        fast = np.maximum(_dot(observation.twist[:, :3], self._way) - seat.catch_m_s, 0.0)
+        added[:, :3] = -seat.catch_ns_m * fast[:, None] * self._way
+        turn = rotation_vector(observation.pose.rotation @ self._upright.T)
+        angle = np.maximum(norm(turn), 1e-9)
+        pull = (
+            np.where(self._searched, 0.0, seat.upright_nm_rad)
+            + seat.lean_nm_rad * np.maximum(angle - seat.tilt_rad, 0.0) / angle
+        )
+        added[:, 3:] = -pull[:, None] * turn
+        phase = 2.0 * np.pi * seat.rock_hz * observation.time
+        short = self._deep < -self._seat.short_m
+        resting = self._in_hole() & short & (observation.time - self._since > seat.rock_after_s)
+        rock = seat.rock_nm * np.where(resting, 1.0, 0.0)
+        added[:, 3:] += (rock * np.cos(phase))[:, None] * self._axes[0] + (rock * np.sin(phase))[:, None] * self._axes[
+            1
+        ]
+        return np.where(pushing[:, None], added, 0.0)
+
+
+def _dot_rows(rows: Float) -> Float:
+    """(N,) squared lengths of rows (N, 3), each by itself."""
+    result: Float = rows[:, 0] ** 2 + rows[:, 1] ** 2 + rows[:, 2] ** 2
+    return result
+
+
+def _dot(rows: Float, way: Float) -> Float:
+    """(N,) how far rows (N, 3) go along a way (3,), each by itself."""
+    result: Float = rows[:, 0] * way[0] + rows[:, 1] * way[1] + rows[:, 2] * way[2]
+    return result

@@ -1,0 +1,177 @@
+"""A seating document from demonstrations: the push from their contact, the place from their poses, the search beside.
+
+The push is learned from what each demonstration shows from shortly before its first contact on. From the demonstrations
+come the push (at --at), and at the tool's tip the way (from the first contact to the end), the end with its attitude,
+and the height of the first contact. From the user comes how far off the fixture may be. The rest is by hand. The search
+is as wide as the mouth can be off its place, both ways at once (our choice):
+
+    radius = sqrt(2) (shift + tilt * height of the first contact)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from math import radians, sqrt
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from skillframe.conditioning.audit import audit
+from skillframe.config import build
+from skillframe.demonstration.record import Demonstration, resolve_point
+from skillframe.demonstration.together import common_frames
+from skillframe.document.frame import with_center
+from skillframe.errors import InputError
+from skillframe.extend.reading import read_demonstration
+from skillframe.extend.records import Document, LearnOptions, SkillType, Stalled
+from skillframe.extend.registry import registry
+from skillframe.frames import Float, Pose, norm, rotation_vector, unit
+from skillframe_search.learner import plain
+from skillframe_search.seat_document import Seat, as_phase
+
+BEFORE_S = 0.3  # of each demonstration before its contact that the push is learned with
+LEAST_M = 0.002  # from the first contact to the end
+ABOVE_M, MOST_ABOVE_M = 0.002, 0.005  # over the first contact, and at most where demonstrations began higher
+PREFIX = "search_"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SeatSettings:
+    """What `--set` changes, beside the settings of the push's learner, and those of a learned search as search_NAME.
+
+    Attributes:
+        skill: kind of skill that pushes.
+        exception: kind of skill that searches where the push stalls.
+        blind: files of blind demonstrations, for a search that is learned from them.
+        place: "base", where it was demonstrated, or "start": as far from the run's start as it was from theirs.
+        shift, tilt, height: how far off the fixture may be: across the way [m], in attitude [rad], along the way [m].
+        friction: between the parts.
+        approach, search: whether it approaches, and searches on a stall.
+        tries: searches and returns before it gives up.
+    """
+
+    skill: str = "lmc"
+    exception: str = "search"
+    blind: tuple[str, ...] = ()
+    place: Literal["base", "start"] = "base"
+    shift: float = 0.002
+    tilt: float = radians(5.0)
+    height: float = 0.0005
+    friction: float = 0.5
+    approach: bool = True
+    search: bool = True
+    tries: int = 8
+
+    def __post_init__(self) -> None:
+        for name, most in (("shift", 0.05), ("tilt", 0.6), ("height", 0.05), ("friction", 2.0), ("tries", 100)):
+            if not 0.0 <= getattr(self, name) <= most:
+                raise InputError(f"--set {name}", f"should be 0 to {most:g}, is {getattr(self, name):g}", "fix it")
+
+
+class _Shown(NamedTuple):
+    """What one demonstration shows of the place, in base: three points of its way [m], and the attitude at its end."""
+
+    start: Float
+    contact: Float
+    end: Float
+    attitude: Float
+    part: Demonstration
+
+
+def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
+    """The body of a seating document.
+
+    Raises:
+        InputError: axes other than base, a demonstration without contact or way, or an unknown setting.
+        UnknownName: no such kind of skill, or none that is an exception strategy.
+    """
+    settings, own, searching = _sorted(options)
+    if options.axes != "base":
+        raise InputError("--axes", "a seating knows its place in base axes", "leave --axes out")
+    frames = common_frames(demonstrations)
+    point = resolve_point("tip" if "tip" in frames else options.at, frames)
+    shown = [_shown(each, point) for each in demonstrations]
+    seat = _seat(shown, point, settings)
+    push = registry().skill(settings.skill)
+    if push.learn is None:
+        raise InputError(f"--skill {push.name}", "is not learned from demonstrations", "name one that is, such as lmc")
+    body = push.learn([each.part for each in shown], replace(options, settings=own))
+    at_point = with_center({"frame": {**body["frame"], "learned_at": point.tolist()}}, point.tolist())
+    stalled = Stalled(
+        way=seat.way, radius=sqrt(2.0) * (seat.shift_m + seat.tilt_rad * seat.contact_m), tilt=seat.tilt_rad,
+        friction=seat.friction, frame=at_point["frame"],
+        options=replace(options, at=",".join(map(str, point.tolist())), settings=searching),
+        blind=[read_demonstration(Path(file)) for file in settings.blind],
+    )  # fmt: skip
+    strategy = exception_strategy(settings.exception)
+    assert strategy.exception is not None
+    found = strategy.exception(stalled)
+    return {
+        "frame": with_center(body, point.tolist())["frame"],
+        "phases": [as_phase(body, push.name), as_phase(found, strategy.name)],
+        "seat": plain(asdict(seat)),
+        "settings": plain(asdict(settings)),
+    }
+
+
+def exception_strategy(name: str) -> SkillType:
+    """The kind of skill of a name, if it can search where another stalls.
+
+    Raises:
+        UnknownName: there is none. InputError: it cannot, with those that can.
+    """
+    kind = registry().skill(name)
+    if kind.exception is None:
+        able = [each for each in registry().names("skill") if registry().skill(each).exception is not None]
+        raise InputError(f"--exception {name}", f"a {name} skill is no exception strategy", f"name {', '.join(able)}")
+    return kind
+
+
+def _sorted(options: LearnOptions) -> tuple[SeatSettings, dict[str, Any], dict[str, Any]]:
+    """Settings of the seating, of the push's learner, and of the search's."""
+    names, given = SeatSettings.__dataclass_fields__, dict(options.settings)
+    mine = {key: given.pop(key) for key in list(given) if key in names}
+    searching = {key.removeprefix(PREFIX): given.pop(key) for key in list(given) if key.startswith(PREFIX)}
+    return build(SeatSettings, mine, "--set"), given, searching
+
+
+def _shown(demonstration: Demonstration, point: Float) -> _Shown:
+    where = demonstration.source or "demonstration"
+    contacts = audit(demonstration).contacts
+    if not contacts:
+        raise InputError(where, "never touches anything", "record until the part is seated")
+    began = float(contacts[0][0])
+    pose = demonstration.pose
+    position = Pose(pose.position, pose.rotation).at(point).position
+    first = int(np.searchsorted(demonstration.time, began))
+    return _Shown(position[0], position[first], position[-1], pose.rotation[-1],
+                  demonstration.between(began - BEFORE_S, None))  # fmt: skip
+
+
+def _seat(shown: Sequence[_Shown], point: Float, settings: SeatSettings) -> Seat:
+    start, contact, end = (
+        np.mean(each, axis=0) for each in ([s.start for s in shown], [s.contact for s in shown], [s.end for s in shown])
+    )
+    depth = float(norm(end - contact))
+    if depth < LEAST_M:
+        raise InputError(
+            "learn", f"the demonstrations go {1e3 * depth:.1f} mm from first contact to end, which seats nothing",
+            "record until the part is seated, and begin before it touches",
+        )  # fmt: skip
+    way = unit(end - contact)
+    left, _, right = np.linalg.svd(np.sum([each.attitude for each in shown], axis=0))
+    attitude = rotation_vector(left @ right)  # the mean of rotations
+    above = float(np.clip((end - start) @ way, depth + ABOVE_M, depth + MOST_ABOVE_M))
+    return Seat(
+        way=_vector(way), point=_vector(point), end=_vector(end), start=_vector(start), attitude=_vector(attitude),
+        contact_m=depth, above_m=above, place=settings.place, shift_m=settings.shift, tilt_rad=settings.tilt,
+        height_m=settings.height, friction=settings.friction, approach=settings.approach, search=settings.search,
+        tries=settings.tries,
+    )  # fmt: skip
+
+
+def _vector(values: Float) -> tuple[float, float, float]:
+    x, y, z = (float(v) for v in values)
+    return (x, y, z)

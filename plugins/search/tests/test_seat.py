@@ -1,0 +1,371 @@
+"""Seating: what demonstrations, user and hand give, which part follows which, and what is added to the push."""
+
+from dataclasses import replace
+from math import radians, sqrt, tan
+from pathlib import Path
+
+import numpy as np
+import pytest
+from skillframe_search import seat, seat_document, seat_learner
+from skillframe_search.example import searching as blind
+from skillframe_search.example import seated
+from skillframe_search.phase import read_phase
+from skillframe_search.reach import Reach
+from skillframe_search.seat_document import Seat, part_of, read_seat
+
+from skillframe.cli.main import run as typed
+from skillframe.demonstration.npz import write_npz
+from skillframe.document.file import checked, load
+from skillframe.document.source import learned
+from skillframe.errors import InputError
+from skillframe.extend.records import LearnOptions, SkillType
+from skillframe.extend.registry import registry
+from skillframe.frames import Pose, norm, rotation_matrix, rotation_vector
+from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
+
+DEPTH, GRIP = 0.012, 0.2  # of the made-up demonstrations
+DOWN = np.array([0.0, 0.0, -1.0])
+PUSH, SEARCH, APPROACH = seat.PUSHING, seat.SEARCHING, seat.APPROACH
+
+
+def document(**settings):
+    return learned(registry().skill("seat"), [seated(0.14), seated(-0.14, 1)], LearnOptions(settings=settings))
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return document()
+
+
+def test_place_way_and_heights_are_those_of_the_demonstrations_tip_whatever_the_hand_did(plain):
+    """The wrist moves by 28 mm as the tool is straightened, and the tip goes straight down."""
+    found = read_seat(plain)
+    np.testing.assert_allclose(found.way, DOWN, atol=1e-3)
+    np.testing.assert_allclose(found.end, (0.4, 0.0, 0.2), atol=5e-5)  # the last sample is 5 ms before its end
+    assert found.contact_m == pytest.approx(DEPTH, abs=5e-4)  # contact is seen some samples after it begins
+    assert found.above_m == pytest.approx(found.contact_m + 0.005)  # they began 10 mm above it
+    assert plain["frame"]["center_of_compliance"] == [0.0, 0.0, GRIP]
+
+
+def test_the_push_is_learned_from_the_contact_and_not_from_the_free_air_before_it(monkeypatch):
+    seen = []
+    real = registry().skill("lmc")
+    fake = replace(real, learn=lambda given, options: seen.extend(given) or real.learn(given, options))
+    known(monkeypatch, lmc=fake)
+    document()
+    assert [round(each.duration, 1) for each in seen] == [1.8, 1.8]  # 1.5 s of contact, 0.3 s before it
+
+
+def test_the_search_is_as_wide_as_the_user_is_unsure_and_wider_by_the_dead_band():
+    """The mouth is off by the shift both ways, and by the tilt times the height of the first contact."""
+    for shift, tilt, friction in ((0.002, radians(5.0), 0.5), (0.001, radians(2.0), 0.2)):
+        found = document(shift=shift, tilt=tilt, friction=friction)
+        search = read_phase(part_of(found, seat_document.SEARCH))
+        height = read_seat(found).contact_m
+        assert search.path.radius == pytest.approx(sqrt(2.0) * (shift + tilt * height) + friction * 4.0 / 4000.0)
+        assert search.stop.drop_m > 2.0 * search.path.radius * tan(tilt)  # no slope is a hole
+
+
+def test_a_search_is_learned_where_somebody_searched_blindfolded(tmp_path):
+    write_npz(blind(), tmp_path / "blind.npz")
+    found = document(blind=[str(tmp_path / "blind.npz")], search_time=7.0)
+    search = read_phase(part_of(found, seat_document.SEARCH))
+    assert search.exploration is not None and search.stop.time_s == 7.0
+    with pytest.raises(InputError, match="has no such setting"):
+        document(search_time=7.0)
+
+
+def test_the_document_reads_back_and_says_where_each_figure_comes_from(plain):
+    checked(plain, "it")
+    words = "\n".join(registry().skill("seat").describe(plain))
+    for said in ("from the demonstrations: the push", "from the user: the fixture may be off by 2 mm", "by hand"):
+        assert said in words
+    for part in (
+        "approach: to 5.0 mm above",
+        "push: adds",
+        "search: where",
+        "catch: brakes",
+        "lean: pulls",
+        "lost: more",
+    ):
+        assert part in words
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [({"exception": "lmc"}, "lmc skill is no exception strategy; name search, spiral"), ({"shift": -1.0}, "shift"),
+     ({"skill": "seat"}, "axes|phases|seat")],
+)  # fmt: skip
+def test_what_cannot_be_composed_is_refused_in_a_sentence(settings, said):
+    with pytest.raises(InputError, match=said):
+        document(**settings)
+
+
+def test_demonstrations_that_seat_nothing_are_refused():
+    short = seated(0.14).between(None, 1.7)
+    with pytest.raises(InputError, match="seats nothing"):
+        learned(registry().skill("seat"), [short], LearnOptions())
+
+
+class Script(Skill):
+    """Commands a feed-forward of its own, and ends where it is told to."""
+
+    def __init__(self):
+        self.begun, self.ends = [], {}
+
+    def start(self, observation, rngs):
+        self.n = len(rngs)
+        self.begun.append((np.arange(self.n), observation.pose))
+
+    def restart(self, rows, observation, rngs):
+        self.begun.append((rows, Pose(observation.pose.position[rows], observation.pose.rotation[rows])))
+
+    def step(self, observation):
+        status, reason = np.zeros(self.n, dtype=np.int64), no_reasons(self.n)
+        for row, end in self.ends.items():
+            status[row], reason[row] = end, "told to"
+        self.ends = {}
+        stiffness = Impedance(np.eye(6))
+        return Command(observation.pose, np.zeros((self.n, 6)), stiffness, np.ones((self.n, 6)), status, reason)
+
+
+def known(monkeypatch, **kinds):
+    class Known:
+        def skill(self, name):
+            return kinds.get(name) or registry().skill(name)
+
+        def names(self, kind):
+            return sorted({*registry().names(kind), *kinds})
+
+    for module in (seat, seat_document, seat_learner):
+        monkeypatch.setattr(module, "registry", Known)
+
+
+SEAT = Seat(way=(0.0, 0.0, -1.0), point=(0.0, 0.0, 0.0), end=(0.4, 0.0, 0.2), attitude=(0.0, 0.0, 0.0),
+            start=(0.4, 0.0, 0.23), contact_m=0.012, above_m=0.014, approach=False)  # fmt: skip
+
+
+class Played:
+    """A seating of three trials, tick by tick at 100 Hz."""
+
+    def __init__(self, **changes):
+        self.push, self.search = Script(), Script()
+        self.skill = seat.Seating(replace(SEAT, **changes), np.zeros(3), lambda: self.push, lambda: self.search)
+        self.time, self.deep, self.aside, self.turn, self.speed = (
+            0.0,
+            np.full(3, -0.012),
+            np.zeros(3),
+            np.zeros((3, 3)),
+            0.0,
+        )
+        self.skill.start(self.seen(), [np.random.default_rng(i) for i in range(3)])
+
+    def seen(self):
+        position = np.array(SEAT.end) + self.deep[:, None] * DOWN + self.aside[:, None] * np.array([1.0, 0.0, 0.0])
+        twist = np.zeros((3, 6))
+        twist[:, :3] = self.speed * DOWN
+        return Observation(
+            np.full(3, self.time), 0.01, Pose(position, rotation_matrix(self.turn)), twist, np.zeros((3, 6))
+        )
+
+    def go(self, seconds=0.01, **ends):
+        for _ in range(round(seconds / 0.01)):
+            command = self.skill.step(self.seen())
+            self.time += 0.01
+        return command
+
+
+def test_a_push_that_rests_short_of_the_end_is_searched_for_and_one_at_the_end_is_done():
+    played = Played()
+    played.go()
+    played.deep[:] = (-0.012, -0.0004, 0.0)
+    command = played.go(SEAT.stall_s + 0.05)
+    assert command.status.tolist() == [Status.RUNNING, Status.SUCCESS, Status.SUCCESS]
+    assert played.skill.current[0] == SEARCH and "seated, 0.4 mm from" in command.reason[1]
+
+
+def test_a_search_begins_about_the_nominal_axis_at_the_height_of_the_stall_however_far_the_tool_slid():
+    played = Played()
+    played.go()
+    played.deep[0], played.aside[0], played.turn[0] = -0.011, 0.003, (0.2, 0.0, 0.0)
+    played.push.ends = {0: Status.SUCCESS}
+    played.go(0.02)
+    _, pose = played.search.begun[0]
+    np.testing.assert_allclose(pose.position[0], np.array(SEAT.end) - 0.011 * DOWN, atol=1e-12)
+    np.testing.assert_allclose(pose.rotation[0], np.eye(3), atol=1e-12)
+
+
+def searching(**changes):
+    played = Played(**changes)
+    played.go()
+    played.push.ends = {0: Status.SUCCESS}
+    played.go(0.02)
+    assert played.skill.current.tolist() == [SEARCH, PUSH, PUSH]
+    return played
+
+
+def test_a_tool_that_sinks_is_pushed_on_and_one_that_slides_down_a_slope_is_not():
+    played = searching()
+    slope = 0.003 * tan(SEAT.tilt_rad)
+    played.aside[0], played.deep[0] = 0.003, -0.012 + slope + 0.9 * SEAT.sunk_m
+    played.go(0.02)
+    assert played.skill.current[0] == SEARCH
+    played.deep[0] = -0.012 + slope + 1.3 * SEAT.sunk_m
+    played.go(0.02)
+    assert played.skill.current[0] == PUSH and "sank 1.3 mm" in played.skill.journal(0)[-1][1]
+
+
+def test_a_push_after_a_search_begins_no_farther_tilted_than_the_fixture_may_be():
+    played = searching()
+    played.turn[0] = (0.3, 0.0, 0.0)
+    played.search.ends = {0: Status.SUCCESS}
+    played.go(0.02)
+    rows, pose = played.push.begun[-1]
+    assert rows.tolist() == [0]
+    np.testing.assert_allclose(pose.rotation[0], rotation_matrix(np.array([SEAT.tilt_rad, 0.0, 0.0])), atol=1e-12)
+
+
+def test_a_tool_beyond_the_end_is_lost_and_returns_as_often_as_it_is_allowed_to():
+    played = searching(tries=2)
+    played.deep[0] = SEAT.lost_m + SEAT.height_m + 1e-4
+    played.go(0.02)
+    assert played.skill.current[0] == APPROACH and "lifts and returns" in played.skill.journal(0)[-1][1]
+    played.deep[0] = -SEAT.above_m
+    played.go(1.1)
+    assert played.skill.current[0] != APPROACH  # it is back over the hole
+    played.deep[0] = SEAT.lost_m + SEAT.height_m + 1e-4
+    command = played.go(0.02)
+    assert command.status[0] == Status.FAILURE and "beside the hole" in command.reason[0]
+
+
+def test_a_search_that_fails_is_the_end_and_without_search_a_stall_is():
+    played = searching()
+    played.search.ends = {0: Status.FAILURE}
+    assert played.go(0.02).status[0] == Status.FAILURE
+    played = Played(search=False)
+    command = played.go(SEAT.stall_s + 0.1)
+    assert command.status.tolist() == [Status.FAILURE] * 3
+    assert "stalled 12.0 mm short of the demonstrated end" in command.reason[0]
+
+
+def test_what_falls_in_is_braked_along_the_way_beyond_the_speed_of_the_catch():
+    played = Played()
+    for speed in (0.02, 0.03, 0.13):
+        played.speed = speed
+        brake = 400.0 * max(speed - 0.03, 0.0)
+        np.testing.assert_allclose(
+            played.go().feedforward[:, :3], np.tile(np.ones(3) - brake * DOWN, (3, 1)), atol=1e-9
+        )
+
+
+def test_what_lies_down_is_pulled_upright_with_more_beyond_the_stated_tilt():
+    played = Played()
+    for angle in (0.05, 0.3):
+        played.turn[:] = (0.0, angle, 0.0)
+        pull = 3.0 * angle + 20.0 * max(angle - SEAT.tilt_rad, 0.0)
+        np.testing.assert_allclose(played.go().feedforward[0, 3:], (1.0, 1.0 - pull, 1.0), atol=1e-9)
+
+
+def test_a_part_that_rests_in_the_hole_after_a_search_is_rocked_and_only_then():
+    played = searching()
+    quiet = played.go().feedforward
+    np.testing.assert_allclose(quiet[0], np.ones(6))  # nothing is added to a search
+    played.search.ends = {0: Status.SUCCESS}
+    played.deep[:] = -0.008
+    rocked = played.go(0.3).feedforward - 1.0
+    assert norm(rocked[0, 3:]) == pytest.approx(0.4) and abs(rocked[0, 5]) < 1e-12
+    assert norm(rocked[1, 3:]) == 0.0  # a push that has not been searched for
+
+
+def test_in_the_hole_the_attitude_wanted_follows_the_measured_one_up_to_the_stated_tilt_and_no_farther():
+    played = searching()
+    played.search.ends = {0: Status.SUCCESS}
+    played.go(0.02)
+    for angle in (0.06, 0.5):
+        played.turn[:] = (angle, 0.0, 0.0)
+        wanted = played.go(1.4).pose.rotation  # e^(-1.4 / 0.31) is 1.1 %
+        followed = rotation_vector(wanted[0])
+        np.testing.assert_allclose(followed, (min(angle, SEAT.tilt_rad), 0.0, 0.0), atol=0.012 * angle)
+        played.deep[0] += 0.001
+    np.testing.assert_allclose(wanted[1], rotation_matrix(played.turn[1]))  # the push's own, before any search
+
+
+def test_an_outside_kind_of_skill_can_be_the_exception_strategy(monkeypatch):
+    """It needs a record with `exception`, and no word of this plug-in."""
+    seen = []
+
+    def wiggle(stalled):
+        seen.append(stalled)
+        return {"frame": stalled.frame, "phases": [{"wiggle": 1.0}]}
+
+    known(monkeypatch, wiggle=SkillType(name="wiggle", summary="", build=lambda d: Script(), exception=wiggle))
+    found = document(exception="wiggle", shift=0.001)
+    assert found["phases"][seat_document.SEARCH]["skill"] == "wiggle"
+    assert isinstance(seat.build(found), Skill)
+    np.testing.assert_allclose(seen[0].way, DOWN, atol=1e-3)
+    assert seen[0].radius == pytest.approx(sqrt(2.0) * (0.001 + seen[0].tilt * read_seat(found).contact_m))
+
+
+def test_a_way_back_lifts_first_then_goes_straight_and_ends_upright():
+    goal = np.array([[0.4, 0.0, 0.22]])
+    skill = Reach(goal, np.eye(3), DOWN, 0.05, 0.2)
+    tilted = Pose(np.array([[0.41, 0.0, 0.2]]), rotation_matrix(np.array([[0.1, 0.0, 0.0]])))
+    seen = Observation(np.zeros(1), 0.01, tilted,
+                       np.zeros((1, 6)), np.zeros((1, 6)))  # fmt: skip
+    skill.start(seen, [np.random.default_rng(0)])
+    places = []
+    for time in np.arange(0.0, 1.5, 0.01):
+        command = skill.step(seen._replace(time=np.array([time])))
+        places.append(command.pose.position[0].copy())
+        if command.status[0]:
+            break
+    places = np.array(places)
+    lifting = places[:, 2] < 0.22 - 1e-9
+    np.testing.assert_allclose(places[lifting][:, 0], 0.41)
+    np.testing.assert_allclose(places[-1], goal[0], atol=1e-9)
+    np.testing.assert_allclose(command.pose.rotation[0], np.eye(3), atol=1e-9)
+    assert command.status[0] == Status.SUCCESS and norm(np.diff(places, axis=0)).max() < 0.05 * 0.01 + 1e-9
+
+
+def test_a_way_back_stops_where_it_touches_and_refuses_to_cross_the_room():
+    far = Reach(np.array([[0.4, 0.5, 0.22]]), np.eye(3), DOWN, 0.05, 0.1)
+    near = Reach(np.array([[0.4, 0.0, 0.22]]), np.eye(3), DOWN, 0.05, 0.1)
+    pose = Pose(np.array([[0.4, 0.0, 0.25]]), np.eye(3)[None])
+    seen = Observation(np.zeros(1), 0.01, pose, np.zeros((1, 6)), np.array([[0.0, 0.0, 9.0, 0.0, 0.0, 0.0]]))
+    for skill, status, said in (
+        (far, Status.FAILURE, "learn with --set place=start"),
+        (near, Status.SUCCESS, "touched"),
+    ):
+        skill.start(seen, [np.random.default_rng(0)])
+        command = [skill.step(seen._replace(time=np.array([0.01 * k]))) for k in range(30)][-1]
+        assert command.status[0] == status and said in command.reason[0]
+
+
+def test_one_command_composes_them_in_one_file_and_its_page_says_what_each_adds(tmp_path, capsys):
+    files = [str(tmp_path / "1.npz"), str(tmp_path / "2.npz")]
+    for file, tilt in zip(files, (0.14, -0.14), strict=True):
+        write_npz(seated(tilt), Path(file))
+    out = str(tmp_path / "seat.skill.json")
+    assert typed(["learn", *files, "--exception", "search", "--set", "shift=0.001", "--out", out]) == 0
+    said = capsys.readouterr().out
+    assert "seat a part" in said and "the fixture may be off by 1 mm across" in said and "search: press along" in said
+    found = load(Path(out))
+    assert (found["type"], [each["skill"] for each in found["phases"]]) == ("seat", ["lmc", "search"])
+    page = tmp_path / "seat.html"
+    assert typed(["skill", "explain", out, "--out", str(page)]) == 0
+    assert "from the demonstrations: the push" in page.read_text() and "The search: Where it looks" in page.read_text()
+
+
+def test_what_the_command_cannot_compose_is_one_sentence(tmp_path, capsys):
+    file = str(tmp_path / "1.npz")
+    write_npz(seated(0.14), Path(file))
+    for more, said in (
+        (["--blind", file], "give --exception search as well"),
+        (["--exception", "replay"], "is no exception strategy; name search, spiral"),
+        (["--exception", "sarch"], "search"),
+        (["--exception", "search", "--blind", str(tmp_path / "none.npz")], "none.npz"),
+        (["--exception", "search", "--axes", "phase_start"], "base axes"),
+    ):
+        assert typed(["learn", file, *more, "--out", str(tmp_path / "a.json")]) == 2
+        told = capsys.readouterr().err
+        assert said in told and told.count("\n") == 1
