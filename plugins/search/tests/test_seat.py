@@ -184,6 +184,15 @@ def test_a_push_that_rests_short_of_the_end_is_searched_for_and_one_at_the_end_i
     assert played.skill.current[0] == SEARCH and "seated, 0.4 mm from" in command.reason[1]
 
 
+def test_a_place_that_goes_by_the_start_is_as_far_from_it_as_it_was_demonstrated():
+    """The run begins 12 mm above the demonstrated end, the demonstrations 30 mm: so its end is 18 mm lower."""
+    played = Played(place="start")
+    played.go()
+    played.deep[:] = 0.018
+    command = played.go(0.5)
+    assert (command.status == Status.SUCCESS).all() and "seated, 0.0 mm from" in command.reason[0]
+
+
 def test_a_search_begins_about_the_nominal_axis_at_the_height_of_the_stall_however_far_the_tool_slid():
     played = Played()
     played.go()
