@@ -20,6 +20,7 @@ from skillframe.conditioning.contact import (
     contact_strength,
     free_air_level,
 )
+from skillframe.conditioning.lateness import lateness
 from skillframe.conditioning.noise import LEAST_SAMPLES, NoiseFigures, has_window, noise_figures
 from skillframe.demonstration.assemble import NOTES
 from skillframe.demonstration.checks import GAP, angles_between
@@ -57,6 +58,7 @@ class DemonstrationAudit:
         contacts: [start, stop, peak] of every contact [s, s, N].
         stalls: [{what, start, stop}] of every stretch that repeats one value: the wrench, a channel, the pose [s].
         onsets_unseen: starts of contacts that follow a stall, and so began nobody knows when [s].
+        wrench_late_s: how late the wrench is against the pose (`lateness`), None where the recording does not tell [s].
         notes: what the reader did.
         warnings: sentences with evidence.
         usable: whether there is anything to learn from.
@@ -82,6 +84,7 @@ class DemonstrationAudit:
     contacts: list[list[float]]
     stalls: list[dict[str, Any]]
     onsets_unseen: list[float]
+    wrench_late_s: float | None
     notes: list[str]
     warnings: list[str]
     usable: bool
@@ -112,6 +115,9 @@ def audit(demonstration: Demonstration) -> DemonstrationAudit:
     warnings = [text for suspicion in AUDITS for text in suspicion(d)]
     warnings += [f"stall: {stall.words()}: it counts as neither free air, contact nor noise" for stall in found]
     warnings += _wrench_warnings(d, noise, level, drift, contacts)
+    late = lateness(d)
+    if late is not None and late.counts:
+        warnings.append(late.words())
     if unseen:
         at = ", ".join(f"{start:.2f}" for start in unseen)
         warnings.append(f"contact: from {at} s it follows a stall: when it began, nobody saw")
@@ -129,6 +135,7 @@ def audit(demonstration: Demonstration) -> DemonstrationAudit:
         peak_force_n=float(norm(d.wrench[:, :3]).max()),
         contact_threshold_n=contact_strength(d.time, d.wrench, noise, level, live)[1],
         contacts=[list(contact) for contact in contacts], stalls=as_meta(found), onsets_unseen=unseen,
+        wrench_late_s=None if late is None else late.seconds,
         notes=list(d.meta.get(NOTES, [])), warnings=warnings,
         usable=usable,
     )  # fmt: skip
