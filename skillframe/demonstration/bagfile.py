@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.mcap import verify
+from skillframe.demonstration.mcap import refuse_other_encodings, verify
 from skillframe.errors import InputError, MissingDependency
 
 BAG_FACTS = "metadata.yaml"
@@ -65,11 +65,14 @@ def checksum_notes(path: Path) -> list[str]:
     """Verify the checksums of every MCAP file of a bag. Returns notes on those that carry none.
 
     Raises:
-        InputError: damage.
+        InputError: damage, or no messages of ROS.
     """
     files = sorted(path.glob("*.mcap")) if path.is_dir() else [path] if path.suffix.lower() == ".mcap" else []
     with _foreign(path):
-        return [note for file in files for note in verify(file)]
+        notes = [note for file in files for note in verify(file)]
+        for file in files:
+            refuse_other_encodings(file)
+    return notes
 
 
 @contextmanager

@@ -47,6 +47,8 @@ POSES: Mapping[str, Callable[[Any], tuple[Any, Any]]] = {
     "nav_msgs/msg/Odometry": lambda m: (m.pose.pose.position, m.pose.pose.orientation),
 }
 JOINTS, WRENCHES = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
+FORCE_WORDS = ("wrench", "force", "franka", "robotstate", "torque")
+"""What types of messages are called that may hold a wrench."""
 STAMP_START = "header_stamp_start_ns"
 """Metadata key of the header stamp at time 0 [ns]."""
 
@@ -144,6 +146,13 @@ def _remedy(what: str, topics: Mapping[str, str]) -> str:
         named = ["name the robot with --robot"] * (JOINTS in topics.values())
         named += ["name base and tool with --pose-frames BASE,TOOL"] * any(kind in TREES for kind in topics.values())
         return ", or ".join(named) or "record the tool's pose or joint states"
+    other = [topic for topic, kind in sorted(topics.items()) if any(word in kind.lower() for word in FORCE_WORDS)]
+    if other:
+        which = " and ".join(other)
+        return (
+            f"{which} may hold one in a type that is not read: republish it as WrenchStamped, "
+            "or export it as CSV and type --columns auto"
+        )
     return "record the wrench too, or state contact = false in NAME.meta.toml beside it"
 
 

@@ -17,7 +17,9 @@ from typing import Any, BinaryIO, NamedTuple
 from skillframe.errors import InputError
 
 MAGIC = b"\x89MCAP0\r\n"
-FOOTER, CHUNK, DATA_END = 0x02, 0x06, 0x0F
+FOOTER, CHANNEL, CHUNK, DATA_END = 0x02, 0x04, 0x06, 0x0F
+READ = ("cdr", "ros1")
+"""Encodings of messages that are read: those of ROS 2 and ROS 1."""
 FOOTER_LENGTH = 20
 LARGEST_CHUNK = 256_000_000
 """Bytes that a chunk may unpack to; writers close one after about a megabyte (our choice)."""
@@ -61,6 +63,35 @@ def verify(path: Path) -> list[str]:
         data = [_data_is_protected(path, file, record, records[0]) for record in records if record.kind == DATA_END]
         _check_summary(path, file, records)
     return [] if any(data) or (chunks and all(chunks)) else [f"{path.name} {UNPROTECTED}"]
+
+
+def refuse_other_encodings(path: Path) -> None:
+    """Refuse a sound MCAP file in which no message is encoded as ROS does, by the names of its encodings.
+
+    Raises:
+        InputError: its channels say so. A file without channels in its summary is passed over.
+    """
+    with path.open("rb") as file:
+        if file.read(len(MAGIC)) != MAGIC:
+            return
+        found = dict(_channel(file, record) for record in _records(path, file) if record.kind == CHANNEL)
+    if found and not set(found.values()) & set(READ):
+        topics = ", ".join(f"{topic} ({encoding or 'no encoding'})" for topic, encoding in sorted(found.items()))
+        raise InputError(
+            path, f"is an MCAP file without messages of ROS: {topics}",
+            "cdr and ros1 are read; export its topics as CSV or JSON lines, and type --columns auto",
+        )  # fmt: skip
+
+
+def _channel(file: BinaryIO, record: _Record) -> tuple[str, str]:
+    """Topic and message encoding of a channel."""
+    file.seek(record.content)
+    content, place, texts = file.read(min(record.length, BLOCK)), 4, []
+    for _ in range(2):
+        length = int.from_bytes(content[place : place + 4], "little")
+        texts.append(content[place + 4 : place + 4 + length].decode("utf-8", "replace"))
+        place += 4 + length
+    return texts[0], texts[1]
 
 
 def _records(path: Path, file: BinaryIO) -> Iterator[_Record]:

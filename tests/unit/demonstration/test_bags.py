@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from skillframe.cli.main import run
+from skillframe.demonstration import bags
 from skillframe.demonstration.bags import STAMP_START
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError, MissingDependency, UnknownName
@@ -249,3 +250,11 @@ def test_a_recorded_bag_of_another_makers_is_opened_and_judged(tmp_path: Path) -
     copy.with_name(f"{copy.stem}.meta.toml").write_text("contact = false\n")
     with pytest.raises(InputError, match=r"/pose: row 1: the quaternion's norm is 13\.19"):  # it holds no rotations
         read_demonstration(copy)
+
+
+def test_a_wrench_in_a_type_that_is_not_read_is_pointed_out() -> None:
+    said = bags._remedy(
+        "wrench", {"/state": "franka_msgs/msg/FrankaRobotState", "/tool": "geometry_msgs/msg/PoseStamped"}
+    )
+    assert said.startswith("/state may hold one in a type that is not read") and "--columns auto" in said
+    assert bags._remedy("wrench", {"/tool": "geometry_msgs/msg/PoseStamped"}).startswith("record the wrench too")

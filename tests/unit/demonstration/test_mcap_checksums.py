@@ -115,3 +115,24 @@ def test_a_chunk_that_claims_gigabytes_is_refused_before_it_is_unpacked(tmp_path
     (tmp_path / "demo.mcap").write_bytes(raw)
     with pytest.raises(InputError, match="would unpack to 1099511627776 bytes"):
         read_demonstration(tmp_path / "demo.mcap")
+
+
+def record(kind: int, content: bytes) -> bytes:
+    return bytes([kind]) + len(content).to_bytes(8, "little") + content
+
+
+def text(said: str) -> bytes:
+    return len(said).to_bytes(4, "little") + said.encode()
+
+
+@pytest.mark.parametrize("encoding", ["json", "protobuf", ""])
+def test_a_sound_file_of_another_encoding_is_named_and_not_called_damaged(encoding: str, tmp_path: Path) -> None:
+    magic = b"\x89MCAP0\r\n"
+    channel = record(4, b"\x01\0\0\0" + text("/ft") + text(encoding) + text(""))
+    head = magic + record(1, text("") + text("a recorder")) + channel + record(0x0F, bytes(4))
+    footer = len(head).to_bytes(8, "little") + bytes(12)
+    (tmp_path / "log.mcap").write_bytes(head + channel + record(2, footer) + magic)
+    with pytest.raises(
+        InputError, match=rf"without messages of ROS: /ft \({encoding or 'no encoding'}\); cdr and ros1"
+    ):
+        read_demonstration(tmp_path / "log.mcap")
