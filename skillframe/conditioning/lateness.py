@@ -78,7 +78,7 @@ def lateness(demonstration: Demonstration) -> Lateness | None:
 
 
 def _motion(d: Demonstration, time: Float) -> Float:
-    """Changes (T - 1, n) of position, direction of motion and attitude, scaled; of columns that change at all."""
+    """Changes (T - 1, n) of position, direction of motion and attitude, scaled, of columns that change."""
     position = np.stack([np.interp(time, d.time, column) for column in d.position.T], axis=1)
     speed = np.gradient(position, time, axis=0)
     way = speed / np.maximum(norm(speed)[:, None], SLOWEST)

@@ -122,7 +122,7 @@ def _innovation_variance(corners: Float, wrench: Float, dt: float) -> Float:
     unit = np.ones((len(corners), 1))
     gain = steady_gain(unit, unit * np.sqrt(dt) * (2.0 * np.pi * corners[:, None]) ** 2, dt)
     starts, rows = chunks(len(wrench))
-    counted = (rows >= starts[:, None]) & (rows < starts[:, None] + CHUNK) & (rows > 0)
+    counted = (rows >= starts[:, None]) & (rows < starts[:, None] + CHUNK)
     value = np.broadcast_to(wrench[rows[:, 0], None], (len(rows), len(corners), 6)).copy()
     slope, total = np.zeros_like(value), np.zeros_like(value)
     for i in range(1, rows.shape[1]):
