@@ -238,11 +238,12 @@ def to_toml(spec: CampaignSpec) -> str:
         "stop": stop,
         "expect": expect,
     }
-    parts = [_lines(top), *(f"[{name}]\n{_lines(table)}" for name, table in tables.items() if _lines(table))]
+    parts = [to_lines(top), *(f"[{name}]\n{to_lines(table)}" for name, table in tables.items() if to_lines(table))]
     return "\n".join(parts)
 
 
-def _lines(table: Mapping[str, Any]) -> str:
+def to_lines(table: Mapping[str, Any]) -> str:
+    """Keys and values of a table as TOML, those that are None left out."""
     return "".join(f"{_key(key)} = {_toml(value)}\n" for key, value in table.items() if value is not None)
 
 

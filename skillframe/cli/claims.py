@@ -85,8 +85,9 @@ def start(
 
     spec = CampaignSpec.from_toml(source)
     begin(
-        spec, out, evaluate.describe, registry().world(spec.world_place).params, rate=rate or USUAL,
-        confidence=confidence or USUAL, skill=skill, look=look,
+        spec, out, evaluate.describe, registry().world(spec.world_place).params,
+        rate=USUAL if rate is None else rate, confidence=USUAL if confidence is None else confidence, skill=skill,
+        look=look,
     )  # fmt: skip
 
 
@@ -97,12 +98,14 @@ def _ask(folder: Path, rate: float | None, confidence: float | None) -> None:
     from skillframe.errors import InputError
 
     asked = read_question(folder)
-    if (rate or asked.rate, confidence or asked.confidence) == (asked.rate, asked.confidence):
+    rate = asked.rate if rate is None else rate
+    confidence = asked.confidence if confidence is None else confidence
+    if (rate, confidence) == (asked.rate, asked.confidence):
         return
     if procedure.claims(folder):
         raise InputError(folder, f"has claimed a rate of {asked.rate:g} with confidence {asked.confidence:g} already",
                          "leave out --rate and --confidence, or claim another in a new folder")  # fmt: skip
-    ask_again(folder, rate or asked.rate, confidence or asked.confidence)
+    ask_again(folder, rate, confidence)
 
 
 @contextmanager
@@ -128,13 +131,13 @@ def _judged(folder: Path, engine: Engine, again: bool) -> Outcome | None:
     """Run what is missing, and judge. None if no box was worth claiming."""
     from skillframe.campaign.claims import procedure
     from skillframe.campaign.claims.certificate import outcome
-    from skillframe.campaign.claims.question import read_question
-    from skillframe.campaign.claims.rounds import looked
+    from skillframe.campaign.claims.question import LOOK, read_question
+    from skillframe.campaign.claims.rounds import is_complete, looked
     from skillframe.cli.campaign_words import progress
     from skillframe.errors import InputError
 
     places = procedure.claims(folder)
-    if not places:
+    if not places and not is_complete(folder / LOOK, engine.params):
         note("looking where it works; these trials carry no claim")
         with progress() as notify:
             procedure.look(folder, engine, notify)

@@ -34,6 +34,7 @@ COMMANDS = {
     "skill": "Show and explain a learned skill.",
     "run": "Run a skill in a simulated world.",
     "campaign": "Run a skill many times over declared uncertainty.",
+    "certify": "One file, one command: from demonstrations to a certificate.",
     "compare": "Say which of several policies is better, from a table of trials.",
     "export": "Write a skill as settings of another controller.",
     "report": "Make a self-contained HTML report from results.",

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from skillframe.errors import InputError
 from skillframe.files import write_whole
+from skillframe.reports.certified import certificate_page
 from skillframe.reports.headline import lead, tiles
 from skillframe.reports.learned import learned_section
 from skillframe.reports.markup import Markup, join, note, tag
@@ -141,7 +142,7 @@ def _chapter(chapter: Chapter, index: int, scenes: dict[str, Markup], alone: boo
     hero = tag(
         "header",
         title,
-        banner(chapter),
+        banner(chapter) if chapter.asked is None else "",
         tag("div", words, cover(chapter), class_="opening"),
         tiles(chapter),
         class_="hero",
@@ -151,7 +152,7 @@ def _chapter(chapter: Chapter, index: int, scenes: dict[str, Markup], alone: boo
         tag("section", tag("h2", title), given[name] if name in given else makers[name](), id=f"c{index}-{name}")
         for name, title in _sections(chapter)
     ]
-    return tag("div", hero, *notes, *sections, class_="chapter", id=f"c{index}")
+    return tag("div", certificate_page(chapter), hero, *notes, *sections, class_="chapter", id=f"c{index}")
 
 
 def _foot() -> Markup:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from skillframe.campaign.axes import parse_axis
+from skillframe.campaign.claims.question import LOOK
 from skillframe.campaign.live import live_table
 from skillframe.campaign.spec import flatten, name_of
 from skillframe.campaign.validity import Plan, plan_of
@@ -25,6 +26,7 @@ from skillframe.errors import InputError, SkillframeError
 from skillframe.execution.trace import Trace
 from skillframe.extend.records import ReportFiles
 from skillframe.files.documents import read_json, read_text
+from skillframe.reports.asked import Asked, is_asked, read_asked
 from skillframe.reports.results import Results, read_results, results_of
 from skillframe.reports.sections import MadeSection, files_of, has_sections, made_sections
 from skillframe.reports.typical import telling, why_typical
@@ -64,6 +66,7 @@ class Chapter:
         sections: what plug-ins have to say.
         notes: sentences about what is missing or was left out.
         hashes: (file, sha256) of everything read.
+        asked: the question that the campaign's folder answers, or None.
     """
 
     name: str
@@ -84,6 +87,7 @@ class Chapter:
     sections: list[MadeSection] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     hashes: list[tuple[str, str]] = field(default_factory=list)
+    asked: Asked | None = None
 
     @property
     def planned(self) -> int:
@@ -109,10 +113,19 @@ def read_chapters(inputs: Sequence[Path]) -> list[Chapter]:
     chapters, loose = [], []
     for path in inputs:
         if path.is_dir():
-            chapters += [read_folder(folder) for folder in _folders(path)]
+            chapters += [_read_asked(path)] if is_asked(path) else [read_folder(folder) for folder in _folders(path)]
         else:
             loose.append(path)
     return [*chapters, read_traces(loose)] if loose else chapters
+
+
+def _read_asked(folder: Path) -> Chapter:
+    """The chapter of the trials that carry a folder's claim, with the question beside it."""
+    asked = read_asked(folder)
+    chapter = read_folder(folder / asked.evidence)
+    chapter.folder, chapter.asked = f"{asked.folder}/{asked.evidence}", asked
+    chapter.hashes += asked.hashes
+    return chapter
 
 
 def campaign_folders(inputs: Sequence[Path]) -> list[Path]:
@@ -121,7 +134,8 @@ def campaign_folders(inputs: Sequence[Path]) -> list[Path]:
     Raises:
         InputError: a folder without results.
     """
-    return [folder for path in inputs if path.is_dir() for folder in _folders(path)]
+    folders = [path for path in inputs if path.is_dir()]
+    return [place for path in folders for place in ([path / LOOK] if is_asked(path) else _folders(path))]
 
 
 def _folders(path: Path) -> list[Path]:
