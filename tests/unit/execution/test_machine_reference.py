@@ -112,7 +112,7 @@ def test_the_quick_look_at_limits_is_the_guards_own():
         push[:, PLANE] = rng.normal(size=(count, 2))
         seen = task.seen(0.0, np.tile(np.eye(3), (count, 1, 1)))
         other = LimitGuard(limits, count, DT)
-        other.energy[:] = guard.energy
+        other.energy[:] = guard.energy[:] = rng.choice([0.0, 2e-3], count, p=[0.9, 0.1])
         pose, status = Pose(np.array(tool), np.eye(3)[None]), np.zeros(count, dtype=int)
         task.aim(Command(pose, zero, Impedance(still, still), push, status, no_reasons(count)), 1.0)
         with np.errstate(invalid="ignore"):
