@@ -21,6 +21,7 @@ Suspicion = Callable[[Demonstration], Iterator[str]]
 HELD_LEAST = 10  # steps of a held pose from which its rate is told
 FARTHEST, FASTEST = 20.0, 10.0
 PAST_HALF = 0.05  # of the scalar part, 6 degrees beyond half a turn: less is no change of sign that means anything
+SATURATED_SAMPLES, SATURATED_LEAST_RUNS = 5.0, 20
 LARGEST_FORCE, LONGEST_LEVER = 2e4, 3.0
 UNMEASURED = "unmeasured"
 """Metadata: names of wrench channels that nobody measured, as across a machine's plane; zero says nothing there."""
@@ -114,6 +115,32 @@ def channels(d: Demonstration) -> Iterator[str]:
         yield f"wrench: {held:.0%} of the samples repeat the one before: its rate is about {d.rate * (1 - held):.3g} Hz"
 
 
+def saturation(d: Demonstration) -> Iterator[str]:
+    """Channels that stay at their largest or least value: a sensor shows no more than its range.
+
+    Noise makes a live channel leave its extreme at once. It saturates if it stays there for five samples or more, three
+    times as long as nine in ten of its runs, while the rest of the wrench goes on. From a second on it is a stall too.
+    """
+    changes = np.concatenate([[0], np.cumsum(np.any(d.wrench[1:] != d.wrench[:-1], axis=1))])
+    for i, name in enumerate(WRENCH):
+        channel = d.wrench[:, i]
+        starts = np.concatenate([[0], np.flatnonzero(channel[1:] != channel[:-1]) + 1])
+        lengths = np.diff(np.append(starts, len(channel)))
+        if len(starts) < SATURATED_LEAST_RUNS:
+            continue
+        goes_on = changes[starts + lengths - 1] > changes[starts]
+        least = max(SATURATED_SAMPLES, 3.0 * float(np.quantile(lengths, 0.9)))
+        for extreme, way in ((float(channel.max()), "largest"), (float(channel.min()), "least")):
+            stays = (channel[starts] == extreme) & (lengths >= least) & goes_on & (extreme != 0.0)
+            if np.any(stays):
+                first, unit = d.time[starts[np.flatnonzero(stays)[0]]], "N" if i < 3 else "Nm"
+                total = int(lengths[stays].sum())
+                yield (
+                    f"saturation: {name} stays at its {way} value, {extreme:.4g} {unit}, for {total} samples from "
+                    f"t = {first:.3f} s on: the sensor's range ended, and the force was larger"
+                )
+
+
 def held_pose(d: Demonstration) -> Iterator[str]:
     """A pose that moves in steps of the same length: it was recorded slower than the rest, which a pause is not."""
     pose = np.concatenate([d.position, d.quaternion], axis=1)
@@ -187,4 +214,6 @@ def frame_and_sign(d: Demonstration) -> Iterator[str]:
         )
 
 
-AUDITS: Sequence[Suspicion] = (clock, quaternions, motion, held_pose, channels, magnitudes, spikes, frame_and_sign)
+AUDITS: Sequence[Suspicion] = (
+    clock, quaternions, motion, held_pose, channels, saturation, magnitudes, spikes, frame_and_sign,
+)  # fmt: skip
