@@ -45,6 +45,7 @@ SLACK = 4.0
 
 def look(folder: Path, engine: Engine, notify: Notify | None = None) -> None:
     """Run what is missing of the trials to look at."""
+    sweep_prepared(folder / LOOK)
     if not is_complete(folder / LOOK, engine.params):
         run_campaign(folder / LOOK, engine.evaluate, engine.options, notify, engine.params)
 

@@ -21,11 +21,12 @@ from skillframe.campaign.claims.border import ToTry
 from skillframe.campaign.claims.engine import Engine, Looked, rows_of_campaign, succeeded
 from skillframe.campaign.claims.plan import FIX, PLAN, Round, RoundPlan
 from skillframe.campaign.claims.question import LOOK, Question, read_question
-from skillframe.campaign.folder import SCENE, load, prepare, sweep_prepared
+from skillframe.campaign.folder import SCENE, load, prepare, sweep, sweep_prepared
 from skillframe.campaign.provenance import file_hash
 from skillframe.campaign.runner import Progress, run_campaign
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.store import RESULTS
+from skillframe.campaign.summary import SUMMARY
 from skillframe.errors import InputError
 from skillframe.files.documents import read_json
 from skillframe.frames import Float
@@ -129,6 +130,7 @@ def run_round(folder: Path, entry: Round, engine: Engine, unusual: Callable[[str
         base = load(folder / LOOK, engine.params)
         prepare(_spec(base, entry, read_question(folder)), place, partial(scene_of, folder), engine.params)
     if is_complete(place, engine.params):
+        sweep(place)  # a process that was killed while it wrote the summary left half of one
         return
 
     def tell(progress: Progress) -> None:
@@ -145,8 +147,8 @@ def scene_of(folder: Path, spec: CampaignSpec) -> dict[str, Any]:
 
 
 def is_complete(place: Path, params: type | None) -> bool:
-    """Whether all rows of a campaign are there, and its table."""
-    if not (place / RESULTS).is_file():
+    """Whether all rows of a campaign are there, its table, and its summary, which is written last."""
+    if not (place / RESULTS).is_file() or not (place / SUMMARY).is_file():
         return False
     try:
         rows_of_campaign(place, params)
