@@ -63,5 +63,20 @@ def replay(demonstrations: Sequence[Demonstration]) -> LearnedSkill:
     return learn(demonstrations[:1], "replay")
 
 
-METHODS: Mapping[str, Method] = {"push": push, "lmc": lmc, "replay": replay}
+def lmc_search(demonstrations: Sequence[Demonstration]) -> LearnedSkill:
+    """What was learned, with an approach, and a search where it stalls, as `learn --exception search` makes it."""
+    return learn(demonstrations, "lmc", exception="search")
+
+
+def push_search(demonstrations: Sequence[Demonstration]) -> LearnedSkill:
+    """The same approach and search around the push that nobody taught: what the learned push adds is the difference."""
+    made = lmc_search(demonstrations)
+    by_hand = {"skill": "lmc", **push(demonstrations).document["phases"][0]}
+    document = {**made.document, "phases": [by_hand, *made.document["phases"][1:]]}
+    return LearnedSkill(document=document, name="push_search")
+
+
+METHODS: Mapping[str, Method] = {
+    "push": push, "push_search": push_search, "lmc": lmc, "lmc_search": lmc_search, "replay": replay,
+}  # fmt: skip
 """By the names that results give them."""
