@@ -105,7 +105,10 @@ def _start_problems(scene: Scene, name: str, robot: RobotModel, model: Any, conf
 
 
 def _gap(scene: Scene, robot: RobotModel, model: Any, configuration: Float) -> float | None:
-    """Smallest distance [m] between what collides of tool and fixture, below zero if inside. None without a pair."""
+    """Smallest distance [m] between what collides of tool and fixture, below zero if inside. None without a pair.
+
+    Of two surfaces, whose distance MuJoCo does not know, contacts alone count.
+    """
     import mujoco
 
     from skillframe.world.convert import FIXTURE, SPRUNG, TOOL
@@ -125,7 +128,12 @@ def _gap(scene: Scene, robot: RobotModel, model: Any, configuration: Float) -> f
     touches = [bool(model.geom_contype[g] or model.geom_conaffinity[g]) for g in range(model.ngeom)]
     tool = [g for g, owner in enumerate(body) if owner == TOOL and touches[g]]
     other = [g for g, owner in enumerate(body) if touches[g] and (owner == FIXTURE or owner.startswith(SPRUNG))]
-    gaps = [mujoco.mj_geomDistance(model, data, a, b, 100.0, None) for a in tool for b in other]
+    surfaces = {g for g in (*tool, *other) if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_SDF}
+    gaps = [
+        mujoco.mj_geomDistance(model, data, a, b, 100.0, None)
+        for a in tool for b in other if not surfaces & {a, b}
+    ]  # fmt: skip
+    gaps += [float(contact.dist) for contact in data.contact if surfaces & set(contact.geom)]
     return min(gaps, default=None)
 
 

@@ -119,7 +119,8 @@ def _fingerprint(scene: Scene) -> str:
         {k: np.asarray(v).tolist() for k, v in dataclasses.asdict(geom).items() if v is not None}
         for geom in _geoms(scene)
     ]
-    return json.dumps([rows, scene.start_tip, scene.start_quaternion, scene.friction, scene.tool.mass, scene.analytic])
+    values = [rows, scene.start_tip, scene.start_quaternion, scene.friction, scene.tool.mass, scene.analytic]
+    return json.dumps(values, default=lambda array: np.asarray(array).tolist())  # arrays of a surface lie deeper
 
 
 SCENES: Mapping[str, Callable[[Scene], Iterable[str]]] = {

@@ -16,7 +16,8 @@ HOMES = {
     "skill:dual_arm": "dualarm",  # asked for as any other behaviour
     "world:dual_peg": "dualarm",
     **{f"row:{number}": "papers" for number in (*range(1, 24), 27, 30)},
-    "command:reproduce": "papers", "command:benchmark": "benchmarks",
+    "command:reproduce": "papers",
+    "command:benchmark": "benchmarks",
     **{f"score:automate_{name}": "benchmarks" for name in ("distance", "height")},
 }
 """The entry point, and folder under plugins/, of every name that is not the core's."""

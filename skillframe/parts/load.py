@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -32,6 +31,9 @@ SIDEWAYS = 6e-3
 """How far beside the held part a cropped standing part is still touched [m]."""
 _ABOVE = 2e-3
 _FREE = 1e-5
+_MOST_LOADED = 8
+_LOADED: dict[tuple[tuple[str, str], ...], LoadedParts] = {}
+"""The last parts by what their files hold, wherever these lie: a campaign's folder has copies of them."""
 _TRIES = (1.0, 0.75, 0.5, 0.25, 0.0)
 
 
@@ -104,15 +106,20 @@ def load(path: Path) -> LoadedParts:
         MissingDependency: the extra `parts` is not installed.
     """
     hashes = {name: _digest(file) for name, file in {path.name: path, **mesh_files(path)}.items()}
-    return _load(path, tuple(hashes.items()))
+    key = tuple(hashes.items())
+    if key not in _LOADED:
+        found = _load(path, hashes)
+        if len(_LOADED) >= _MOST_LOADED:
+            del _LOADED[next(iter(_LOADED))]
+        _LOADED[key] = found
+    return _LOADED[key]._replace(name=name_of(path))
 
 
 def _digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-@lru_cache(maxsize=8)
-def _load(path: Path, hashes: tuple[tuple[str, str], ...]) -> LoadedParts:
+def _load(path: Path, hashes: Mapping[str, str]) -> LoadedParts:
     file = read_fixture(path)
     plug, socket = (read_part(path.parent / each.mesh, each.units) for each in (file.tool, file.fixture))
     found = fit(plug, socket, file)
@@ -123,7 +130,7 @@ def _load(path: Path, hashes: tuple[tuple[str, str], ...]) -> LoadedParts:
     mass, center, inertia, notes = _inertia(found, plug, file)
     return LoadedParts(
         name_of(path), file, found, held, standing, mass, center, inertia, _starts(found, file),
-        (*plug.notes, *socket.notes, *notes), dict(hashes),
+        (*plug.notes, *socket.notes, *notes), hashes,
     )  # fmt: skip
 
 

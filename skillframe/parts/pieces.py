@@ -181,17 +181,23 @@ def _looked_at(vertices: Float, faces: Faces) -> Float:
 
 
 def distances(points: Float, triangles: Float) -> Float:
-    """Distance of points (P, 3) from the nearest of triangles (F, 3, 3), (P,) [m]."""
+    """Distance of points (P, 3) from the nearest of triangles (F, 3, 3), (P,) [m].
+
+    A triangle is looked at where its bounding sphere comes nearer to a point than the nearest corner of all is.
+    """
+    from scipy.spatial import cKDTree
     from trimesh.triangles import closest_point
 
     scale = 1.0 / float(np.ptp(triangles.reshape(-1, 3), axis=0).max())  # trimesh compares with absolute tolerances
     points, triangles = scale * points, scale * triangles
+    centres = triangles.mean(axis=1)
+    radii = norm(triangles - centres[:, None]).max(axis=1)
+    nearest: Float = cKDTree(triangles.reshape(-1, 3)).query(points)[0]
     step = max(1, _PAIRS // len(triangles))
-    nearest = []
     for start in range(0, len(points), step):
         some = points[start : start + step]
-        pairs = np.repeat(some, len(triangles), axis=0)
-        on = closest_point(np.tile(triangles, (len(some), 1, 1)), pairs)
-        nearest.append(np.linalg.norm(pairs - on, axis=1).reshape(len(some), -1).min(axis=1))
-    found: Float = np.concatenate(nearest) / scale
-    return found
+        near = norm(some[:, None] - centres) - radii <= nearest[start : start + step, None]
+        point, triangle = np.nonzero(near)
+        away = norm(some[point] - closest_point(triangles[triangle], some[point]))
+        np.minimum.at(nearest, start + point, away)
+    return nearest / scale

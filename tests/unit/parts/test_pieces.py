@@ -94,3 +94,12 @@ def test_a_cross_section_is_filled_by_convex_polygons_that_move_with_height():
 def polygon_area(points):
     x, y = points.T
     return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+
+def test_triangles_that_are_left_out_by_their_spheres_are_never_the_nearest():
+    """Against every pair, on long thin triangles, whose spheres say little."""
+    rng = np.random.default_rng(5)
+    triangles = rng.uniform(-1.0, 1.0, (60, 1, 3)) + rng.uniform(-0.3, 0.3, (60, 3, 3)) * [1.0, 0.05, 1.0]
+    points = rng.uniform(-2.0, 2.0, (200, 3))
+    every = np.min([distances(points, triangle[None]) for triangle in triangles], axis=0)
+    np.testing.assert_allclose(distances(points, triangles), every, atol=1e-12)

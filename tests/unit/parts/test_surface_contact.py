@@ -5,7 +5,9 @@ import mujoco.batch
 import numpy as np
 import pytest
 
+from skillframe.conformance.worlds import check_world
 from skillframe.errors import InputError
+from skillframe.extend.registry import registry
 from skillframe.fmu.build import build_library
 from skillframe.parts.field import surface_of
 from skillframe.parts.found import lines, values
@@ -27,6 +29,7 @@ def few(monkeypatch):
 
 
 def pieces_are_few(monkeypatch):
+    monkeypatch.setattr("skillframe.parts.load._LOADED", {})  # other parts of the same files are not these
     for module in ("checks", "load", "pieces"):
         monkeypatch.setattr(f"skillframe.parts.{module}.MOST_PIECES", 1)
 
@@ -119,6 +122,13 @@ def test_a_pair_that_pieces_do_not_hold_gets_surfaces_and_says_so(tmp_path, monk
 
 
 @pytest.mark.slow
+@needs_compiler
+def test_a_world_of_surfaces_conforms_as_any_world(tmp_path, monkeypatch):
+    pieces_are_few(monkeypatch)
+    path = write(tmp_path, *round_pair(), FILE)
+    assert check_world(registry().world(str(path))) == []
+
+
 def test_without_a_compiler_there_are_pieces_alone_and_one_sentence(tmp_path, monkeypatch):
     pieces_are_few(monkeypatch)
     monkeypatch.setattr("skillframe.parts.load.available", lambda: False)

@@ -46,9 +46,12 @@ class SeatSettings:
         exception: kind of skill that searches where the push stalls.
         blind: files of blind demonstrations, for a search that is learned from them.
         place: "base", where it was demonstrated, or "start": as far from the run's start as it was from theirs.
-        shift, tilt, height: how far off the fixture may be: across the way [m], in attitude [rad], along the way [m].
-        friction: between the parts.
-        approach, search: whether it approaches, and searches on a stall.
+        shift: how far off the fixture may be across the way [m].
+        tilt: how far off it may be turned [rad].
+        height: how far off it may be along the way [m].
+        friction: between the parts [1].
+        approach: whether it goes to where contact began first.
+        search: whether it searches on a stall.
         tries: searches and returns before it gives up.
     """
 
