@@ -19,7 +19,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from skillframe.conformance import beginning, running, skills
+from skillframe.conformance import beginning, running, skills, stalls
 from skillframe.conformance.drives import check_drive
 from skillframe.conformance.examples import example_demonstrations, random_observations
 from skillframe.conformance.exporters import check_exporter
@@ -161,6 +161,10 @@ class SkillConformance:
     def test_tells_its_journal(self) -> None:
         """The journal gives times and words for every trial."""
         self._check(beginning.tells_its_journal)
+
+    def test_finds_the_way_on(self) -> None:
+        """Where it offers a search for where another skill stalls, that search is a document that runs."""
+        self._check(stalls.finds_the_way_on)
 
 
 class CoordinatorConformance(SkillConformance):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from textwrap import fill
+
 import click
 
 from skillframe.cli.output import LIST_WIDTH, emit_json, table
@@ -38,7 +40,7 @@ def list_(as_json: bool) -> None:
         emit_json(rows)
     elif not rows:
         left_out = f"SKILLFRAME_PLUGINS leaves out {', '.join(known.unselected)}" if known.unselected else ""
-        click.echo(left_out or f"no kind of skill is installed; type: {install_all()}")
+        click.echo(fill(left_out, LIST_WIDTH) or f"no kind of skill is installed; type: {install_all()}")
     else:
         lines = [(r["name"], "yes" if r["learns"] else "no", r["summary"], r["distribution"]) for r in rows]
         table(("skill", "learns", "what it is", "from"), lines, LIST_WIDTH)

@@ -14,7 +14,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -120,6 +119,8 @@ def available() -> bool:
 
 def opened() -> ctypes.CDLL | None:
     """The generator's library, built if it is not there or does not open, or None where it cannot be built."""
+    import mujoco
+
     folder = Path(__file__).parent
     text = {name: (folder / name).read_text(encoding="utf-8") for name in SOURCES}
     header = f"#define SKILLFRAME_MUJOCO {mujoco.mj_version()}\n"
@@ -138,6 +139,8 @@ def opened() -> ctypes.CDLL | None:
 @lru_cache(maxsize=1)
 def library() -> ctypes.CDLL | None:
     """The contact generator, in MuJoCo's table from now on, or None where it cannot be built."""
+    import mujoco
+
     found = opened()
     if found is None or found.skillframe_version() != mujoco.mj_version():
         return None
@@ -150,6 +153,8 @@ def library() -> ctypes.CDLL | None:
 
 def _engine() -> ctypes.CDLL:
     """MuJoCo's own library, which Python's bindings have loaded."""
+    import mujoco
+
     return ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("libmujoco.*"))), mode=ctypes.RTLD_GLOBAL)
 
 
