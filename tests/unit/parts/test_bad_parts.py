@@ -166,6 +166,7 @@ def test_a_part_that_pieces_do_not_hold_is_refused_without_a_compiler_with_how_m
     for module in ("checks", "load", "pieces"):
         monkeypatch.setattr(f"skillframe.parts.{module}.MOST_PIECES", 5)
     monkeypatch.setattr("skillframe.parts.load.available", lambda: False)
+    monkeypatch.setattr("skillframe.parts.load._LOADED", {})  # the same files were taken by other tests
     words = ("socket.stl: takes 13 convex pieces", "0.093 mm, a quarter of the clearance", "5 are the most")
     refused(pair(tmp_path, *round_pair()), *words)
 
