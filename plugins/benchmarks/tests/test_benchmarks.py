@@ -161,6 +161,7 @@ def test_two_pairs_of_meshes_become_a_table_a_page_and_are_not_run_again(tmp_pat
     ran, refused = found["assemblies"]
     assert "overlap" in refused["refused"] and not refused["cells"]  # a plug of 6 mm in a hole of 5
     (only,) = ran["cells"]
+    assert 'tilt = "90deg"' in (tmp_path / "automate/00001/fixture.toml").read_text()  # seated says nothing of it
     assert only["trials"] == 2 and only["checked"] is not None and ran["cost_s"]["1mm-2deg-0.2"] > 0.0
     page = (tmp_path / "automate/automate.html").read_text()
     assert "00001" in page and "data:image/png" in page and "http://" not in page

@@ -45,6 +45,10 @@ density = 8000             # as published
 friction = 0.5             # as published
 [task.start]
 above_mouth = 0.002
+[task.seated]
+height = 0.001
+sideways = 0.002
+tilt = "90deg"             # a loose part may lean in its socket
 """
 SCORES = ("automate_height", "automate_distance")
 DONE, REFUSED = "done.json", "refused.json"

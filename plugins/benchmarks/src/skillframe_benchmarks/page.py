@@ -102,8 +102,8 @@ def render(found: Sequence[Found], given: Sequence[Total], plan: Plan, count: in
     refused = [each for each in found if each.refused]
     said = (
         f"{len(found)} of {count} assemblies done, {len(refused)} of them refused. {plan.robot}, {plan.trials} trials "
-        f"a level and method, two demonstrations each (seed {plan.seed}). Seated: within 1 mm of the assembled height, "
-        f"2 mm sideways and 2 degrees, and the skill ended by itself. Intervals draw assemblies again. "
+        f"a level and method, two demonstrations each (seed {plan.seed}). Seated: within 1 mm of the assembled height "
+        f"and 2 mm sideways, and the skill ended by itself. Intervals draw assemblies again. "
         f"The column >= 80 % counts assemblies of which {OFTEN:.0%} of the trials and more are seated."
     )
     each = tag("div", *map(_figure, found), class_="parts")
