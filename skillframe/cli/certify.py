@@ -87,7 +87,10 @@ def steps_of(task: TaskFile, out: Path, workers: int | None) -> list[Step]:
          str(task.teacher), "--seed", str(task.seed), "--out", str(out / "demonstrations" / "demo.npz")],
         lambda: all(Path(path).is_file() for path in demonstrations),
     )  # fmt: skip
-    at = [] if task.at is None else ["--at", task.at]
+    told = [
+        text for name, value in (("--at", task.at), ("--exception", task.exception)) if value for text in (name, value)
+    ]
+    told += [text for name, value in task.learn.items() for text in ("--set", f"{name}={value}")]
     begun = [str(out / "campaign.toml"), "--out", str(proof)]
 
     def asked() -> list[str]:
@@ -99,7 +102,7 @@ def steps_of(task: TaskFile, out: Path, workers: int | None) -> list[Step]:
     numbers = ["--rate", f"{task.rate:g}", "--confidence", f"{task.confidence:g}"]
     return [
         *([recorded] if task.teacher else []),
-        Step(["learn", *demonstrations, "--skill", task.learner, *at, "--out", str(skill)], skill.is_file),
+        Step(["learn", *demonstrations, "--skill", task.learner, *told, "--out", str(skill)], skill.is_file),
         Step(["campaign", "map", *asked(), *crew], there("border.json")),
         Step(["campaign", "break", str(proof), *crew], there("breaking.json"), may_say_no=True),
         Step(["campaign", "matter", str(proof), *crew], there("matter.json")),

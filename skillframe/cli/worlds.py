@@ -101,7 +101,10 @@ def _point(point: tuple[float, ...]) -> str:
 @click.option(
     "--friction", default=0.2, show_default=True, type=click.FloatRange(0.0, 5.0), help="Coulomb coefficient."
 )
-@click.option("--axis", default="[0, 0, -1]", show_default=True, help='Of insertion, as "[0, 0, -1]", or "auto".')
+@click.option(
+    "--axis", default="auto", show_default=True,
+    help='Of insertion, as "[0, 0, -1]"; auto takes the first of -z, z, -x, x, -y, y that is free.',
+)  # fmt: skip
 def new(plug: Path, socket: Path, units: str | None, out: Path, friction: float, axis: str) -> None:
     """Make a world of two meshes, PLUG (held) and SOCKET (standing), assembled as they were exported.
 

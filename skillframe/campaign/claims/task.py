@@ -9,7 +9,8 @@
     [vary]
     "fixture.offset_x" = { uniform = ["-15mm", "15mm"] }
 
-The other keys are those of a campaign file (`spec`): `name`, `coc`, `duration_s`, `[set]`.
+What the learner can be told is `learner`, `at`, `exception` and `[learn]` (`Keys`). The other keys are those of a
+campaign file (`spec`): `name`, `coc`, `duration_s`, `[set]`.
 """
 
 from __future__ import annotations
@@ -30,11 +31,16 @@ TASK, CAMPAIGN, DEMONSTRATIONS, SKILL = "task.toml", "campaign.toml", "demonstra
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _File:
+class Keys:
     """The keys of a task file, in the types TOML has.
 
     Attributes:
+        teacher: demonstrations that a simulated person records; 0 if there are some.
+        demonstrations: files, relative to the task's.
+        learner: kind of skill that is learned, `at` its frame or point, `learn` its settings.
+        exception: kind of skill that searches where the learned one stalls.
         duration_s: simulated time after which a trial has failed [s].
+        rate, confidence: of the claim.
     """
 
     world: str
@@ -45,6 +51,8 @@ class _File:
     demonstrations: tuple[str, ...] = ()
     learner: str = "lmc"
     at: str | None = None
+    exception: str | None = None
+    learn: dict[str, Any] = field(default_factory=dict)
     coc: str | None = None
     duration_s: float = DURATION_S
     rate: float = USUAL
@@ -54,35 +62,16 @@ class _File:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TaskFile:
+class TaskFile(Keys):
     """A task.
 
     Attributes:
         path: its file; relative paths start in its folder.
         given: its content as read.
-        teacher: demonstrations that a simulated person records; 0 if there are some.
-        demonstrations: files, relative to the task's.
-        learner: kind of skill that is learned, `at` its frame or point.
-        rate, confidence: of the claim.
-        others: see `_File`.
     """
 
     path: Path
     given: dict[str, Any]
-    name: str
-    world: str
-    robot: str
-    seed: int
-    teacher: int
-    demonstrations: tuple[str, ...]
-    learner: str
-    at: str | None
-    coc: str | None
-    duration_s: float
-    rate: float
-    confidence: float
-    vary: dict[str, Any]
-    set: dict[str, Any]
 
     @classmethod
     def from_toml(cls, path: Path) -> TaskFile:
@@ -92,7 +81,7 @@ class TaskFile:
             InputError: what is wrong and where.
         """
         table = read_toml(path)
-        file = build(_File, table, f"{path}: task")
+        file = build(Keys, table, f"{path}: task")
         if bool(file.teacher > 0) == bool(file.demonstrations):
             raise InputError(
                 f"{path}: teacher", "has to be a number of demonstrations, or demonstrations a list of files",
@@ -103,22 +92,23 @@ class TaskFile:
                 raise InputError(f"{path}: demonstrations[{i}]", f"no such file: {name}", "paths are relative to TASK")
         if not file.vary:
             raise InputError(f"{path}: vary", "is empty", "declare one to four ranges, of which the box is made")
-        values = {name: getattr(file, name) for name in _File.__dataclass_fields__}
+        values = {name: getattr(file, name) for name in Keys.__dataclass_fields__}
         return cls(**(values | {"name": file.name or path.name.partition(".")[0]}), path=path, given=dict(table))
 
     @property
     def world_from_here(self) -> str:
         """The world as a command takes it: a name, or the path of its file from here."""
-        return self._from_here(self.world)
+        return str(self._beside(self.world) or self.world)
 
     @property
     def robot_from_here(self) -> str:
         """The robot as a command takes it."""
-        return self._from_here(self.robot)
+        return str(self._beside(self.robot) or self.robot)
 
-    def _from_here(self, name: str) -> str:
+    def _beside(self, name: str) -> Path | None:
+        """What a name says of this file's folder, if it is a path."""
         beside = self.path.parent / name
-        return str(beside) if name.endswith(".toml") or ("/" in name and beside.exists()) else name
+        return beside if name.endswith(".toml") or ("/" in name and beside.exists()) else None
 
     def demonstrations_in(self, out: Path) -> list[Path]:
         """Where the demonstrations of a folder lie."""
@@ -149,8 +139,8 @@ class TaskFile:
 
     def campaign(self, out: Path) -> str:
         """The campaign file of a folder."""
-        here = {key: str(Path(name).absolute()) if name != given else name for key, name, given in (
-            ("robot", self.robot_from_here, self.robot), ("world", self.world_from_here, self.world))}  # fmt: skip
+        paths = {"robot": self._beside(self.robot), "world": self._beside(self.world)}
+        here = {key: str(path.absolute()) if path else getattr(self, key) for key, path in paths.items()}
         top = {
             "name": self.name, "seed": self.seed, "trials": 1, **here, "skills": (SKILL,), "coc": self.coc,
             "duration_s": self.duration_s,

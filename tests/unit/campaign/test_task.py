@@ -1,5 +1,8 @@
 """One file that leads to a certificate: what it has to say, and the folder that it settles in."""
 
+import tomllib
+from pathlib import Path
+
 import pytest
 
 from skillframe.campaign.claims.task import TaskFile
@@ -36,6 +39,17 @@ def test_the_folder_holds_a_campaign_with_the_tasks_ranges(tmp_path):
     task.settle(out)  # to go on
 
 
+def test_a_world_of_a_file_is_found_where_the_task_lies_from_wherever_it_is_typed(tmp_path, monkeypatch):
+    folder = tmp_path / "in"
+    text = TEXT.replace('"valley"', '"parts.toml"').replace("teacher", 'robot = "./arm"\nteacher')
+    written(folder, text)
+    (folder / "arm").mkdir()
+    for here, path in ((folder, "valley.task.toml"), (tmp_path, "in/valley.task.toml")):
+        monkeypatch.chdir(here)
+        said = tomllib.loads(TaskFile.from_toml(Path(path)).campaign(tmp_path / "out"))
+        assert (said["world"], Path(said["robot"])) == (str(folder / "parts.toml"), folder / "arm")
+
+
 def test_steps_whose_outcome_is_there_are_done_and_a_begun_proof_is_gone_on_with(tmp_path):
     task, out = written(tmp_path / "in"), tmp_path / "out"
     task.settle(out)
@@ -52,6 +66,15 @@ def test_steps_whose_outcome_is_there_are_done_and_a_begun_proof_is_gone_on_with
     assert [step.done() for step in after] == [True, False, False, False, False, False, False]
     assert after[2].command == ["campaign", "map", str(out / "proof"), "--workers", "2"]
     assert [step.may_say_no for step in after] == [False, False, False, True, False, True, False]
+
+
+def test_what_the_learner_is_told_stands_in_the_command(tmp_path):
+    text = TEXT.replace("seed = 3", 'seed = 3\nat = "wrist"\nexception = "search"').replace(
+        "[set]", "[learn]\nshift = 0.001\n[set]"
+    )
+    task, out = written(tmp_path / "in", text), tmp_path / "out"
+    learn = steps_of(task, out, None)[1].command
+    assert learn[3:-2] == ["--skill", "lmc", "--at", "wrist", "--exception", "search", "--set", "shift=0.001"]
 
 
 @pytest.mark.parametrize(
