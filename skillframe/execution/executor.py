@@ -120,7 +120,7 @@ class Loop:
         tick = 0
         try:
             for tick in range(ticks):
-                self._tick(tick)
+                self.tick(tick)
                 if not len(self.active):
                     return
                 if progress is not None and tick % SLOW_TICKS == 0:
@@ -128,13 +128,18 @@ class Loop:
         except KeyboardInterrupt:
             self.interrupted = True
             self._end(self.active, tick * self.dt, "interrupted", True, Ended.INTERRUPTED)
+        self.time_over(ticks, duration_s)
+
+    def time_over(self, ticks: int, duration_s: float) -> None:
+        """End the trials that still run after `ticks` ticks: by a limit that they broke, else by the clock."""
         if len(self.active):
             self._end_broken(self.contact.look(self.active), ticks * self.dt)
             self._end_touching(self.active, ticks * self.dt)
             text = f"time limit: {duration_s:g} s of simulated time are over"
             self._end(self.active, ticks * self.dt, text, False, Ended.TIME)
 
-    def _tick(self, tick: int) -> None:
+    def tick(self, tick: int) -> None:
+        """One tick of the trials that still run. Ticks are counted from 0 and none is left out."""
         time = tick * self.dt
         observation = self.drive.sense(tick, self.active)
         command = self._ask(tick, observation)

@@ -30,7 +30,7 @@ def ratios(show, counts=(1, 96)):
             for name, loop in loops.items():
                 before = time.process_time()
                 for tick in range(i * TICKS, (i + 1) * TICKS):
-                    loop._tick(tick)
+                    loop.tick(tick)
                 seconds[name].append((time.process_time() - before) / TICKS)
         least = {name: min(values[1:]) for name, values in seconds.items()}
         for name, value in least.items():

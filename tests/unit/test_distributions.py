@@ -28,8 +28,8 @@ def recipe(target):
     return [line.strip().replace("$(BIN)/", "") for line in lines.splitlines()]
 
 
-def test_there_are_eight_distributions():
-    assert len(PROJECTS) == 8
+def test_there_are_nine_distributions():
+    assert len(PROJECTS) == 9
 
 
 @pytest.mark.parametrize("folder", PROJECTS, ids=lambda path: path.name)

@@ -15,7 +15,11 @@ API = (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8")
 MODULES = re.findall(r"^\.\. automodule:: (\S+)\n((?:   :.*\n)*)", API, re.MULTILINE)
 PAGES = [*ROOT.glob("docs/how-to/*.md"), *ROOT.glob("docs/tutorial/*.md"), *ROOT.glob("docs/reference/*.md")]
 PAGES += [ROOT / "README.md", *ROOT.glob("plugins/*/README.md")]
-INSIDE = {"skillframe_papers", "skillframe_benchmarks"}  # they measure the core from inside, as the page says
+INSIDE = {
+    "skillframe_papers",
+    "skillframe_benchmarks",
+    "skillframe_gym",
+}  # they run the core from inside, as the page says
 SOURCES = [
     *(p for p in ROOT.glob("plugins/*/src/**/*.py") if not INSIDE & set(p.parts)),
     *ROOT.glob("examples/*.py"),

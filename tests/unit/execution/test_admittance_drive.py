@@ -189,7 +189,7 @@ def test_a_push_against_a_joint_at_its_end_does_not_wind_up():
     stop = drive._joints[0, drive._dofs] + 1e-4
     drive._steps._limits = drive._steps._limits._replace(upper=stop, lower=stop - 2e-4)
     for tick in range(1000):
-        loop._tick(tick)
+        loop.tick(tick)
     assert np.all(drive._joints[0, drive._dofs] <= stop + 1e-9)
     assert np.abs(drive.admittance.twist).max() < 1e-3
 
@@ -206,6 +206,6 @@ def test_what_a_velocity_s_integral_is_off_fades_with_a_second():
     drive._joints = drive._joints.copy()
     drive._joints[:, drive._dofs] += off
     for tick in range(400):
-        loop._tick(tick)
+        loop.tick(tick)
     left = (drive._joints - drive.limb.joint_positions())[0, drive._dofs]
     np.testing.assert_allclose(left, off * np.exp(-0.4), atol=2e-5)  # 2 % of the least: what the joints move meanwhile

@@ -1,0 +1,162 @@
+"""Trials of a world that are steered from outside, a step of many ticks at a time, in the loop that `run` has.
+
+A cohort is the trials that began together. They tick in lock-step, and a trial's outcome does not depend, to the last
+bit, on how many others are beside it. A trial ends as in `run`: by a limit, by the clock, or when the world's goal
+holds, which is looked at every 10 ms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.control.endings import Ended
+from skillframe.errors import InputError
+from skillframe.execution.executor import Loop, begin
+from skillframe.execution.setup import Setup
+from skillframe.frames import Float, Pose, quaternion_from_matrix, rotation_matrix
+from skillframe.skill import Command, Impedance, Observation, Skill, no_reasons
+from skillframe.world.rates import ratio
+from skillframe_gym.settings import LARGEST, EnvSettings
+
+LEVER_M = 0.1
+"""[m/rad] that makes an angle to the goal a distance; our choice, the length of a small part."""
+
+
+class Seen(NamedTuple):
+    """Where some trials stand after a step. Every array has a row a trial.
+
+    Attributes:
+        observation: name to (N, ...), of `settings.observation_space`.
+        distance: to the goal, the angle counted with `LEVER_M` [m].
+        success: of `Result`; False while a trial runs.
+        ended: the trial is over.
+        by_time: it is over because of the clock alone.
+    """
+
+    observation: dict[str, Float]
+    distance: Float
+    success: NDArray[np.bool_]
+    ended: NDArray[np.bool_]
+    by_time: NDArray[np.bool_]
+
+
+class Steered(Skill):
+    """Holds the target that it was given last. At the start that is where the tool stands."""
+
+    def __init__(self, settings: EnvSettings) -> None:
+        self._settings = settings
+
+    def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
+        """Stand still."""
+        self.seen, self._count = observation, len(rngs)
+        self._still, self._running = np.zeros((self._count, 6)), np.zeros(self._count, dtype=np.int64)
+        self._reasons = no_reasons(self._count)
+        self.steer(np.zeros((self._count, self._settings.action_space().shape[0])))
+
+    def steer(self, actions: Float) -> None:
+        """Take actions (N, 6 or 12), between -1 and 1, seen from the last observation."""
+        position, rotation = self.seen.pose
+        turn = rotation_matrix(self._settings.reach_rad * actions[:, 3:6])
+        self._pose = Pose(position + self._settings.reach_m * actions[:, :3], turn @ rotation)
+        self._impedance = Impedance(self._settings.gains(actions))
+
+    def step(self, observation: Observation) -> Command:
+        """The target."""
+        self.seen = observation
+        still = self._still
+        return Command(self._pose, still, self._impedance, still, self._running, self._reasons)
+
+
+class Cohort:
+    """Trials that began together.
+
+    Args:
+        setup: robot and scene; a trial ends when the scene's goal holds.
+        settings: of the environment.
+        draws: quantities per trial, each (N,).
+        rngs: one generator per trial.
+
+    Raises:
+        SkillframeError: as `skillframe.execution.executor.simulate`.
+    """
+
+    def __init__(
+        self, setup: Setup, settings: EnvSettings, draws: dict[str, Float], rngs: Sequence[np.random.Generator]
+    ) -> None:
+        self._skill, self._settings = Steered(settings), settings
+        rate = setup.robot.spec.control.tick_hz
+        self._per_step = ratio(rate, settings.rate_hz, "control", "actions")
+        self._last_s = settings.duration_s * setup.pace
+        self._last = round(self._last_s * rate)
+        with _diverging_is_no_warning():
+            self._loop: Loop = begin(self._skill, setup, draws, rngs)
+            self._loop.prepare()
+            self._loop.tick(0)
+        self._tick, self.count = 1, len(rngs)
+        self._shown = self._observed()
+        self._running, self._result = -1, self._loop.result()
+
+    def step(self, actions: NDArray[Any]) -> None:
+        """Tick to the next action, or to the end of the trials.
+
+        Raises:
+            InputError: an action that is not a number.
+        """
+        if not np.all(np.isfinite(actions)):
+            raise InputError("action", "holds a value that is not finite", "give numbers between -1 and 1")
+        if not len(self._loop.active):
+            return
+        self._skill.steer(np.clip(actions.astype(float), -1.0, 1.0))
+        stop = min(self._tick + self._per_step, self._last)
+        with _diverging_is_no_warning():
+            while self._tick < stop and len(self._loop.active):
+                running = self._loop.active
+                self._loop.tick(self._tick)
+                self._tick += 1
+                if len(self._loop.active) < len(running):
+                    self._show(np.setdiff1d(running, self._loop.active))
+            self._show(self._loop.active)
+            if self._tick >= self._last:
+                self._loop.time_over(self._last, self._last_s)
+
+    def see(self) -> Seen:
+        """Where the trials stand. What is observed is as old as a tick, as a skill's is."""
+        ended = np.ones(self.count, dtype=bool)
+        ended[self._loop.active] = False
+        outcomes = self._loop.outcomes
+        far, turned = self._loop.setup.scene.goal_error(self._loop.plant.tip_state())
+        by_time = ended & (outcomes.ended_by == Ended.TIME.value)
+        if self._running != len(self._loop.active):  # sentences for every trial are made when one ended, not each step
+            self._running, self._result = len(self._loop.active), self._loop.result()
+        return Seen(self._shown, far + LEVER_M * turned, self._result.success & ended, ended, by_time)
+
+    def told(self, i: int) -> dict[str, Any]:
+        """Outcome of trial i, which has ended and was seen, as `run` tells it."""
+        result = self._result
+        return {
+            "is_success": bool(result.success[i]), "failure": str(result.failure[i]), "reason": str(result.reason[i]),
+            "ended_by": str(result.ended_by[i]), "duration_s": float(result.duration_s[i]),
+            "peak_force_n": float(result.peak_force_n[i]), "final_error_m": float(result.final_error_m[i]),
+            "final_error_rad": float(result.final_error_rad[i]),
+        }  # fmt: skip
+
+    def _show(self, rows: NDArray[np.int64]) -> None:
+        """Keep what some trials observe now. Sensors of trials that have ended go on reading beside the others."""
+        for name, values in self._observed().items():
+            self._shown[name][rows] = values[rows]
+
+    def _observed(self) -> dict[str, Float]:
+        position, rotation = self._skill.seen.pose
+        values = {
+            "position": position, "quaternion": quaternion_from_matrix(rotation),
+            "twist": self._skill.seen.twist, "wrench": self._skill.seen.wrench,
+        }  # fmt: skip
+        return {k: np.clip(np.nan_to_num(v), -LARGEST[k], LARGEST[k]) for k, v in values.items()}
+
+
+def _diverging_is_no_warning() -> np.errstate:
+    return np.errstate(invalid="ignore", over="ignore")
