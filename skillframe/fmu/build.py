@@ -59,16 +59,19 @@ def build_source(source: Path) -> Path | None:
     return build_library(source.stem, source.read_text(encoding="utf-8"))
 
 
-def build_library(name: str, text: str, include: Path | None = None) -> Path | None:
+def build_library(
+    name: str, text: str, include: Path | None = None, flags: tuple[str, ...] = ()
+) -> Path | None:  # fmt: skip
     """The shared library of C text, from the cache if it is there, or None where it cannot be built.
 
     `include` is a folder with headers of others; what they are is not part of the key, so the text has to say it.
+    `flags` go to the compiler after its own.
     """
     compiler = find_compiler()
     if compiler is None:
         return None
-    extra = [] if include is None else ["-I", str(include)]
-    library = cache_dir(name) / _digest(text, " ".join([*compiler, *FLAGS]))[:24] / f"{name}.so"
+    extra = [*flags, *([] if include is None else ["-I", str(include)])]
+    library = cache_dir(name) / _digest(text, " ".join([*compiler, *FLAGS, *flags]))[:24] / f"{name}.so"
     if not library.is_file():
         library.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=library.parent) as work:

@@ -35,7 +35,7 @@ def surface_of(solid: Any, low: Float, high: Float) -> Surface:
     found = points_of(vertices, faces, low, high)
     return Surface(
         triangles=triangles, grids=tuple(grids), points=found.points, first=found.first, balls=found.balls,
-        apart=_APART * found.spacing, turn=np.eye(3), shift=np.zeros(3),
+        group=found.group, around=found.around, apart=_APART * found.spacing, turn=np.eye(3), shift=np.zeros(3),
     )  # fmt: skip
 
 
@@ -60,7 +60,7 @@ def error_of(surface: Surface, low: Float, high: Float) -> float:
 
 def memory_of(surface: Surface) -> int:
     """Bytes that a surface takes."""
-    of_grid = ("value", "listed", "before", "start", "triangle")
+    of_grid = ("value", "gap", "listed", "before", "start", "triangle")
     grids = [getattr(grid, name) for grid in surface.grids for name in of_grid]
     own = [surface.points, surface.balls, surface.triangles.corners, surface.triangles.normals]
     return sum(array.nbytes for array in (*grids, *own))

@@ -2,7 +2,7 @@
 
 They are denser where the other part can come. Edges are where faces turn by more than 20 degrees. They get their
 corners and a point every half spacing; faces get one point a cube of the spacing. Blocks of
-neighbouring points have a ball around them, so that a call passes over most.
+neighbouring points have a ball around them, and so have groups of blocks, so that a call passes over most.
 """
 
 from __future__ import annotations
@@ -19,16 +19,23 @@ _SHARP = np.cos(np.radians(20.0))
 _POINTS = 1500
 _SPACING = (4e-4, 2e-3)  # m
 _SPARSE = 4.0  # times the spacing, where the other part cannot come
+_WIDE = 3  # blocks along each side of a group
 _OVER = 8.0  # points tried for each that is kept on faces
 _PLASTIC = 1.324717957244746  # M. Roberts' sequence R2: x_n = n / p, y_n = n / p^2, modulo 1
 
 
 class SurfacePoints(NamedTuple):
-    """Points (P, 3) [m], block by block, `first` (B + 1,), `balls` (B, 4), and the `spacing` that they have [m]."""
+    """Points (P, 3) [m] and the `spacing` that they have [m].
+
+    Blocks of them begin at `first` (B + 1,) and lie in `balls` (B, 4), centre and radius. Groups of blocks begin at
+    `group` (G + 1,) and lie in the balls `around` (G, 4).
+    """
 
     points: Float
     first: NDArray[np.int64]
     balls: Float
+    group: NDArray[np.int64]
+    around: Float
     spacing: float
 
 
@@ -92,11 +99,23 @@ def _thinned(points: Float, chosen: NDArray[np.bool_], size: float) -> NDArray[n
 
 
 def _in_blocks(points: Float, size: float, spacing: float) -> SurfacePoints:
-    _, block = np.unique(np.floor(points / size).astype(np.int64), axis=0, return_inverse=True)
-    block = block.reshape(-1)
-    order = np.argsort(block, kind="stable")
+    place = np.floor(points / size).astype(np.int64)
+    wide = place // _WIDE
+    # by groups first, so that the blocks of each follow each other
+    order = np.lexsort((*place.T[::-1], *wide.T[::-1]))
     points = np.ascontiguousarray(points[order])
-    first = np.searchsorted(block[order], np.arange(block.max() + 2)).astype(np.int64)
+    first, of_group = _begins(place[order]), _begins(wide[order])
+    group = np.searchsorted(first, of_group).astype(np.int64)
+    return SurfacePoints(points, first, _balls(points, first), group, _balls(points, of_group), spacing)
+
+
+def _begins(places: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Where runs of equal rows begin, and their number of rows last."""
+    change = (places[1:] != places[:-1]).any(axis=1)
+    return np.concatenate([[0], 1 + np.flatnonzero(change), [len(places)]]).astype(np.int64)
+
+
+def _balls(points: Float, first: NDArray[np.int64]) -> Float:
+    """Balls (B, 4), centre and radius, around points that begin at first (B + 1,)."""
     low, high = (f.reduceat(points, first[:-1], axis=0) for f in (np.minimum, np.maximum))
-    balls = np.column_stack([0.5 * (low + high), 0.5 * norm(high - low)])
-    return SurfacePoints(points, first, np.ascontiguousarray(balls), spacing)
+    return np.ascontiguousarray(np.column_stack([0.5 * (low + high), 0.5 * norm(high - low)]))

@@ -11,6 +11,7 @@
 #define BAND 2.5
 #define REACH 4.0  /* cells; how far from a listed cell's centre its triangles lie, at most */
 #define FAR 1e9f
+#define LOOSE 1.15 /* distances beyond the band are at most this much too large */
 
 typedef void (*Visit)(void* what, int64_t node, int64_t triangle, const double* corner, const double* place);
 
@@ -157,6 +158,27 @@ EXPORT int64_t skillframe_mark(const Grid* g, double tolerance, uint64_t* listed
         found++;
       }
   return found;
+}
+
+/* Gaps of all cells, from values and marks (see Grid and CLEAR).
+
+   Of a cell without a list what is seen is between its corners' values. In one with a list it is exact, and no point is
+   farther than 0.87 cells from a corner. Values beyond the band are at most `LOOSE` too large. */
+EXPORT void skillframe_gaps(const Grid* g, uint8_t* gap) {
+  int64_t sx = g->size[1] * g->size[2], sy = g->size[2];
+  memset(gap, 0, (size_t)(g->size[0] * sx));
+  for (int64_t i = 0; i + 1 < g->size[0]; i++)
+    for (int64_t j = 0; j + 1 < g->size[1]; j++)
+      for (int64_t k = 0; k + 1 < g->size[2]; k++) {
+        int64_t node = node_of(g, i, j, k);
+        const float* v = g->value + node;
+        float low = fminf(fminf(fminf(v[0], v[1]), fminf(v[sy], v[sy + 1])),
+                          fminf(fminf(v[sx], v[sx + 1]), fminf(v[sx + sy], v[sx + sy + 1])));
+        double cells = (double)low / g->cell;
+        int listed = (int)(g->listed[node >> 6] >> (node & 63) & 1);
+        if (listed ? cells > 0.87 : cells >= 0)
+          gap[node] = (uint8_t)(1 + fmin(254, fmax(0, floor((cells / LOOSE - 1.8) / CLEAR))));
+      }
 }
 
 typedef struct {

@@ -16,7 +16,8 @@
 #define CANDIDATES 4096
 #define TURNING 0.010    /* m; by how much normals of 90 degrees apart count as farther apart in place, over sqrt 2 */
 #define SURELY 0.5       /* cells; what interpolates to more is outside, whatever edge is near (it is off by a quarter) */
-#define LOOSE 1.15       /* distances far from the surface are at most this much too large */
+
+#define INLINE inline __attribute__((always_inline))
 
 static const Part* parts[PARTS];
 
@@ -30,7 +31,7 @@ typedef struct {
 
 static _Thread_local Candidate candidates[CANDIDATES];
 
-static void apply(const Frame* f, const double* p, double* out) {
+static INLINE void apply(const Frame* f, const double* p, double* out) {
   for (int x = 0; x < 3; x++) out[x] = dot(f->turn + 3 * x, p) + f->shift[x];
 }
 
@@ -52,17 +53,6 @@ static Frame inverse(const Frame* f) {
   return out;
 }
 
-/* The cell of a point and where it lies in it; false outside, and for what is no number. */
-static int cell_at(const Grid* g, const double* p, int64_t* at, double* part) {
-  for (int x = 0; x < 3; x++) {
-    double place = (p[x] - g->origin[x]) / g->cell;
-    if (!(place >= 0 && place < (double)(g->size[x] - 1))) return 0;
-    at[x] = (int64_t)place;
-    part[x] = place - (double)at[x];
-  }
-  return 1;
-}
-
 static double in_list(const Part* part, const Grid* g, int64_t rank, const double* p, double* normal) {
   double best = 1e9, c[3], d[3], out[3] = {0, 0, 0};
   const double* face = part->mesh.normal;
@@ -82,8 +72,9 @@ static double in_list(const Part* part, const Grid* g, int64_t rank, const doubl
   return inside ? -best : best;
 }
 
-static double in_cell(const Part* part, const Grid* g, const int64_t* at, const double* w, const double* p, double* normal) {
-  int64_t node = node_of(g, at[0], at[1], at[2]), sx = g->size[1] * g->size[2], sy = g->size[2];
+/* What a grid says of a point p of the part's frame that lies at w within the cell of a node; normals where it is negative. */
+static double in_cell(const Part* part, const Grid* g, int64_t node, const double* w, const double* p, double* normal) {
+  int64_t sx = g->size[1] * g->size[2], sy = g->size[2];
   const float* v = g->value + node;
   double a00 = v[0] + w[2] * (v[1] - v[0]), a01 = v[sy] + w[2] * (v[sy + 1] - v[sy]);
   double a10 = v[sx] + w[2] * (v[sx + 1] - v[sx]), a11 = v[sx + sy] + w[2] * (v[sx + sy + 1] - v[sx + sy]);
@@ -104,11 +95,47 @@ static double in_cell(const Part* part, const Grid* g, const int64_t* at, const 
   return value;
 }
 
-/* What points are looked up in: a part, or a box of these half sizes. */
+/* A grid as a moving part sees it: `turn` and `shift` take a point of that part to cells. `cells` of 0: not there. */
+typedef struct {
+  double turn[9], shift[3], cells[3];
+  int64_t step[2];
+  const Grid* grid;
+} View;
+
+/* What points are looked up in: a part, seen on two levels, or a box of these half sizes. */
 typedef struct {
   const Part* part;
   const double* half;
+  Frame across; /* from the points' frame to its own */
+  View view[2];
 } Shape;
+
+static Shape seen(const Part* part, const double* half, const Frame* across) {
+  Shape in = {part, half, *across, {{{0}}}};
+  for (int level = 0; part && level < 2; level++) {
+    const Grid* g = part->grid + level;
+    View* view = in.view + level;
+    view->grid = g, view->step[0] = g->size[1] * g->size[2], view->step[1] = g->size[2];
+    if (!g->size[0]) continue;
+    for (int x = 0; x < 3; x++) {
+      for (int y = 0; y < 3; y++) view->turn[3 * x + y] = across->turn[3 * x + y] / g->cell;
+      view->shift[x] = (across->shift[x] - g->origin[x]) / g->cell;
+      view->cells[x] = (double)(g->size[x] - 1);
+    }
+  }
+  return in;
+}
+
+/* The node at which a point's cell begins, and where it lies in it; -1 outside, and for what is no number. */
+static INLINE int64_t cell_at(const View* v, const double* p, double* at) {
+  for (int x = 0; x < 3; x++) {
+    at[x] = dot(v->turn + 3 * x, p) + v->shift[x];
+    if (!(at[x] >= 0 && at[x] < v->cells[x])) return -1;
+  }
+  int64_t i = (int64_t)at[0], j = (int64_t)at[1], k = (int64_t)at[2];
+  at[0] -= (double)i, at[1] -= (double)j, at[2] -= (double)k;
+  return i * v->step[0] + j * v->step[1] + k;
+}
 
 /* Depth of a point in a box, below zero, and the normal of the face that is nearest; above zero outside. */
 static double in_box(const double* half, const double* p, double* normal) {
@@ -120,55 +147,65 @@ static double in_box(const double* half, const double* p, double* normal) {
   return p[0] == p[0] ? value : 1e9;
 }
 
-/* Signed distance of a point of a shape's frame, and its gradient where that is negative. */
-static double distance_at(Shape in, const double* p, double* normal) {
+/* Signed distance of a point, and its gradient where that is negative. `p` becomes the point in the shape's own frame.
+   With `only_inside` it is 1e9 where one byte tells that it is positive, as of most points. */
+static INLINE double distance_at(const Shape* in, int only_inside, const double* point, double* p, double* normal) {
   double w[3];
-  int64_t at[3];
-  if (in.half) return in_box(in.half, p, normal);
-  for (int level = 0; level < 2; level++)
-    if (cell_at(in.part->grid + level, p, at, w)) return in_cell(in.part, in.part->grid + level, at, w, p, normal);
-  return 1e9;
+  if (!in->half)
+    for (int level = 0; level < 2; level++) {
+      const View* view = in->view + level;
+      int64_t node = cell_at(view, point, w);
+      if (node < 0) continue;
+      if (only_inside && view->grid->gap[node]) return 1e9;
+      apply(&in->across, point, p);
+      return in_cell(in->part, view->grid, node, w, p, normal);
+    }
+  if (!in->half) return 1e9;
+  apply(&in->across, point, p);
+  return in_box(in->half, p, normal);
 }
 
 /* Whether no point of a ball can be in a shape. */
-static int is_clear(Shape in, const double* centre, double radius) {
-  const Part* part = in.part;
-  int64_t at[3];
-  double w[3];
-  if (in.half) return in_box(in.half, centre, w) > radius;
-  for (int level = 0; level < 2; level++) {
-    const Grid* g = part->grid + level;
-    if (cell_at(g, centre, at, w))
-      return (double)g->value[node_of(g, at[0], at[1], at[2])] > LOOSE * (radius + 1.8 * g->cell);
+static int is_clear(const Shape* in, const double* centre, double radius) {
+  double w[3], p[3];
+  if (in->half) {
+    apply(&in->across, centre, p);
+    return in_box(in->half, p, w) > radius;
   }
   for (int level = 0; level < 2; level++) {
-    const Grid* g = part->grid + level;
+    const View* view = in->view + level;
+    int64_t node = cell_at(view, centre, w);
+    if (node >= 0) return CLEAR * view->grid->cell * ((double)view->grid->gap[node] - 1) > radius;
+  }
+  for (int level = 0; level < 2; level++) {
+    const View* view = in->view + level;
     double away = 0;
-    for (int x = 0; x < 3 && g->size[x] > 1; x++) {
-      double high = g->origin[x] + g->cell * (double)(g->size[x] - 1);
-      away = fmax(away, fmax(g->origin[x] - centre[x], centre[x] - high));
+    for (int x = 0; x < 3; x++) {
+      double at = dot(view->turn + 3 * x, centre) + view->shift[x];
+      away = larger(away, larger(-at, at - view->cells[x]));
     }
-    if (g->size[0] > 1 && !(away > radius)) return 0;
+    if (view->cells[0] > 0 && !(away * view->grid->cell > radius)) return 0;
   }
   return 1;
 }
 
 /* Add what the points of one part find in the other; `sign` turns gradients to normals from the first to the second. */
-static int look(const Part* of, const Frame* pose_of, Shape in, const Frame* pose_in, double sign, int found) {
+static int look(const Part* of, const Frame* pose_of, const Part* part, const double* half, const Frame* pose_in, double sign, int found) {
   Frame back = inverse(pose_in), across = after(&back, pose_of);
-  for (int64_t b = 0; b < of->blocks; b++) {
-    double centre[3], p[3], normal[3];
-    apply(&across, of->ball + 4 * b, centre);
-    if (is_clear(in, centre, of->ball[4 * b + 3])) continue;
-    for (int64_t i = of->first[b]; i < of->first[b + 1] && found < CANDIDATES; i++) {
-      apply(&across, of->point + 3 * i, p);
-      double dist = distance_at(in, p, normal);
-      if (!(dist < 0)) continue;
-      Candidate* c = candidates + found++;
-      for (int x = 0; x < 3; x++) p[x] -= 0.5 * dist * normal[x];
-      apply(pose_in, p, c->pos);
-      for (int x = 0; x < 3; x++) c->normal[x] = sign * dot(pose_in->turn + 3 * x, normal);
-      c->dist = dist, c->apart = 1e9;
+  Shape in = seen(part, half, &across);
+  for (int64_t a = 0; a < of->groups; a++) {
+    if (is_clear(&in, of->around + 4 * a, of->around[4 * a + 3])) continue;
+    for (int64_t b = of->group[a]; b < of->group[a + 1]; b++) {
+      if (is_clear(&in, of->ball + 4 * b, of->ball[4 * b + 3])) continue;
+      for (int64_t i = of->first[b]; i < of->first[b + 1] && found < CANDIDATES; i++) {
+        double p[3], normal[3], dist = distance_at(&in, 1, of->point + 3 * i, p, normal);
+        if (!(dist < 0)) continue;
+        Candidate* c = candidates + found++;
+        for (int x = 0; x < 3; x++) p[x] -= 0.5 * dist * normal[x];
+        apply(pose_in, p, c->pos);
+        for (int x = 0; x < 3; x++) c->normal[x] = sign * dot(pose_in->turn + 3 * x, normal);
+        c->dist = dist, c->apart = 1e9;
+      }
     }
   }
   return found;
@@ -219,8 +256,8 @@ static int collide(const mjModel* m, mjData* d, mjPreContact* con, int g1, int g
   const Part *one = part_of(m, d, g1, &f1), *two = part_of(m, d, g2, &f2);
   (void)margin;
   if (!one || !two) return 0;
-  int found = look(one, &f1, (Shape){two, NULL}, &f2, -1.0, 0);
-  found = look(two, &f2, (Shape){one, NULL}, &f1, 1.0, found);
+  int found = look(one, &f1, two, NULL, &f2, -1.0, 0);
+  found = look(two, &f2, one, NULL, &f1, 1.0, found);
   return choose(found, fmin(one->apart, two->apart), con);
 }
 
@@ -232,7 +269,7 @@ static int collide_box(const mjModel* m, mjData* d, mjPreContact* con, int g1, i
   if (!part) return 0;
   memcpy(box.turn, d->geom_xmat + 9 * g1, sizeof box.turn);
   memcpy(box.shift, d->geom_xpos + 3 * g1, sizeof box.shift);
-  return choose(look(part, &pose, (Shape){NULL, m->geom_size + 3 * g1}, &box, 1.0, 0), part->apart, con);
+  return choose(look(part, &pose, NULL, m->geom_size + 3 * g1, &box, 1.0, 0), part->apart, con);
 }
 
 EXPORT int skillframe_version(void) { return mjVERSION_HEADER; }
@@ -257,6 +294,8 @@ EXPORT void skillframe_remove(int number) { parts[number - 1] = NULL; }
 
 /* Signed distances of points (count, 3) as contacts see them. */
 EXPORT void skillframe_look_up(const Part* part, int64_t count, const double* point, double* out) {
-  double normal[3];
-  for (int64_t i = 0; i < count; i++) out[i] = distance_at((Shape){part, NULL}, point + 3 * i, normal);
+  Frame same = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0}};
+  Shape in = seen(part, NULL, &same);
+  double p[3], normal[3];
+  for (int64_t i = 0; i < count; i++) out[i] = distance_at(&in, 0, point + 3 * i, p, normal);
 }

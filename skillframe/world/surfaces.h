@@ -7,6 +7,7 @@
 #include <string.h>
 
 #define EXPORT __attribute__((visibility("default")))
+#define CLEAR 0.25 /* cells; a gap of 1 + n says that every point within n of these is outside */
 
 typedef struct {
   int64_t count;         /* triangles */
@@ -18,6 +19,7 @@ typedef struct {
   double origin[3], cell;
   int64_t size[3];          /* nodes; x runs slowest */
   const float* value;       /* signed distance at the nodes, negative inside */
+  const uint8_t* gap;       /* of the cell that begins there: 0 where a point may be inside, else see CLEAR */
   const uint64_t* listed;   /* one bit a node: the cell that begins there has a list of triangles */
   const uint32_t* before;   /* listed cells before each word of 64 */
   const int32_t* start;     /* (listed cells + 1) into `triangle` */
@@ -29,13 +31,17 @@ typedef struct {
   Grid grid[2];             /* fine, where the parts can meet, and coarse, all of it; a size of zero: not there */
   double turn[9], shift[3]; /* part frame to body frame */
   double apart;             /* least distance of two contacts */
-  int64_t points, blocks;
+  int64_t points, blocks, groups;
   const double* point;      /* (points, 3), block by block */
   const double* ball;       /* (blocks, 4): centre and radius */
   const int64_t* first;     /* (blocks + 1) into `point` */
+  const double* around;     /* (groups, 4): centre and radius of some blocks that follow each other */
+  const int64_t* group;     /* (groups + 1) into `ball` */
 } Part;
 
 static inline double dot(const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+static inline double larger(double a, double b) { return a > b ? a : b; }
 
 static inline int64_t node_of(const Grid* g, int64_t i, int64_t j, int64_t k) {
   return (i * g->size[1] + j) * g->size[2] + k;

@@ -34,7 +34,7 @@ class _Mesh(ctypes.Structure):
 class _Grid(ctypes.Structure):
     _fields_ = (
         ("origin", ctypes.c_double * 3), ("cell", ctypes.c_double), ("size", ctypes.c_int64 * 3),
-        *((name, ctypes.c_void_p) for name in ("value", "listed", "before", "start", "triangle")),
+        *((name, ctypes.c_void_p) for name in ("value", "gap", "listed", "before", "start", "triangle")),
     )  # fmt: skip
 
 
@@ -42,7 +42,8 @@ class _Part(ctypes.Structure):
     _fields_ = (
         ("mesh", _Mesh), ("grid", _Grid * 2), ("turn", ctypes.c_double * 9), ("shift", ctypes.c_double * 3),
         ("apart", ctypes.c_double), ("points", ctypes.c_int64),
-        ("blocks", ctypes.c_int64), *((name, ctypes.c_void_p) for name in ("point", "ball", "first")),
+        ("blocks", ctypes.c_int64), ("groups", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in ("point", "ball", "first", "around", "group")),
     )  # fmt: skip
 
 
@@ -68,6 +69,7 @@ class DistanceGrid:
     Attributes:
         origin: (3,) of the first node [m]; cell: [m].
         value: (X, Y, Z) at the nodes [m], below zero inside.
+        gap: (X, Y, Z) of the cell that begins there: 0 where a point may be inside, else how far it is from there.
         listed: one bit a node, whether the cell that begins there has a list; before: listed cells before each word.
         start: (cells + 1,) into triangle: those that can be nearest within a listed cell.
         disagree: share of the nodes whose three rays disagree on what is inside.
@@ -76,6 +78,7 @@ class DistanceGrid:
     origin: Float
     cell: float
     value: NDArray[np.float32]
+    gap: NDArray[np.uint8]
     listed: NDArray[np.uint64]
     before: NDArray[np.uint32]
     start: NDArray[np.int32]
@@ -92,6 +95,7 @@ class Surface:
         grids: one, or a fine one where parts can meet and a coarse one of all.
         points: (P, 3) on the surface [m], block by block; first: (B + 1,) where each block begins.
         balls: (B, 4) centre and radius of each block [m].
+        group: (G + 1,) where each group of blocks begins; around: (G, 4) their balls.
         apart: least distance of two contacts [m].
     """
 
@@ -100,6 +104,8 @@ class Surface:
     points: Float
     first: Ints
     balls: Float
+    group: Ints
+    around: Float
     apart: float
     turn: Float
     shift: Float
@@ -126,7 +132,8 @@ def opened() -> ctypes.CDLL | None:
     header = f"#define SKILLFRAME_MUJOCO {mujoco.mj_version()}\n"
     whole = header + "".join(text[name].replace('#include "surfaces.h"', "") for name in SOURCES)
     for _ in range(2):
-        built = build_library("contacts", whole, include=Path(mujoco.__file__).parent / "include")
+        headers = Path(mujoco.__file__).parent / "include"
+        built = build_library("contacts", whole, include=headers, flags=("-O3",))
         if built is None or not _loaded_engine():
             return None
         try:
@@ -183,7 +190,7 @@ def _mesh(triangles: Triangles) -> _Mesh:
 
 
 def _grid(grid: DistanceGrid) -> _Grid:
-    lists = (_at(each) for each in (grid.value, grid.listed, grid.before, grid.start, grid.triangle))
+    lists = (_at(each) for each in (grid.value, grid.gap, grid.listed, grid.before, grid.start, grid.triangle))
     return _Grid((ctypes.c_double * 3)(*grid.origin), grid.cell, (ctypes.c_int64 * 3)(*grid.value.shape), *lists)
 
 
@@ -193,8 +200,12 @@ def _part(surface: Surface) -> _Part:
         made.grid[level] = _grid(grid)
     made.turn[:] = surface.turn.ravel().tolist()
     made.shift[:] = surface.shift.tolist()
-    made.points, made.blocks = len(surface.points), len(surface.balls)
-    made.point, made.ball, made.first = (_at(each).value for each in (surface.points, surface.balls, surface.first))
+    made.points, made.blocks, made.groups = len(surface.points), len(surface.balls), len(surface.around)
+    for name, array in (
+        ("point", surface.points), ("ball", surface.balls), ("first", surface.first), ("around", surface.around),
+        ("group", surface.group),
+    ):  # fmt: skip
+        setattr(made, name, _at(array).value)
     return made
 
 
@@ -255,15 +266,16 @@ def grid_of(triangles: Triangles, low: Float, high: Float, cell: float) -> Dista
     size = np.maximum(np.ceil((high - low) / cell).astype(int) + 1, 2)
     mesh, value = _mesh(triangles), np.empty(size, dtype=np.float32)
     listed, disagree = np.zeros(value.size // 64 + 1, dtype=np.uint64), ctypes.c_int64()
-    none = np.zeros(1, dtype=np.int32)
+    none, gap = np.zeros(1, dtype=np.int32), np.empty(size, dtype=np.uint8)
     grid = DistanceGrid(
-        origin=np.array(low, dtype=float), cell=cell, value=value, listed=listed,
+        origin=np.array(low, dtype=float), cell=cell, value=value, gap=gap, listed=listed,
         before=np.zeros(1, dtype=np.uint32), start=none, triangle=none, disagree=0.0,
     )  # fmt: skip
     made = _grid(grid)
     if found.skillframe_values(ctypes.byref(made), ctypes.byref(mesh), _at(value), ctypes.byref(disagree)):
         raise SkillframeError(f"a grid of {value.size:,} nodes for contact does not fit into memory; take larger cells")
     count = int(found.skillframe_mark(ctypes.byref(made), TOLERANCE, _at(listed)))
+    found.skillframe_gaps(ctypes.byref(made), _at(gap))
     bits = np.bitwise_count(listed) if hasattr(np, "bitwise_count") else _bits(listed)
     before = (np.cumsum(bits, dtype=np.uint32) - bits).astype(np.uint32)
     made.before = _at(before).value
@@ -274,8 +286,8 @@ def grid_of(triangles: Triangles, low: Float, high: Float, cell: float) -> Dista
     made.start, many[:] = _at(start).value, 0
     found.skillframe_lists(ctypes.byref(made), ctypes.byref(mesh), _at(nearest), _at(many), _at(triangle))
     return DistanceGrid(
-        origin=grid.origin, cell=cell, value=value, listed=listed, before=before, start=start, triangle=triangle,
-        disagree=disagree.value / value.size,
+        origin=grid.origin, cell=cell, value=value, gap=gap, listed=listed, before=before, start=start,
+        triangle=triangle, disagree=disagree.value / value.size,
     )  # fmt: skip
 
 

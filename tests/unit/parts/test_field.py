@@ -116,6 +116,30 @@ def test_blocks_hold_their_points(cube):
     assert cube.first[-1] == len(cube.points)
 
 
+def test_groups_hold_their_blocks_one_after_the_other(cube):
+    assert cube.group[0] == 0 and cube.group[-1] == len(cube.balls) and (np.diff(cube.group) > 0).all()
+    for k, (x, y, z, radius) in enumerate(cube.around):
+        inside = cube.points[cube.first[cube.group[k]] : cube.first[cube.group[k + 1]]]
+        assert np.linalg.norm(inside - [x, y, z], axis=1).max() < radius + 1e-12
+    assert len(cube.around) < len(cube.balls) / 3
+
+
+def test_no_point_that_is_passed_over_is_inside(cube):
+    """A gap of 1 + n says that all within n quarters of a cell are outside, which the closed form has to confirm."""
+    (grid,) = cube.grids
+    points = np.random.default_rng(6).uniform(-1.0, 1.0, (100_000, 3)) * (HALF + 4.0 * grid.cell)
+    place = np.floor((points - grid.origin) / grid.cell).astype(int)
+    kept = ((place >= 0) & (place < np.array(grid.gap.shape) - 1)).all(axis=1)
+    gap = grid.gap[tuple(place[kept].T)].astype(float)
+    true = box_distance(points[kept])
+    outside = gap > 0
+    assert (true[outside] >= 0.25 * grid.cell * (gap[outside] - 1.0) - 1e-7).all()  # values are floats
+    assert (cube.look_up(points[kept][outside]) >= 0.0).all()
+    # and it is of use: of what is farther out than (1.8 + 0.25) x 1.15 + a cell's diagonal, everything is told
+    assert (gap[true > 4.1 * grid.cell] > 1).all()
+    assert (gap[true < 0.0] == 0).all()
+
+
 @pytest.mark.slow
 def test_a_ball_has_the_distance_of_a_ball():
     radius, sides = 6e-3, 96
