@@ -126,15 +126,19 @@ def _look(folder: Path, engine: Engine) -> None:
 
 def _tell_border(folder: Path, found: dict[str, Any]) -> int:
     end = f"the last round changed {100.0 * (found['changed'] or 0.0):.1f} % of it"
-    click.echo(f"border      found after {found['trials']} trials; {end}"
-               + ("" if found["settled"] else ", which is not yet settled"))  # fmt: skip
+    alike = _alike(found["trials"], found["successes"])
+    if alike:
+        click.echo(f"border      none was met: {alike}")
+    else:
+        click.echo(f"border      found after {found['trials']} trials; {end}"
+                   + ("" if found["settled"] else ", which is not yet settled"))  # fmt: skip
     click.echo(f"works       in {100.0 * found['share_that_works']:.3g} % of the declared ranges, as predicted")
     for name, (low, high) in found["reaches"].items():
         ends = [word for word, there in (("low", low), ("high", high)) if there]
         if ends:
             click.echo(f"reaches     the {' and the '.join(ends)} end of {name}: widen it to see the border there")
     idle = [name for name, index in found["index"].items() if index < 0.05]
-    if idle and 0.0 < found["share_that_works"] < 1.0:
+    if idle and not alike:
         click.echo(f"no effect   of {', '.join(idle)} shows")
     click.echo(f"islands     smaller than {100.0 * found['smallest_island']:.2g} % of the ranges may have been missed")
     click.echo("no claim    these trials were picked; what may be claimed: skillframe campaign certify " + str(folder))
@@ -159,7 +163,20 @@ def _tell_break(folder: Path, found: dict[str, Any]) -> int:
     return 0
 
 
+def _alike(trials: int, successes: int) -> str:
+    """That all trials ended alike, and what to do. Empty where they did not."""
+    if successes == trials:
+        return f"all {trials} trials succeed; widen the ranges until some fail"
+    if not successes:
+        return f"all {trials} trials fail; narrow the ranges until some succeed"
+    return ""
+
+
 def _tell_matter(folder: Path, found: dict[str, Any]) -> int:
+    alike = _alike(**found["looked_at"])
+    if alike:
+        click.echo(f"nothing to rank: {alike}")
+        return 0
     for name, index in sorted(found["index"].items(), key=lambda pair: -pair[1]):
         click.echo(f"{name:24} {index:.1f}" + ("  does nothing that shows" if index < 0.05 else ""))
     for each in found["held"]:

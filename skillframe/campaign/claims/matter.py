@@ -78,6 +78,13 @@ def indices(surrogate: Surrogate, dimension: int) -> Float:
     return found
 
 
+def ranks(seen: Looked) -> Float:
+    """(d,) indices by trials that were looked at, all 0 where they ended alike and so there is nothing to rank."""
+    if seen.works.all() or not seen.works.any():
+        return np.zeros(seen.points.shape[1])
+    return indices(Surrogate(seen.points, seen.works), seen.points.shape[1])
+
+
 def search(
     ranked: Mapping[str, float], names: list[str], nominal: Float, seed: int, say: Say = lambda text: None
 ) -> Generator[ToTry, Looked, tuple[Frozen, ...]]:

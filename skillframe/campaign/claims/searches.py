@@ -23,7 +23,6 @@ from skillframe.campaign.claims.engine import Engine, Looked, Say
 from skillframe.campaign.claims.plan import PLAN, RoundPlan
 from skillframe.campaign.claims.question import LOOK, Question, read_question
 from skillframe.campaign.claims.rounds import BORDER, carry_out, ended, looked, next_sobol, rows_hash, scene_of, seed_of
-from skillframe.campaign.claims.surrogate import Surrogate
 from skillframe.campaign.folder import load
 from skillframe.errors import InputError
 from skillframe.files import write_whole
@@ -53,7 +52,7 @@ def map_border(folder: Path, engine: Engine, say: Say = print) -> dict[str, Any]
     question = read_question(folder)
     names = list(question.ranges)
     seen = looked(folder, engine.params)
-    ranks = matter.indices(Surrogate(seen.points, seen.works), len(names))
+    ranks = matter.ranks(seen)
     return _written(folder, BORDER, {
         "trials": found.trials, "successes": int(seen.works.sum()), "explored": found.explored,
         "changed": found.changed, "settled": found.settled, "share_that_works": found.share,
@@ -117,8 +116,9 @@ def rank(folder: Path, engine: Engine, say: Say = print) -> dict[str, Any]:
     """Rank the quantities and test the first two. Returns the content of matter.json."""
     question = read_question(folder)
     held = carry_out(folder, MATTER, _matter(folder, engine.params, say), engine, say)
-    where = nominal(folder, question)
+    where, seen = nominal(folder, question), looked(folder, engine.params, rounds=0)
     return _written(folder, MATTER, {
+        "looked_at": {"trials": len(seen.works), "successes": int(seen.works.sum())},
         "index": _ranks(folder, engine.params),
         "held": [{**each._asdict(), "change": list(each.change), "at": where[each.name]} for each in held],
     })  # fmt: skip
@@ -127,7 +127,7 @@ def rank(folder: Path, engine: Engine, say: Say = print) -> dict[str, Any]:
 def _ranks(folder: Path, params: type | None) -> dict[str, float]:
     """Index of each quantity by the trials that were looked at evenly."""
     question, seen = read_question(folder), looked(folder, params, rounds=0)
-    found = matter.indices(Surrogate(seen.points, seen.works), len(question.ranges))
+    found = matter.ranks(seen)
     return {name: float(found[i]) for i, name in enumerate(question.ranges)}
 
 
@@ -183,7 +183,9 @@ def _disagreements(
     entries = plan.of(stream)
     if not entries:
         return []
-    batch, wrong = next(search), []
+    batch, wrong = next(search, None), []
+    if batch is None:
+        return [f"{PLAN}: rounds of {stream} do not follow from the trials before them, from which none does"]
     for entry in entries:
         where = f"{PLAN}: round {entry.round} of {stream}"
         points = np.array([question.in_si(point) for point in batch.points])

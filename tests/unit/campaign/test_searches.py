@@ -9,15 +9,16 @@ import numpy as np
 import pytest
 from scipy.stats import norm, qmc
 from search_fakes import content, everything
-from test_certify import ENGINE, TEXT, asked, written
+from test_certify import ENGINE, TEXT, asked, inside, written
 
 from skillframe.campaign.claims import border, breaking, matter, procedure
 from skillframe.campaign.claims.engine import Looked
 from skillframe.campaign.claims.plan import PLAN, RoundPlan
 from skillframe.campaign.claims.question import ask_again, begin, read_question
 from skillframe.campaign.claims.rounds import looked
-from skillframe.campaign.claims.searches import check_plan, find_break, nominal
+from skillframe.campaign.claims.searches import check_plan, find_break, nominal, rank
 from skillframe.campaign.claims.surrogate import Surrogate, covariance
+from skillframe.cli.searches import _tell_border, _tell_matter
 from skillframe.errors import InputError
 from skillframe.world.worlds.valley import ValleyParams
 
@@ -283,3 +284,55 @@ def test_twenty_kills_at_random_moments_leave_the_folder_as_it_would_be(tmp_path
     print(f"{ends.count(-9)} of 20 processes killed before their end")
     assert ends.count(-9) >= 10
     assert content(tmp_path / "killed" / "out") == content(tmp_path / "whole" / "out")
+
+
+def all_end(works):
+    """Whatever is drawn, trials end alike."""
+    failure = "" if works else "stuck"
+    return ENGINE._replace(evaluate=lambda job: [row | {"success": works, "failure": failure} for row in inside(job)])
+
+
+@pytest.mark.parametrize(
+    ("works", "said"), [(True, "all 128 trials succeed; widen"), (False, "all 128 trials fail; narrow")]
+)
+def test_where_all_trials_end_alike_there_is_nothing_to_rank_and_no_border(tmp_path, capsys, works, said):
+    out = asked(tmp_path)
+    alike = all_end(works)
+    procedure.look(out, alike)
+    found = rank(out, alike, quiet)
+    assert (set(found["index"].values()), found["held"]) == ({0.0}, [])
+    assert not (out / PLAN).exists()
+    _tell_matter(out, found)
+    border = {
+        "trials": 128,
+        "successes": 128 * works,
+        "changed": 0.0,
+        "settled": True,
+        "share_that_works": float(works),
+    }
+    _tell_border(out, {**border, "reaches": {}, "index": found["index"], "smallest_island": 0.1, "explored": 128})
+    told = capsys.readouterr().out
+    assert f"nothing to rank: {said}" in told and f"none was met: {said}" in told
+    assert "no effect" not in told and "0.0" not in told.splitlines()[0]
+
+
+def test_a_quantity_that_does_nothing_is_named(tmp_path, capsys):
+    index = {"fixture.tilt_y": 0.9, "fixture.offset_x": 0.01}
+    _tell_matter(tmp_path, {"looked_at": {"trials": 128, "successes": 60}, "index": index, "held": []})
+    found = {"trials": 160, "successes": 80, "changed": 0.02, "settled": True, "share_that_works": 0.5, "index": index}
+    reaches = {"fixture.tilt_y": (False, True), "fixture.offset_x": (True, True)}
+    _tell_border(tmp_path, {**found, "reaches": reaches, "smallest_island": 0.02})
+    told = capsys.readouterr().out
+    assert "fixture.offset_x         0.0  does nothing that shows" in told
+    assert "no effect   of fixture.offset_x shows" in told
+    assert "reaches     the high end of fixture.tilt_y: widen it to see the border there" in told
+
+
+def test_a_plan_whose_rounds_do_not_follow_is_said_where_no_search_would_have_begun(tmp_path):
+    out = asked(tmp_path)
+    alike = all_end(works=True)
+    procedure.look(out, alike)
+    RoundPlan(out, list(read_question(out).ranges)).append("matter", np.zeros((1, 2)), 0, "x")
+    assert check_plan(out, ValleyParams) == [
+        f"{PLAN}: rounds of matter do not follow from the trials before them, from which none does"
+    ]
