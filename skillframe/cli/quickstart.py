@@ -1,7 +1,8 @@
 """`skillframe quickstart`: the whole way in a few minutes, as the commands a person would type.
 
 Each step is a command of this program, echoed before it runs, so that the log doubles as a tutorial: two demonstrations
-of each task, learning, one run, a campaign over errors of the fixture's pose beside plain replay, and one report.
+of each task, learning, one run, a campaign over errors of the fixture's pose beside plain replay, a certificate of the
+first task's skill, and one report.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import Any
 
 import click
 
+from skillframe.cli.certify import NOT_CERTIFIED
 from skillframe.cli.names import robot_option
 from skillframe.cli.numbers import COUNT, SEED
 from skillframe.cli.output import bold, emit_json, is_quiet, quiet_option
@@ -54,7 +56,10 @@ duration_s = 8.0
 "fixture.offset_x" = {{ sobol = [-0.008, 0.008] }}
 "fixture.tilt_y" = {{ sobol = [-0.12, 0.12] }}
 """
-STEPS = 9
+STEPS = 10
+PROOF, CERTIFIED = "proof", "valley"
+"""Folder of the certificate, and the task whose skill it is of: its trials are the quickest."""
+CERTIFY = ["campaign", "certify"]
 TASKS = (("valley", "valley", VALLEY, None), ("peg", "peg_in_hole", PEG, "tip"))
 
 
@@ -62,12 +67,14 @@ TASKS = (("valley", "valley", VALLEY, None), ("peg", "peg_in_hole", PEG, "tip"))
 @click.option("--out", default="demo", show_default=True, type=click.Path(path_type=Path), help="Folder to make.")
 @robot_option
 @click.option("--trials", default=96, show_default=True, type=COUNT, help="Trials per skill and campaign.")
+@click.option("--rate", default=0.9, show_default=True, type=click.FloatRange(0.5, 1.0, max_open=True),
+              help="Success rate to certify.")  # fmt: skip
 @click.option("--workers", default=2, show_default=True, type=COUNT, help="Worker processes of the campaigns.")
 @click.option("--seed", default=1, show_default=True, type=SEED, help="Seed of the demonstrations.")
 @click.option("--json", "as_json", is_flag=True, help="The outcome as JSON alone on stdout; the log goes to stderr.")
 @quiet_option
-def command(out: Path, robot: str, trials: int, workers: int, seed: int, as_json: bool) -> int:
-    """Demonstrate, learn, run and prove two skills, and write a report.
+def command(out: Path, robot: str, trials: int, rate: float, workers: int, seed: int, as_json: bool) -> int:
+    """Demonstrate, learn, run and prove two skills, certify one, and write a report.
 
     A simulated person shows a robot twice how to slide into a valley, and how to put a peg into a hole with 0.25 mm of
     play.
@@ -85,28 +92,45 @@ def command(out: Path, robot: str, trials: int, workers: int, seed: int, as_json
         write_whole(out / f"{name}.campaign.toml", text.encode())
     steps, quiet = list[list[str]](), is_quiet()
     with redirect_stdout(sys.stderr) if as_json else nullcontext():
-        for step in _steps(out, robot, workers, seed):  # it copies files between its steps, so one at a time
+        for step in _steps(out, robot, trials, rate, workers, seed):  # it copies files between, so one at a time
             steps.append(step)
             code = _type(step, len(steps), quiet)
-            if code:
+            if code and not (code == NOT_CERTIFIED and step[:2] == CERTIFY):
                 return code
     spent = time.perf_counter() - began
     if as_json:
         emit_json(_outcome(out, robot, steps, spent))
         return 0
     click.echo(f"\nDone in {spent:.0f} s. Open {out / 'report.html'} in a browser: what was learned,")
-    click.echo("the runs in 3-D, and where the skills work, beside a plain replay of the demonstrations.")
+    click.echo("the runs in 3-D, where the skills work, beside a plain replay of the demonstrations, and")
+    click.echo(f"{_verdict(out)} on a page to print. To check it: skillframe campaign check {out / PROOF}")
     return 0
 
 
 def _outcome(out: Path, robot: str, steps: list[list[str]], wall_s: float) -> dict[str, Any]:
     """What a script wants to know: where the report is, and how each campaign ended."""
+    from skillframe.campaign.claims.certificate import CERTIFICATE
     from skillframe.campaign.summary import read_summary
 
     found = {name: read_summary(out / name)["skills"] for name, *_ in TASKS}
     campaigns = [{"robot": robot, "world": world, "skills": found[name]} for name, world, *_ in TASKS]
     typed = [shlex.join(["skillframe", *step]) for step in steps]
-    return {"report": str(out / "report.html"), "campaigns": campaigns, "commands": typed, "wall_s": wall_s}
+    return {
+        "report": str(out / "report.html"), "campaigns": campaigns, "certified": _certified(out)["certified"],
+        "certificate": str(out / PROOF / CERTIFICATE), "commands": typed, "wall_s": wall_s,
+    }  # fmt: skip
+
+
+def _certified(out: Path) -> dict[str, Any]:
+    from skillframe.campaign.claims.certificate import CERTIFICATE
+    from skillframe.files.documents import read_json
+
+    predicate: dict[str, Any] = read_json(out / PROOF / CERTIFICATE, "type the command again")["predicate"]
+    return predicate
+
+
+def _verdict(out: Path) -> str:
+    return "a certificate" if _certified(out)["certified"] else "why nothing was certified"
 
 
 def _make_room(out: Path) -> None:
@@ -125,7 +149,7 @@ def _make_room(out: Path) -> None:
     write_whole(out / MARKER, b"made by skillframe quickstart, which clears this folder\n")
 
 
-def _steps(out: Path, robot: str, workers: int, seed: int) -> Iterator[list[str]]:
+def _steps(out: Path, robot: str, trials: int, rate: float, workers: int, seed: int) -> Iterator[list[str]]:
     """The commands, in order."""
     for name, world, _, coc in TASKS:
         demos = [str(out / "demonstrations" / f"{name}{i}.npz") for i in (1, 2)]
@@ -142,7 +166,14 @@ def _steps(out: Path, robot: str, workers: int, seed: int) -> Iterator[list[str]
         yield ["campaign", "run", plan, "--out", str(out / name), "--workers", str(workers)]
         _copy(demos, out / name / "demonstrations")
         _copy([trace], out / name / "traces")
-    yield ["report", *(str(out / name) for name, *_ in TASKS), "--out", str(out / "report.html")]
+    yield [
+        *CERTIFY, str(out / f"{CERTIFIED}.campaign.toml"), "--rate", f"{rate:g}", "--look", str(trials),
+        "--out", str(out / PROOF), "--workers", str(workers),
+    ]  # fmt: skip
+    for fresh in sorted((out / PROOF).glob("claim*/fresh")):
+        _copy([str(out / "demonstrations" / f"{CERTIFIED}{i}.npz") for i in (1, 2)], fresh / "demonstrations")
+    shown = [str(out / name) for name in (*(name for name, *_ in TASKS), PROOF)]
+    yield ["report", *shown, "--out", str(out / "report.html")]
 
 
 def _copy(files: list[str], folder: Path) -> None:

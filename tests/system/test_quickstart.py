@@ -1,6 +1,7 @@
 """The quickstart, from an empty folder to its report, with few trials."""
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -9,12 +10,16 @@ from skillframe.cli.main import run
 
 @pytest.mark.slow
 @pytest.mark.needs_plugins
-def test_the_quickstart_ends_in_a_report_and_tells_how_each_campaign_ended(tmp_path, capsys):
+def test_the_quickstart_ends_in_a_report_with_a_certificate_and_tells_how_each_campaign_ended(tmp_path, capsys):
     out = tmp_path / "demo"
-    assert run(["quickstart", "--out", str(out), "--trials", "4", "--json"]) == 0
+    assert run(["quickstart", "--out", str(out), "--trials", "4", "--rate", "0.5", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["report"] == str(out / "report.html") and (out / "report.html").is_file()
     assert [each["world"] for each in told["campaigns"]] == ["valley", "peg_in_hole"]
     assert all(skill["trials"] == 4 for each in told["campaigns"] for skill in each["skills"].values())
-    assert len(told["commands"]) == 9 and all(each.startswith("skillframe ") for each in told["commands"])
+    assert len(told["commands"]) == 10 and all(each.startswith("skillframe ") for each in told["commands"])
     assert list((out / "peg" / "demonstrations").iterdir()), "the page shows what was shown"
+    assert told["certified"] and (out / "proof" / "certificate.json") == Path(told["certificate"])
+    page = (out / "report.html").read_text()
+    assert page.count("Certificate: Valley") == 1 and "certified</p>" in page
+    assert run(["campaign", "check", str(out / "proof"), "--replays", "1"]) == 0

@@ -145,7 +145,7 @@ def test_importing_the_installed_package_loads_nothing_but_itself_and_python(typ
 
 
 def test_the_quickstart_works_in_an_empty_folder_from_wheels_alone(typed, tmp_path):
-    few = ["--robot", "free_tool", "--trials", "2", "--workers", "1", "--json"]
+    few = ["--robot", "free_tool", "--trials", "2", "--rate", "0.5", "--workers", "1", "--json"]
     code, said, told = typed("-m", "skillframe.cli.main", "quickstart", "--out", "demo", *few)
     assert code == 0, told
     assert [p.name for p in tmp_path.iterdir()] == ["demo"]
