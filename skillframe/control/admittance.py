@@ -21,6 +21,7 @@ import numpy as np
 
 from skillframe.control.impedance import critical_damping, pose_error, raised_damping
 from skillframe.control.ringing import RingWatch
+from skillframe.control.ticks import LawSettings, compiled_admittance
 from skillframe.errors import InputError
 from skillframe.frames import Float, Pose, norm
 from skillframe.robot.interface import VIRTUAL_INERTIA, VIRTUAL_MASS
@@ -61,6 +62,7 @@ class AdmittanceLaw:
     def __init__(self, count: int, dt: float, bounds: Bounds, watch: RingWatch | None = None) -> None:
         self._dt, self._bounds, self._watch = dt, bounds, watch
         self._impedance: Impedance | None = None
+        self._compiled = compiled_admittance(count, LawSettings(dt, bounds.push, QUIET))
         self.twist = np.zeros((count, 6))
         """(N, 6) v of the centre of compliance, base axes. Who moves the joints writes here what they really do."""
 
@@ -78,13 +80,20 @@ class AdmittanceLaw:
         """
         self._design(command.impedance)
         damping, gain = self._now(wrench)
+        drive, force = self._forces(command, pose, wrench, ramp, damping)
+        self.twist = self.twist + _times(gain, force)
+        law: Float = drive - _times(damping, self.twist)
+        return law
+
+    def _forces(self, command: Command, pose: Pose, wrench: Float, ramp: float, damping: Float) -> tuple[Float, Float]:
+        """The drive (N, 6), held to the push, and all forces together."""
+        if (law := self._compiled) is not None and law.strayed(command.pose, pose, self.twist):
+            law.find(command, wrench, ramp, (self._stiffness, self._damping, damping))
+            return law.drive, law.force
         error = pose_error(command.pose, pose) - self._dt * self.twist
         wanted = _times(self._damping, command.twist) + command.feedforward
         drive = self._cut(_times(self._stiffness, error) + ramp * wanted)
-        force = drive - _times(damping, self.twist)
-        self.twist = self.twist + _times(gain, force + felt(wrench))
-        law: Float = drive - _times(damping, self.twist)
-        return law
+        return drive, drive - _times(damping, self.twist) + felt(wrench)
 
     def _now(self, wrench: Float) -> tuple[Float, Float]:
         """Damping and step matrix, those of the trials whose contact rings with more damping."""

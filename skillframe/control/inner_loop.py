@@ -12,9 +12,11 @@ what an arm yields with under load. Makers publish none of w, zeta, s: they are 
 from __future__ import annotations
 
 from collections.abc import Callable
+from ctypes import c_int64
 
 import numpy as np
 
+from skillframe.control.ticks import compiled
 from skillframe.frames import Float
 from skillframe.robot.interface import LOOP_DAMPING, SERVO, Admittance
 
@@ -42,8 +44,20 @@ class InnerLoop:
         self._place, self._speed = start.copy(), np.zeros_like(start)
         still = start if self._of_position else self._speed
         self._line = np.tile(still, (arm.delay_ticks + 1, 1, 1))
+        self._position, self._velocity = np.zeros((2, *start.shape))
+        self._asked, self._torque = np.zeros((2, *start.shape, 1))
         self._tick = 0
         self._step = _exact_step(arm, dt)
+        self._ask = self._compiled() or self._ask_in_numpy
+
+    def _compiled(self) -> Callable[..., int] | None:
+        (a, b, u), (c, d, v) = self._step
+        return compiled("inner", {
+            "line": self._line, "position": self._position, "velocity": self._velocity, "place": self._place,
+            "speed": self._speed, "asked": self._asked, "back": self._back, "fade": self._fade, "late": LATE,
+            "stiff": STIFF, "a": a, "b": b, "u": u, "c": c, "d": d, "v": v, "of_position": int(self._of_position),
+            "numbers": self._place.size,
+        }, c_int64)  # fmt: skip
 
     def torque(self, command: Float, position: Float, velocity: Float, bias: Float) -> Float:
         """Joint torques (N, n) of a tick.
@@ -59,25 +73,24 @@ class InnerLoop:
         if self._tick % REFRESH == 0:
             self._mass = self._mass_matrix()
         self._tick += 1
-        heard = self._line[self._tick % length]  # the oldest: sent `delay_ticks` ago
-        off = self._place - heard
-        if self._of_position:
-            rate = self._back * off + self._fade * self._speed
-        else:
-            rate = self._back * heard + self._fade * self._speed
-        asked = rate - LATE * velocity + STIFF * (self._place - position)
-        torque: Float = (self._mass @ asked[..., None])[..., 0] + bias
-        self._move(heard, off)
+        self._position[:], self._velocity[:] = position, velocity
+        self._ask(self._tick % length)  # the oldest: sent `delay_ticks` ago
+        np.matmul(self._mass, self._asked, out=self._torque)
+        torque: Float = self._torque[..., 0] + bias
         return torque
 
-    def _move(self, heard: Float, off: Float) -> None:
-        """The filter a tick on."""
+    def _ask_in_numpy(self, heard_at: int) -> int:
+        """The accelerations that are asked for at what is heard, and the filter a tick on."""
+        heard, speed = self._line[heard_at], self._speed
+        off = self._place - heard
+        rate = self._back * (off if self._of_position else heard) + self._fade * speed
+        self._asked[..., 0] = rate - LATE * self._velocity + STIFF * (self._place - self._position)
         (a, b, u), (c, d, v) = self._step
-        speed = self._speed
         if self._of_position:
-            self._place, self._speed = heard + a * off + b * speed, c * off + d * speed
+            self._place[:], self._speed[:] = heard + a * off + b * speed, c * off + d * speed
         else:
-            self._place, self._speed = self._place + b * speed + u * heard, d * speed + v * heard
+            self._place[:], self._speed[:] = self._place + b * speed + u * heard, d * speed + v * heard
+        return 0
 
 
 def _exact_step(arm: Admittance, dt: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:

@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.control.ticks import compiled_steps
 from skillframe.frames import Float
 
 TURN_LENGTH = 0.2
@@ -60,6 +61,7 @@ class JointSteps:
         self._leash = limits.velocity * delay + LEASH_SLACK
         self._scale = np.repeat([1.0, TURN_LENGTH], 3)[:, None]
         self._every, self._step = max(1, round(REFRESH_S / dt)), 0
+        self._compiled = compiled_steps(self._home, (*limits, self._leash), POSTURE, dt)
 
     def velocities(self, twist: Float, jacobian: Float, command: Float, measured: Float) -> tuple[Float, Float]:
         """Joint velocities (N, n) for twists (N, 6), and the twists (N, 6) that they make.
@@ -75,6 +77,18 @@ class JointSteps:
             self._squared = _damping(scaled)
             self._inverse = self._inverted(scaled)
         self._step += 1
+        speed = self._free(twist, jacobian, command, measured)
+        if speed is None:
+            speed = self._limited(twist, jacobian, command, measured)
+        return speed, (jacobian @ speed[..., None])[..., 0]
+
+    def _free(self, twist: Float, jacobian: Float, command: Float, measured: Float) -> Float | None:
+        """Joint velocities where it is sure that none is at a limit."""
+        compiled = self._compiled
+        return None if compiled is None else compiled.speed(twist, jacobian, self._inverse, command, measured)
+
+    def _limited(self, twist: Float, jacobian: Float, command: Float, measured: Float) -> Float:
+        """Joint velocities within all limits."""
         spare = POSTURE * (self._home - command) if jacobian.shape[-1] > 6 else np.zeros_like(command)
         left = twist - (jacobian @ spare[..., None])[..., 0]
         speed = self._held_to_speed(spare + (self._inverse @ left[..., None])[..., 0])
@@ -85,7 +99,7 @@ class JointSteps:
         far = np.abs(ahead) > self._leash
         if np.count_nonzero(far):
             speed[(far & (ahead * speed > 0.0)).any(-1)] = 0.0
-        return speed, (jacobian @ speed[..., None])[..., 0]
+        return speed
 
     def _inverted(self, scaled: Float) -> Float:
         """(N, n, 6) damped inverses of Jacobians whose turning rows are scaled. Columns of zeros give rows of zeros."""

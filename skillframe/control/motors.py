@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.control.endings import Broken, Ended
+from skillframe.control.ticks import compiled
 from skillframe.frames import Float
 from skillframe.robot.model import RobotModel
 from skillframe.robot.numbers import numbers
@@ -148,11 +149,14 @@ class Motors:
         self._most = np.concatenate([step, self._effort, velocity, half], axis=-1)
         self._now = np.zeros((count, 4 * nv))
         self._change, self._asked, self._speed, self._place = (self._now[:, k * nv : (k + 1) * nv] for k in range(4))
-        self._torque: Float | None = None
+        self._last = np.zeros((count, nv))
+        self._begun = False
         self._ticks = np.zeros((count, 3 * nv), dtype=np.int64)  # of torque, speed, range
         self._rate_ticks = np.zeros(count, dtype=np.int64)
         self._peak = np.zeros((count, 4 * nv))
         self._persistence = max(1, round(MOTOR_S / dt))
+        whole = {"now": self._now, "peak": self._peak, "last": self._last, "middle": self._middle, "most": self._most}
+        self._above = compiled("held", {**whole, "count": count, "nv": nv}) or self._above_in_numpy
         self.counting = False
         """Is any row beyond what a motor can give?"""
 
@@ -164,20 +168,25 @@ class Motors:
             velocity: (N, nv) of the joints.
             position: (N, nv) of the joints.
         """
-        last = torque if self._torque is None else self._torque
-        np.subtract(torque, last, out=self._change)
+        if not self._begun:
+            self._last[:], self._begun = torque, True
         self._asked[:] = torque
         self._speed[:] = velocity
-        np.subtract(position, self._middle, out=self._place)
-        size = np.abs(self._now)
-        np.maximum(self._peak, size, out=self._peak)
-        over = size > self._most
-        if np.count_nonzero(over):
-            torque = self._limited(torque, last, over)
+        self._place[:] = position
+        if self._above():
+            torque = self._limited(torque, self._last, np.abs(self._now) > self._most)
         elif self.counting:
             self._ticks[:], self._rate_ticks[:], self.counting = 0, 0, False
-        self._torque = torque
+        self._last[:] = torque
         return torque
+
+    def _above_in_numpy(self) -> int:
+        """Take in what is asked and done. How many numbers are above what a motor can give."""
+        np.subtract(self._asked, self._last, out=self._change)
+        np.subtract(self._place, self._middle, out=self._place)
+        size = np.abs(self._now)
+        np.maximum(self._peak, size, out=self._peak)
+        return int(np.count_nonzero(size > self._most))
 
     def _limited(self, torque: Float, last: Float, over: NDArray[np.bool_]) -> Float:
         """Held to the effort, and then to the rate: a motor at its effort is not asked for a rate besides."""

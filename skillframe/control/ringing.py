@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.control.ticks import compiled
 from skillframe.frames import Float, norm
 
 SLOW, MEMORY = 2.0, 5.0
@@ -37,15 +38,26 @@ class RingWatch:
         self._follow = -float(np.expm1(-dt / (SLOW * delay)))
         self._fade = float(np.exp(-dt / (MEMORY * delay)))
         self._least = SHARE * push
-        self._slow, self._up, self._down = np.zeros((3, count, 3))
+        self._slow, self._up, self._down, self._both, self._force = np.zeros((5, count, 3))
+        self._move = compiled("rung", {
+            "slow": self._slow, "up": self._up, "down": self._down, "least": self._both, "force": self._force,
+            "follow": self._follow, "fade": self._fade, "numbers": self._slow.size,
+        }) or self._move_in_numpy  # fmt: skip
         self.amplitude = np.zeros(count)
 
     def look(self, force: Float) -> NDArray[np.bool_]:
         """Whose contact rings (N,), by the forces (N, 3) that are felt now."""
-        off = force - self._slow
-        self._slow = self._slow + self._follow * off
-        self._up = np.maximum(off, self._fade * self._up)
-        self._down = np.maximum(-off, self._fade * self._down)
-        self.amplitude = norm(np.minimum(self._up, self._down))
+        self._force[:] = force
+        self._move()
+        self.amplitude = norm(self._both)
         result: NDArray[np.bool_] = self.amplitude > self._least
         return result
+
+    def _move_in_numpy(self) -> int:
+        """The slow part and both amplitudes a look on."""
+        off = self._force - self._slow
+        self._slow += self._follow * off
+        self._up[:] = np.maximum(off, self._fade * self._up)
+        self._down[:] = np.maximum(-off, self._fade * self._down)
+        np.minimum(self._up, self._down, out=self._both)
+        return 0

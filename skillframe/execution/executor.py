@@ -19,6 +19,7 @@ from skillframe.control.endings import Broken, Ended
 from skillframe.execution.drive import Drive
 from skillframe.execution.drives.choose import chosen_drive
 from skillframe.execution.outcome import Outcomes
+from skillframe.execution.paced import PacedSkill
 from skillframe.execution.result import Result
 from skillframe.execution.setup import Setup
 from skillframe.frames import Float
@@ -98,10 +99,12 @@ class Loop:
     ) -> None:
         count = len(rngs)
         self.skill, self.setup, self.drive, self.count, self.skill_rngs = skill, setup, drive, count, rngs
+        self._paced = skill if isinstance(skill, PacedSkill) else None
         self.plant, self.dt = drive.plant, drive.dt
         self.collisions = Collisions(self.plant)
         self.contact = TrueContact(setup.robot.spec.limits, count, self.dt)
         self.outcomes = Outcomes(setup, drive, self.contact, count)
+        self.check: CommandCheck
         self.faults: list[Fault] = []
         self.active = np.arange(count)
         rate = setup.robot.spec.control.tick_hz
@@ -152,6 +155,9 @@ class Loop:
             self._end_failed(self.drive.advance(self.active), time)
 
     def _ask(self, tick: int, observation: Observation) -> Command:
+        if self._paced is not None and (last := self._paced.between()) is not None:
+            self.faults = [] if tick % SLOW_TICKS else self.check.faults(last, tick)
+            return last
         seen = shown(observation)
         if tick == 0:
             self.check = CommandCheck(self.skill, observation.time.shape)

@@ -42,6 +42,13 @@ class PacedSkill(Skill):
         self._tick += 1
         return self._command
 
+    def between(self) -> Command | None:
+        """What the skill has answered last, in a tick that does not ask it. None where it has to be asked."""
+        if self._command is None or self._tick % self._every == 0:
+            return None
+        self._tick += 1
+        return self._command
+
     def restart(
         self, rows: NDArray[np.intp], observation: Observation, rngs: Sequence[np.random.Generator]
     ) -> None:  # fmt: skip
@@ -55,4 +62,4 @@ class PacedSkill(Skill):
     def _seen(self, observation: Observation) -> Observation:
         """An observation by the skill's clock."""
         twist, time = self._pace * observation.twist, observation.time / self._pace
-        return observation._replace(time=time, dt=self._every * observation.dt / self._pace, twist=twist)
+        return Observation(time, self._every * observation.dt / self._pace, observation.pose, twist, observation.wrench)

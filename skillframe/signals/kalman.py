@@ -129,10 +129,14 @@ def steady_step(value: Any, slope: Any, measured: Any, gain: Gain, dt: float) ->
 
 
 class SteadyWrenchFilter:
-    """The converged filter for N wrenches in lock-step, equation (1): array arithmetic only, each row for itself."""
+    """The converged filter for N wrenches in lock-step, equation (1): array arithmetic only, each row for itself.
+
+    Args:
+        gain: of its channels; dt: [s] between two measurements. Both can be read.
+    """
 
     def __init__(self, gain: Gain, dt: float) -> None:
-        self._gain, self._dt = gain, dt
+        self.gain, self.dt = gain, dt
         self._value = np.zeros((0, 6))
         self._slope = np.zeros((0, 6))
 
@@ -143,7 +147,7 @@ class SteadyWrenchFilter:
 
     def step(self, wrench: Float) -> Float:
         """Take in one measurement (N, 6) and return the filtered wrench (N, 6), a fresh array."""
-        self._value, self._slope = steady_step(self._value, self._slope, wrench, self._gain, self._dt)
+        self._value, self._slope = steady_step(self._value, self._slope, wrench, self.gain, self.dt)
         return self._value.copy()
 
 

@@ -22,6 +22,7 @@ from skillframe.robot.carried import loaded_inertias
 from skillframe.robot.model import RobotModel
 from skillframe.world.convert import FIXTURE, SECOND, TIMESTEP, build_spec, held
 from skillframe.world.layout import Layout
+from skillframe.world.reading import compiled_jacobian
 from skillframe.world.scene import Scene, State
 
 Draws = Mapping[str, Float]
@@ -104,6 +105,7 @@ class Plant:
         second = copy.copy(self)
         assert self.scene.holder is not None
         second._layout, second.tool = Layout(self.model, SECOND, FIXTURE), self.scene.holder.tool
+        second._view()
         return [self, second]
 
     def _bind(self) -> None:
@@ -114,6 +116,16 @@ class Plant:
         self._sensor, self._external, self._com = bind("sensordata"), bind("cfrc_ext"), bind("subtree_com")
         self._mocap_pos, self._mocap_quat, self._mass = bind("mocap_pos"), bind("mocap_quat"), bind("M")
         self._acceleration = bind("qacc")
+        self._view()
+
+    def _view(self) -> None:
+        """What every tick reads of this arm, as live views."""
+        i = self._layout.sensor
+        self._tool_pose = Pose(self._xpos[:, i], self._xmat[:, i].reshape(-1, 3, 3))
+        self.gauge: Float = self._sensor[:, self._layout.readings]
+        """(N, 6) of the force-torque sensor as the simulator has it, live: `sensor_wrench` is its opposite."""
+        self._force = self._external[:, self._layout.tool, 3:]
+        self._compiled = compiled_jacobian(self._layout, self._anchor, self._axis, self._tool_pose)
 
     def _apply(self, draws: Draws) -> None:
         if "world.friction" in draws:
@@ -248,13 +260,14 @@ class Plant:
             self._applied[:, self._layout.sprung] = 0.0
 
     def tool_pose(self) -> Pose:
-        """Pose of the robot's tool frame (where the sensor sits) in base."""
-        i = self._layout.sensor
-        return Pose(self._xpos[:, i], self._xmat[:, i].reshape(-1, 3, 3))
+        """Pose of the robot's tool frame (where the sensor sits) in base, live views."""
+        return self._tool_pose
 
     def kinematics(self, offset: Float) -> Kinematics:
         """Kinematics with the Jacobian of a point fixed in the tool frame, `offset` (3,) or (N, 3)."""
-        pose = self.tool_pose()
+        pose = self._tool_pose
+        if self._compiled is not None:
+            return Kinematics(pose, self._compiled.at(offset), self._bias, self._qvel)
         point = pose.position + rotate(pose.rotation, offset)
         jacobian = self._layout.jacobian(self._anchor, self._axis, self._xmat, point)
         return Kinematics(pose, jacobian, self._bias, self._qvel)
@@ -268,7 +281,7 @@ class Plant:
 
         It holds contact, tool weight and the tool's inertial forces; the reading is that of the step just taken.
         """
-        reading: Float = -self._sensor[:, self._layout.readings]
+        reading: Float = -self.gauge
         return reading
 
     def contact_wrench(self, offset: Float) -> Float:
@@ -281,7 +294,7 @@ class Plant:
 
     def contact_force(self) -> Float:
         """Size (N,) of the true contact force on the tool [N]."""
-        return norm(self._external[:, self._layout.tool, 3:])
+        return norm(self._force)
 
     def fixture_pose(self) -> Pose:
         """True pose of the fixture in base, standing or in the second arm's grip."""

@@ -15,6 +15,7 @@ import numpy as np
 
 from skillframe.frames import Float, Pose, cross, move_wrench, rotate, rotate_spatial, skew
 from skillframe.world.plant import Plant
+from skillframe.world.reading import compiled_wrist
 
 BLOCK = 100
 TARE_TICKS = 100
@@ -53,7 +54,8 @@ class Sensors:
         self._next = BLOCK
         tool = plant.tool
         self._weight = tool.mass * np.array(plant.model.opt.gravity)
-        self._com = np.array(tool.center_of_mass)
+        self._com = np.array(tool.center_of_mass, dtype=float)
+        self._compiled = compiled_wrist(plant.gauge, self._noise, self._bias, self._weight, self._com)
 
     def _draw(self) -> tuple[Float, Float]:
         """Noise of force, torque and position (N, 12), and the rotation (N, 3, 3) that attitude noise turns by."""
@@ -75,6 +77,8 @@ class Sensors:
         """
         noise, turn = self._draw()
         measured = Pose(pose.position + noise[:, 6:9], turn @ pose.rotation)
+        if self._compiled is not None:
+            return measured, self._compiled.wrench(self._next - 1, measured.rotation)
         wrench = rotate_spatial(measured.rotation, self._plant.sensor_wrench() + (self._bias + noise[:, :6]))
         wrench[:, :3] -= self._weight
         wrench[:, 3:] -= cross(rotate(measured.rotation, self._com), self._weight)
@@ -82,7 +86,7 @@ class Sensors:
 
     def set_tare(self, mean: Float, rotation: Float) -> None:
         """Take the mean wrench (N, 6) of a still moment, base axes, as the bias from now on."""
-        self._bias = self._bias - rotate_spatial(np.swapaxes(rotation, -1, -2), mean)
+        self._bias -= rotate_spatial(np.swapaxes(rotation, -1, -2), mean)
 
 
 def _small_rotation(vector: Float) -> Float:

@@ -89,8 +89,11 @@ class AdmittanceDrive(TorqueDrive):
         """A step of the law, and the joints on by what it makes."""
         law, dofs = self.admittance, self._dofs
         measured = self.limb.joint_positions().take(dofs, axis=1)  # in C order, or rounding would depend on N
-        joints, jacobian = self._joints.take(dofs, axis=1), self._reading.jacobian.take(dofs, axis=-1)
-        paced = command._replace(twist=command.twist / self._pace)
+        joints, jacobian = self._joints, self._reading.jacobian
+        if not self._all:
+            joints, jacobian = joints.take(dofs, axis=1), jacobian.take(dofs, axis=-1)
+        wanted, twist, impedance, feedforward, status, reason = command
+        paced = Command(wanted, twist / self._pace, impedance, feedforward, status, reason)
         pose = moved(self._tool.at(self.limb.point), jacobian, joints - measured)
         self._law = law.step(paced, pose, self._wrench, ramp)
         speed, law.twist = self._steps.velocities(law.twist, jacobian, joints, measured)

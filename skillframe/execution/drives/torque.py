@@ -19,17 +19,18 @@ from skillframe.control.endings import Broken
 from skillframe.control.joint_friction import FrictionCompensation
 from skillframe.control.limits import LimitGuard
 from skillframe.control.motors import Motors, joint_limits, unstated
+from skillframe.control.ticks import compiled_filter
 from skillframe.execution.drive import Shares, Trials
 from skillframe.execution.drives.plants import encoders_of, varied_plants
 from skillframe.execution.recorder import Recorder
 from skillframe.execution.result import Result
 from skillframe.execution.setup import Setup
-from skillframe.frames import Float, Pose, norm
+from skillframe.frames import Float, Pose, move_wrench, norm, rotate
 from skillframe.signals.delay import CommandDelay
 from skillframe.signals.kalman import WrenchFilter
 from skillframe.skill import Command, Impedance, Observation, no_reasons
 from skillframe.world.plant import Draws, Kinematics, Plant
-from skillframe.world.sensors import TARE_TICKS, Sensors, at_point
+from skillframe.world.sensors import TARE_TICKS, Sensors
 
 HOLD = Impedance(np.diag([2000.0] * 3 + [100.0] * 3))
 TARED_IN_CONTACT = 0.5
@@ -93,6 +94,7 @@ class TorqueDrive:
         self.limb, self.plant, self.rows = limb, limb.plant, limb.rows
         self.dt = 1.0 / setup.robot.spec.control.tick_hz
         self.filter = WrenchFilter(dt=self.dt).steady() if setup.filter_wrench else None
+        self._compiled = compiled_filter(self.rows, self.filter)
         self.controller = ImpedanceController(self.rows)
         limits = joint_limits(setup.robot, self.plant.model, limb.dofs)
         rate = setup.limits.torque_rate_nm_s
@@ -139,9 +141,9 @@ class TorqueDrive:
         """Pose and twist of the centre of compliance, and the filtered wrench there."""
         kinematics = self.limb.kinematics(active)
         tool, raw = self.limb.sensors.sample(kinematics.pose)
-        self._position = tool.position
-        self._wrench = at_point(self._filtered(raw, tick), tool.rotation, self.limb.point)
-        self._reading = self._read(kinematics, tool.at(self.limb.point))
+        self._position, lever = tool.position, rotate(tool.rotation, self.limb.point)
+        self._wrench = self._filtered(raw, tick, lever)
+        self._reading = self._read(kinematics, Pose(tool.position + lever, tool.rotation))
         time = np.full(self.rows, tick * self.dt)
         return Observation(time, self.dt, self._reading.pose, self._reading.twist, self._wrench)
 
@@ -197,12 +199,16 @@ class TorqueDrive:
             result.failure[i] = f"{result.failure[i]}, after a tare in contact"
         return result
 
-    def _filtered(self, raw: Float, tick: int) -> Float:
+    def _filtered(self, raw: Float, tick: int, lever: Float) -> Float:
+        """Wrench (rows, 6) at the centre of compliance, which lies `lever` (rows, 3) from the tool frame."""
         if self.filter is None:
-            return raw
+            return move_wrench(raw, lever)
+        filter_ = self._compiled or self.filter
         if tick == 0:
-            self.filter.start(raw * 0.0)
-        return self.filter.step(raw)
+            filter_.start(raw * 0.0)
+        if self._compiled is not None:
+            return self._compiled.step(raw, lever)
+        return move_wrench(self.filter.step(raw), lever)
 
     def _read(self, kinematics: Kinematics, measured: Pose) -> Reading:
         twist = (kinematics.jacobian @ kinematics.velocity[..., None])[..., 0]

@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from skillframe.control.joint_steps import JointSteps
 from skillframe.errors import InputError
 from skillframe.execution.drives.admittance import AdmittanceDrive
 from skillframe.execution.executor import Setup, begin, simulate
@@ -187,7 +188,8 @@ def test_a_push_against_a_joint_at_its_end_does_not_wind_up():
     loop.prepare()
     drive = loop.drive
     stop = drive._joints[0, drive._dofs] + 1e-4
-    drive._steps._limits = drive._steps._limits._replace(upper=stop, lower=stop - 2e-4)
+    limits = drive._steps._limits._replace(upper=stop, lower=stop - 2e-4)
+    drive._steps = JointSteps(drive._steps._home, limits, drive.arm.total_delay, drive._dt_command)
     for tick in range(1000):
         loop.tick(tick)
     assert np.all(drive._joints[0, drive._dofs] <= stop + 1e-9)

@@ -44,6 +44,20 @@ def test_a_skill_is_asked_at_the_rate_of_commands_and_its_last_command_stands_be
     assert {o.dt for o in inner.seen} == {0.008}
 
 
+def test_who_asks_for_what_stands_between_gets_the_same_commands_and_none_when_one_is_due():
+    skill, inner, commands = run(every=8, pace=1.0, ticks=1)
+    assert inner.seen
+    due = []
+    for tick in range(1, 20):
+        command = skill.between()
+        if command is None:
+            due.append(tick)
+            command = skill.step(seen_at(tick))
+        commands.append(command.pose.position[0, 0])
+    assert due == [8, 16]
+    assert commands == [1.0] * 8 + [2.0] * 8 + [3.0] * 4
+
+
 def test_its_clock_runs_slower_and_what_moves_looks_as_fast_as_it_was_taught():
     _, inner, _ = run(every=2, pace=2.5, ticks=11)
     np.testing.assert_allclose([o.time[0] for o in inner.seen], np.arange(6) * 0.002 / 2.5)

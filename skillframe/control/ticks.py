@@ -1,0 +1,191 @@
+"""What motors, limits, inner loop and admittance law do number by number, in C: a third of the time, the same bits.
+
+What is done is in ticks.c; it is called by the classes whose arrays it works on. Without a compiler each of them does
+the same in numpy.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.fmu.native import Record, library
+from skillframe.frames import Float, Pose
+from skillframe.signals.kalman import SteadyWrenchFilter
+from skillframe.skill import Command
+
+SOURCE = Path(__file__).with_name("ticks.c")
+Fields = Mapping[str, NDArray[Any] | int | float]
+
+
+def compiled(name: str, fields: Fields, *more: type) -> Callable[..., int] | None:
+    """A function of ticks.c over some arrays, or None without a compiler.
+
+    Args:
+        name: of it.
+        fields: of its record, in the order of its struct.
+        more: numbers that it is given at each call.
+    """
+    built = library(SOURCE)
+    return None if built is None else Record(fields).bound(built, name, *more)
+
+
+class LawSettings(NamedTuple):
+    """Of `CompiledAdmittance`: h [s], the push (force, torque), and squares of force and torque that are not felt."""
+
+    step: float
+    push: tuple[float, float]
+    quiet: Float
+
+
+class CompiledAdmittance:
+    """Drive and force of an admittance law of N trials: equation (2) of `skillframe.control.admittance` up to its gain.
+
+    Args:
+        count: N.
+        settings: of the law.
+        built: ticks.c.
+    """
+
+    def __init__(self, count: int, settings: LawSettings, built: ctypes.CDLL) -> None:
+        self.drive, self.force = np.zeros((2, count, 6))
+        """(N, 6) drive, held to the push, and with damping and what is felt."""
+        self._turn = np.zeros((count, 3, 3))
+        self._desired, self._at, self._axis = np.zeros((3, count, 3))
+        self._sine, self._cosine, self._angle = np.zeros((3, count))
+        self._twist, self._forward, self._wrench = np.zeros((3, count, 6))
+        self._error, self._wanted, self._spring, self._braked = np.zeros((4, count, 6, 1))
+        self._squares, self._felt = np.zeros((2, count, 2))
+        self._halves = self.drive.reshape(-1, 2, 3), self._wrench.reshape(-1, 2, 3)
+        record = Record({
+            "turn": self._turn, "desired": self._desired, "at": self._at, "angle": self._angle, "twist": self._twist,
+            "sine": self._sine, "cosine": self._cosine, "axis": self._axis, "error": self._error,
+            "wanted": self._wanted, "forward": self._forward, "spring": self._spring, "braked": self._braked,
+            "wrench": self._wrench, "squares": self._squares, "felt": self._felt,
+            "push": np.array(settings.push, dtype=float), "quiet": settings.quiet, "drive": self.drive,
+            "force": self.force, "step": settings.step, "count": count,
+        })  # fmt: skip
+        self._turned, self._strayed = record.bound(built, "turned"), record.bound(built, "strayed")
+        self._driven, self._pushed = record.bound(built, "driven", ctypes.c_double), record.bound(built, "pushed")
+
+    def strayed(self, desired: Pose, pose: Pose, twist: Float) -> bool:
+        """Find the error that a step on at a twist (N, 6) leaves. False where a turn is near pi and it is not found."""
+        self._desired[:], self._at[:], self._twist[:] = desired.position, pose.position, twist
+        np.matmul(desired.rotation, pose.rotation.mT, out=self._turn)
+        self._turned()
+        np.vecdot(self._axis, self._axis, out=self._sine)
+        np.sqrt(self._sine, out=self._sine)
+        np.arctan2(self._sine, self._cosine, out=self._angle)
+        return not self._strayed()
+
+    def find(self, command: Command, wrench: Float, ramp: float, gains: tuple[Float, Float, Float]) -> None:
+        """Find drive and force, after the error.
+
+        Args:
+            command: what the skill wants.
+            wrench: (N, 6) of the environment.
+            ramp: of desired twist and feed-forward.
+            gains: stiffness, damping against the desired twist, damping of the twist, each (6, 6) or (N, 6, 6).
+        """
+        stiffness, wanted, damping = gains
+        self._forward[:], self._wrench[:] = command.feedforward, wrench
+        np.matmul(wanted, command.twist[..., None], out=self._wanted)
+        np.matmul(stiffness, self._error, out=self._spring)
+        np.matmul(damping, self._twist[..., None], out=self._braked)
+        self._driven(ramp)
+        drive, felt = self._halves
+        np.vecdot(drive, drive, out=self._squares)
+        np.vecdot(felt, felt, out=self._felt)
+        self._pushed()
+
+
+def compiled_admittance(count: int, settings: LawSettings) -> CompiledAdmittance | None:
+    """A `CompiledAdmittance`, or None without a compiler."""
+    built = library(SOURCE)
+    return None if built is None else CompiledAdmittance(count, settings, built)
+
+
+class CompiledSteps:
+    """Joint velocities of N arms with n joints, where none is at a limit: `skillframe.control.joint_steps`.
+
+    Args:
+        home: (N, n) posture; limits: velocity, lower, upper and leash, (n,) each.
+        posture: k [1/s]; step: h [s].
+        built: ticks.c.
+    """
+
+    def __init__(
+        self, home: Float, limits: tuple[Float, Float, Float, Float], posture: float, step: float, built: ctypes.CDLL
+    ) -> None:  # fmt: skip
+        count, joints = home.shape
+        self._command, self._measured, self._speed = np.zeros((3, count, joints))
+        self._spare, self._answer = np.zeros((2, count, joints, 1))
+        self._twist = np.zeros((count, 6))
+        self._left, self._made = np.zeros((2, count, 6, 1))
+        velocity, lower, upper, leash = (np.array(part, dtype=float) for part in limits)
+        record = Record({
+            "home": np.array(home), "command": self._command, "measured": self._measured, "twist": self._twist,
+            "made": self._made, "answer": self._answer, "velocity": velocity, "lower": lower, "upper": upper,
+            "leash": leash, "spare": self._spare, "left": self._left, "speed": self._speed, "posture": posture,
+            "step": step, "count": count, "joints": joints,
+        })  # fmt: skip
+        self._back, self._rest, self._speeds = (record.bound(built, name) for name in ("spare", "left", "speeds"))
+
+    def speed(
+        self, twist: Float, jacobian: Float, inverse: Float, command: Float, measured: Float
+    ) -> Float | None:  # fmt: skip
+        """Joint velocities (N, n), an array of their own. None where a joint may be at a limit."""
+        self._twist[:], self._command[:], self._measured[:] = twist, command, measured
+        self._back()
+        np.matmul(jacobian, self._spare, out=self._made)
+        self._rest()
+        np.matmul(inverse, self._left, out=self._answer)
+        return None if self._speeds() else self._speed.copy()
+
+
+def compiled_steps(
+    home: Float, limits: tuple[Float, Float, Float, Float], posture: float, step: float
+) -> CompiledSteps | None:  # fmt: skip
+    """`CompiledSteps`, or None without a compiler."""
+    built = library(SOURCE)
+    return None if built is None else CompiledSteps(home, limits, posture, step, built)
+
+
+class CompiledFilter:
+    """The converged wrench filter (`skillframe.signals.kalman`) of N rows, and what it says taken at another point.
+
+    Args:
+        count: N.
+        filter_: whose gain and time step it has.
+        built: ticks.c.
+    """
+
+    def __init__(self, count: int, filter_: SteadyWrenchFilter, built: ctypes.CDLL) -> None:
+        self._measured, self._value, self._slope, self._moved = np.zeros((4, count, 6))
+        self._lever = np.zeros((count, 3))
+        value, slope = (np.array(part, dtype=float) for part in filter_.gain[:2])
+        self._filtered = Record({
+            "measured": self._measured, "lever": self._lever, "gain": value, "slope_gain": slope, "value": self._value,
+            "slope": self._slope, "moved": self._moved, "step": filter_.dt, "count": count,
+        }).bound(built, "filtered")  # fmt: skip
+
+    def start(self, wrench: Float) -> None:
+        """Begin at a measured wrench (N, 6) with no slope."""
+        self._value[:], self._slope[:] = wrench, 0.0
+
+    def step(self, wrench: Float, lever: Float) -> Float:
+        """Take in a measurement (N, 6). The filtered wrench (N, 6) at a point `lever` (N, 3) away, an own array."""
+        self._measured[:], self._lever[:] = wrench, lever
+        self._filtered()
+        return self._moved.copy()
+
+
+def compiled_filter(count: int, filter_: SteadyWrenchFilter | None) -> CompiledFilter | None:
+    """A `CompiledFilter`, or None where nothing is filtered or without a compiler."""
+    built = None if filter_ is None else library(SOURCE)
+    return None if built is None or filter_ is None else CompiledFilter(count, filter_, built)

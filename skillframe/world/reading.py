@@ -1,0 +1,105 @@
+"""Jacobian and wrist sensor in C: `Layout.jacobian` and `Sensors.sample`, to the last bit, for a third of their time.
+
+What is done is in reading.c. Without a compiler, or for a free base, the code beside them runs.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.fmu.native import Record, library
+from skillframe.frames import Float, Pose
+
+if TYPE_CHECKING:
+    from skillframe.world.layout import Layout
+
+SOURCE = Path(__file__).with_name("reading.c")
+
+
+class CompiledJacobian:
+    """Jacobians (N, 6, nv) of points of one arm's tool frame.
+
+    Args:
+        layout: of the arm.
+        anchor, axis: (N, joints, 3) of MuJoCo; tool: its tool frame. All live, and they stay where they are.
+        built: reading.c.
+    """
+
+    def __init__(self, layout: Layout, anchor: Float, axis: Float, tool: Pose, built: ctypes.CDLL) -> None:
+        count, nv = len(anchor), int(layout.model.nv)
+        self._rotation = tool.rotation
+        self._turned, self._out = np.zeros((count, 3, 1)), np.zeros((count, 6, nv))
+        hinges, hinge_dofs, slides, slide_dofs = (
+            _numbers(part)
+            for part in (layout.hinges, layout.hinge_dofs, layout.slides, layout.slide_dofs)
+        )  # fmt: skip
+        record = Record({
+            "anchor": anchor, "axis": axis, "position": tool.position, "turned": self._turned, "jacobian": self._out,
+            "hinges": hinges, "hinge_dofs": hinge_dofs, "slides": slides, "slide_dofs": slide_dofs,
+            "anchor_step": _step(anchor), "axis_step": _step(axis), "position_step": _step(tool.position),
+            "trials": count, "n_hinges": len(hinges), "n_slides": len(slides), "nv": nv,
+        })  # fmt: skip
+        self._jacobian = record.bound(built, "jacobian")
+
+    def at(self, offset: Float) -> Float:
+        """Of the point `offset` (3,) or (N, 3) in tool axes, base axes, in an array of its own."""
+        np.matmul(self._rotation, offset[..., None], out=self._turned)
+        self._jacobian()
+        return self._out.copy()
+
+
+class CompiledWrist:
+    """Force-torque sensors of N trials.
+
+    Args:
+        sensor: (N, 6) as the simulator has it, live.
+        noise: (B, N, 12) samples; bias: (N, 6). Both are written in place by who owns them.
+        weight: (3,) of the tool; center: (3,) of its mass.
+        built: reading.c.
+    """
+
+    def __init__(
+        self, sensor: Float, noise: Float, bias: Float, weight: Float, center: Float, built: ctypes.CDLL
+    ) -> None:  # fmt: skip
+        count = len(sensor)
+        self._raw, self._wrench, self._lever = np.zeros((count, 2, 3)), np.zeros((count, 2, 3)), np.zeros((count, 3, 1))
+        self._center = center[:, None]
+        record = Record({
+            "sensor": sensor, "noise": noise, "bias": bias, "weight": weight, "lever": self._lever,
+            "raw": self._raw, "wrench": self._wrench, "sensor_step": _step(sensor), "trials": count,
+        })  # fmt: skip
+        self._felt, self._weightless = record.bound(built, "felt", ctypes.c_int64), record.bound(built, "weightless")
+
+    def wrench(self, sample: int, rotation: Float) -> Float:
+        """Wrench (N, 6) with the noise of a sample and without the tool's weight, by measured rotations (N, 3, 3)."""
+        self._felt(sample)
+        np.matmul(self._raw, rotation.mT, out=self._wrench)
+        np.matmul(rotation, self._center, out=self._lever)
+        self._weightless()
+        return self._wrench.reshape(-1, 6).copy()
+
+
+def compiled_jacobian(layout: Layout, anchor: Float, axis: Float, tool: Pose) -> CompiledJacobian | None:
+    """A `CompiledJacobian`, or None for a free base or without a compiler."""
+    built = None if layout.free or not layout.model.njnt else library(SOURCE)
+    return None if built is None else CompiledJacobian(layout, anchor, axis, tool, built)
+
+
+def compiled_wrist(sensor: Float, noise: Float, bias: Float, weight: Float, center: Float) -> CompiledWrist | None:
+    """A `CompiledWrist`, or None without a compiler."""
+    built = library(SOURCE)
+    return None if built is None else CompiledWrist(sensor, noise, bias, weight, center, built)
+
+
+def _numbers(part: slice | NDArray[np.int64]) -> NDArray[np.int64]:
+    chosen = np.arange(part.start, part.stop) if isinstance(part, slice) else part
+    return np.ascontiguousarray(chosen, dtype=np.int64)
+
+
+def _step(array: Float) -> int:
+    return int(array.strides[0]) // 8
