@@ -94,6 +94,7 @@ def record(
     sensors: SensorSettings | None = None,
     progress: Callable[[str], None] | None = None,
     watch: Watch | None = None,
+    attempts: int = MOST_ATTEMPTS,
 ) -> Recording:
     """Demonstrate a scene `count` times. The starts of the scene's task are taken in turn.
 
@@ -109,9 +110,10 @@ def record(
         sensors: noise of the sensors; a wrist sensor's if not given, an estimate's for teleoperation.
         progress: told in words what happens.
         watch: told now and then how many seconds are simulated, and of how many at most.
+        attempts: at a slot, at most.
 
     Raises:
-        SkillframeError: a slot still fails after 20 attempts; says with what.
+        SkillframeError: a slot still fails after all attempts; says with what.
     """
     sensors = sensors or (ESTIMATED if settings.kind == "teleoperation" else SensorSettings())
 
@@ -121,7 +123,7 @@ def record(
     def keep(trace: Trace, slot: int, number: int) -> Demonstration:
         return demonstration_from(trace, scene, settings, sensors, seed=seed, slot=slot, attempt=number)
 
-    return collect(robot, scene, count, attempt, keep, progress)
+    return collect(robot, scene, count, attempt, keep, progress, attempts)
 
 
 def collect(
@@ -131,6 +133,7 @@ def collect(
     attempt: Callable[[list[int], int], Result],
     keep: Callable[[Trace, int, int], Demonstration],
     progress: Callable[[str], None] | None,
+    attempts: int = MOST_ATTEMPTS,
 ) -> Recording:
     """Let a teacher attempt what is still missing until every slot has its demonstration.
 
@@ -141,15 +144,16 @@ def collect(
         attempt: runs the slots, the so many-th time.
         keep: makes the demonstration of a slot from its trace and the number of the attempt.
         progress: told in words what happens.
+        attempts: at a slot, at most.
 
     Raises:
-        SkillframeError: a slot still fails after 20 attempts; says with what.
+        SkillframeError: a slot still fails after all attempts; says with what.
     """
     done: dict[int, Demonstration] = {}
     rejected: list[str] = []
     if progress is not None:
         progress(beginning(robot, scene, count))
-    for number in range(MOST_ATTEMPTS):
+    for number in range(attempts):
         slots = [slot for slot in range(count) if slot not in done]
         result = attempt(slots, number)
         assert result.traces is not None
@@ -165,7 +169,7 @@ def collect(
         if len(done) == count:
             return Recording(demonstrations=[done[slot] for slot in range(count)], rejected=rejected)
     raise SkillframeError(
-        f"world {scene.name}: the teacher failed {MOST_ATTEMPTS} times for one demonstration "
+        f"world {scene.name}: the teacher failed {attempts} times for one demonstration "
         f"(last: {rejected[-1]}); lower the noise or choose another start"
         + (f"; {note}" if (note := guess_note(robot.spec)) else "")
     )

@@ -2,8 +2,10 @@
 
 The push is learned from what each demonstration shows from shortly before its first contact on. From the demonstrations
 come the push (at --at), and at the tool's tip the way (from the first contact to the end), the end with its attitude,
-and the height of the first contact. From the user comes how far off the fixture may be. The rest is by hand. The search
-is as wide as the mouth can be off its place, both ways at once (our choice):
+and the height of the first contact. Loose parts touch only near the end, and how they slide there is not the way: where
+the tip came straight from more than twice as far, and more than 30 degrees otherwise than it went in contact, the way
+is that straight and begins with it (our choice). From the user comes how far off the fixture may be. The rest is by
+hand. The search is as wide as the mouth can be off its place, both ways at once (our choice):
 
     radius = sqrt(2) (shift + tilt * height of the first contact)
 """
@@ -33,6 +35,9 @@ from skillframe_search.seat_document import Seat, as_phase
 
 BEFORE_S = 0.3  # of each demonstration before its contact that the push is learned with
 LEAST_M = 0.002  # from the first contact to the end
+STRAIGHT = 0.15  # of its length that a straight way is off its line, at most
+SLID = np.cos(radians(30.0))  # between that way and the one in contact; more is no insertion
+_LOOKED_AT = 200  # samples before the contact
 ABOVE_M, MOST_ABOVE_M = 0.002, 0.005  # over the first contact, and at most where demonstrations began higher
 PREFIX = "search_"
 
@@ -149,8 +154,23 @@ def _shown(demonstration: Demonstration, point: Float) -> _Shown:
     pose = demonstration.pose
     position = Pose(pose.position, pose.rotation).at(point).position
     first = int(np.searchsorted(demonstration.time, began))
-    return _Shown(position[0], position[first], position[-1], pose.rotation[-1],
+    return _Shown(position[0], _way_begins(position, first), position[-1], pose.rotation[-1],
                   demonstration.between(began - BEFORE_S, None))  # fmt: skip
+
+
+def _way_begins(position: Float, first: int) -> Float:
+    """Where (3,) the way of a tip (T, 3) to its last place begins: at sample `first`, or before if it slid there."""
+    touched = position[-1] - position[first]
+    for i in np.unique(np.linspace(0, first, _LOOKED_AT).astype(int)).tolist():
+        left = position[-1] - position[i:]
+        length = float(norm(left[0]))
+        if length <= 2.0 * float(norm(touched)):
+            break
+        along = left @ (left[0] / length)
+        straight = float(norm(left - along[:, None] * left[0] / length).max()) <= STRAIGHT * length
+        if straight and touched @ left[0] < SLID * float(norm(touched)) * length:
+            return np.asarray(position[i])
+    return np.asarray(position[first])
 
 
 def _seat(shown: Sequence[_Shown], point: Float, settings: SeatSettings) -> Seat:
