@@ -126,7 +126,12 @@ def reading_settings(options: dict[str, Any]) -> dict[str, Any]:
 
 @command.command()
 @click.argument("source", type=click.Path(path_type=Path))
-@click.option("--out", required=True, type=click.Path(path_type=Path), help="File to write: .npz (native) or .csv.")
+@click.option(
+    "--out",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="File to write: .npz (native) or .csv; without an ending a LeRobot data set.",
+)
 @reading_options
 @click.option("--json", "as_json", is_flag=True, help="The audit of what was written as JSON on stdout.")
 @quiet_option

@@ -34,7 +34,12 @@ QUIET_S = 5.0  # a recording that is over by then needs no progress
 @click.option(
     "--teacher", type=click.Choice(["kinesthetic", "teleoperation", "blind"]), default="kinesthetic", show_default=True
 )
-@click.option("--out", required=True, type=click.Path(path_type=Path), help="File; with --count N: NAME1, NAME2, ...")
+@click.option(
+    "--out",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="File; with --count N: NAME1, NAME2, ... Without an ending: a LeRobot data set.",
+)
 @click.option("--count", default=1, show_default=True, type=COUNT, help="Number of demonstrations.")
 @click.option("--seed", default=0, show_default=True, type=SEED, help="Everything random follows from it.")
 @click.option(
@@ -108,6 +113,7 @@ def command(
         --out s.npz
       skillframe demonstration record --world pallets --robot hiab_xs031 --teacher teleoperation --delay 0.15 \\
         --angle -40 --count 2 --out push.npz
+      skillframe demonstration record --world peg_in_hole --count 1000 --rate 50 --out pegs
     """
     from skillframe.api.recording import record
     from skillframe.api.tasks import robot_of, scene_of
@@ -134,7 +140,10 @@ def command(
         where = {"robot": machine.spec.name, "world": world}
         click.echo(json.dumps({**where, "files": [str(f) for f in files], "rejected": recording.rejected}))
         return 0
-    for path, demonstration in zip(files, recording.demonstrations, strict=True):
+    if len(files) < len(recording):
+        click.echo(f"{files[0]}: {len(recording)} episodes, {sum(map(len, recording))} frames, LeRobot v3.0")
+        files = []
+    for path, demonstration in zip(files, recording.demonstrations, strict=False):
         click.echo(f"{path}: {demonstration.duration:.2f} s at {demonstration.rate:.0f} Hz")
     for text in recording.rejected:
         click.echo(f"redrawn: {text}")

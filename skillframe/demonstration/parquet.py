@@ -14,7 +14,11 @@ from typing import Any
 import numpy as np
 
 from skillframe.demonstration.arrays import read_as_table, table_of
+from skillframe.demonstration.columns import Columns
+from skillframe.demonstration.delimited import read_wrench_file
 from skillframe.demonstration.foreign import Arrays, foreign, refuse_no_file
+from skillframe.demonstration.merged import assemble_split
+from skillframe.demonstration.options import read_options
 from skillframe.demonstration.record import Demonstration
 from skillframe.demonstration.table import Table
 from skillframe.errors import InputError, UnknownName, extras_named
@@ -23,6 +27,9 @@ from skillframe.files.documents import read_json
 INFO = Path("meta") / "info.json"
 EPISODE = "episode_index"
 BESIDE = (EPISODE, "frame_index", "index", "task_index")
+OURS = Path("meta") / "skillframe.json"
+"""In data sets that `demonstration.lerobot` wrote: the metadata of each episode."""
+FORMAT, FORMAT_VERSION, FURTHER = "skillframe.demonstrations", 1, "observation.further."
 
 
 def is_lerobot(path: Path) -> bool:
@@ -42,7 +49,33 @@ def read_parquet(path: Path, options: Mapping[str, Any]) -> Demonstration:
         MissingDependency: pyarrow is not installed.
     """
     notes = list[str]()
+    if (path / OURS).is_file() and options.get("columns") is None:
+        return _read_own(path, options)
     return read_as_table(path, options, parquet_table(path, options, notes), notes)
+
+
+def _read_own(path: Path, options: Mapping[str, Any]) -> Demonstration:
+    """An episode that skillframe wrote, with its metadata."""
+    ours = read_json(path / OURS, "write the data set again")
+    metas = ours.get("episodes") if isinstance(ours, dict) else None
+    if not isinstance(metas, list) or ours.get("format") != FORMAT or ours.get("version") != FORMAT_VERSION:
+        fix = "update skillframe, or name the columns with --columns"
+        raise InputError(path / OURS, f"is no {FORMAT} of version {FORMAT_VERSION}", fix)
+    table = parquet_table(path, options)
+    columns = {
+        name.removeprefix(prefix): table.values[:, index]
+        for index, name in enumerate(table.names)
+        for prefix in ("observation.state.", "observation.wrench.", FURTHER)
+        if name.startswith(prefix)
+    }
+    number = int(options.get("episode") or 0)
+    if "timestamp" not in table.names or not number < len(metas) or not isinstance(metas[number], dict):
+        raise InputError(
+            path / OURS, f"and the data do not go together at episode {number}", "write the data set again"
+        )
+    columns["t"] = table.values[:, table.names.index("timestamp")]
+    chosen = read_options(options)
+    return assemble_split(Columns(columns, str(path)), metas[number], chosen, [], read_wrench_file(chosen))
 
 
 def parquet_table(path: Path, options: Mapping[str, Any], notes: list[str] | None = None) -> Table:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -79,17 +80,39 @@ def write_demonstration(demonstration: Demonstration, path: Path | str) -> None:
         InputError: an ending that no format writes, or a place that cannot be written to.
     """
     path = Path(path)
+    if is_data_set(path):
+        return write_data_set([demonstration], path)
     write = _format_of(path, reading=False).write
     assert write is not None
     write(demonstration, path)
+
+
+def is_data_set(path: Path) -> bool:
+    """Whether a name to write to is that of a data set of LeRobot: one without an ending."""
+    return not path.suffix
+
+
+def write_data_set(demonstrations: Sequence[Demonstration], path: Path | str) -> None:
+    """Write demonstrations as a data set of LeRobot, version 3.0. The folder appears complete or not at all.
+
+    Raises:
+        InputError: the folder is there, or the demonstrations do not go together.
+    """
+    from skillframe.demonstration.lerobot import write_lerobot
+
+    write_lerobot(demonstrations, Path(path))
 
 
 def check_writable(path: Path | str) -> None:
     """Refuse a file name that no format writes, before the work that fills the file.
 
     Raises:
-        InputError: with the endings there are.
+        InputError: with the endings there are, or a data set's folder that holds something.
     """
+    if is_data_set(Path(path)):
+        from skillframe.demonstration.lerobot import check_new
+
+        return check_new(Path(path))
     _format_of(Path(path), reading=False)
 
 

@@ -19,7 +19,7 @@ from skillframe.errors import SkillframeError
 from skillframe.execution.executor import Result, Setup, simulate
 from skillframe.execution.prepare import drive_maker
 from skillframe.execution.trace import Trace
-from skillframe.extend.reading import write_demonstration
+from skillframe.extend.reading import is_data_set, write_data_set, write_demonstration
 from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, rotate
 from skillframe.robot.guesses import guess_note
 from skillframe.robot.model import RobotModel
@@ -32,6 +32,8 @@ from skillframe.world.scene import Scene
 from skillframe.world.sensors import SensorSettings
 
 MOST_ATTEMPTS = 20
+MOST_AT_ONCE = 100
+"""Demonstrations that are simulated side by side, so that memory does not grow with the traces of a thousand."""
 Watch = Callable[[float, float], None]
 """Told how many seconds are simulated, and of how many at most."""
 ESTIMATED = SensorSettings(force_noise=1.0, torque_noise=0.07)
@@ -66,15 +68,19 @@ class Recording(Sequence[Demonstration]):
         """Write each demonstration to a file. The ending chooses the format.
 
         Args:
-            path: of one demonstration; several get NAME1, NAME2, ... in the same folder.
+            path: of one demonstration; several get NAME1, NAME2, ... in the same folder. A name without an ending is
+                that of a new LeRobot data set, of which each is an episode.
 
         Returns:
-            the files.
+            the files, or the data set's folder.
 
         Raises:
             InputError: an ending that no format writes, or a place that cannot be written to.
         """
         path, count = Path(path), len(self)
+        if is_data_set(path):
+            write_data_set(self.demonstrations, path)
+            return [path]
         files = [path] if count == 1 else [path.with_name(f"{path.stem}{i + 1}{path.suffix}") for i in range(count)]
         for file, demonstration in zip(files, self, strict=True):
             write_demonstration(demonstration, file)
@@ -154,14 +160,15 @@ def collect(
     if progress is not None:
         progress(beginning(robot, scene, count))
     for number in range(attempts):
-        slots = [slot for slot in range(count) if slot not in done]
-        result = attempt(slots, number)
-        assert result.traces is not None
-        for slot, good, failure, trace in zip(slots, result.success, result.failure, result.traces, strict=True):
-            if good:
-                done[slot] = keep(trace, slot, number)
-            else:
-                rejected.append(f"demonstration {slot}, attempt {number}: {failure}")
+        left = [slot for slot in range(count) if slot not in done]
+        for slots in (left[i : i + MOST_AT_ONCE] for i in range(0, len(left), MOST_AT_ONCE)):
+            result = attempt(slots, number)
+            assert result.traces is not None
+            for slot, good, failure, trace in zip(slots, result.success, result.failure, result.traces, strict=True):
+                if good:
+                    done[slot] = keep(trace, slot, number)
+                else:
+                    rejected.append(f"demonstration {slot}, attempt {number}: {failure}")
         if progress is not None:
             progress(f"{len(done)} of {count} demonstrations recorded, {len(rejected)} rejected")
             if rejected and (note := guess_note(robot.spec)):
