@@ -54,12 +54,16 @@ def command(
       skillframe condition free_motion.npz --weight --free-air 0,6 --method none --out identified.npz
     """
     from skillframe.conditioning.offline import filter_wrench, remove_bias, smooth
+    from skillframe.demonstration.faults.find import faults
     from skillframe.demonstration.stalls import stalls
     from skillframe.extend.reading import read_demonstration, write_demonstration
 
     demonstration = read_demonstration(file)
-    for stall in stalls(demonstration):
+    held = stalls(demonstration)
+    for stall in held:
         click.echo(f"warning: {stall.words()}: what happened then is not known, whatever is written", err=True)
+    for fault in faults(demonstration, held):
+        click.echo(f"warning: {fault.warning()}", err=True)
     removed = None
     if bias or weight:
         removed = remove_bias(demonstration, _pair("--free-air", free_air), weight)

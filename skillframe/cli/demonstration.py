@@ -245,6 +245,7 @@ def _show(found: DemonstrationAudit) -> None:
         ("peak", f"{found.peak_force_n:.2f} N, {counted(found.spikes, 'spike')}"),
         ("contact", _contacts(found)),
         *([("stalls", _stalls(found))] if found.stalls else []),
+        *([("faults", _faults(found))] if found.faults else []),
     ]
     for name, text in lines:
         click.echo(f"  {name:<9}{text}")
@@ -282,6 +283,11 @@ def counted(count: int, what: str) -> str:
 
 def _stalls(found: DemonstrationAudit) -> str:
     return ", ".join(f"{s['what']} {s['start']:.2f}-{s['stop']:.2f} s" for s in found.stalls)
+
+
+def _faults(found: DemonstrationAudit) -> str:
+    more = f" and {len(found.faults) - 8} more" if len(found.faults) > 8 else ""
+    return ", ".join(f"{f['kind']} of {f['what']} {f['start']:.2f}-{f['stop']:.2f} s" for f in found.faults[:8]) + more
 
 
 def _contacts(found: DemonstrationAudit) -> str:

@@ -24,8 +24,11 @@ from skillframe.conditioning.lateness import lateness
 from skillframe.conditioning.noise import LEAST_SAMPLES, NoiseFigures, has_window, noise_figures
 from skillframe.demonstration.assemble import NOTES
 from skillframe.demonstration.checks import GAP, angles_between
+from skillframe.demonstration.faults import fault
+from skillframe.demonstration.faults.fault import Flaw
+from skillframe.demonstration.faults.find import alive, faults, pressing
 from skillframe.demonstration.record import Demonstration
-from skillframe.demonstration.stalls import POSE, alive, as_meta, stalls
+from skillframe.demonstration.stalls import POSE, as_meta, stalls
 from skillframe.demonstration.suspicions import AUDITS, broken_samples
 from skillframe.frames import Float, norm
 
@@ -57,7 +60,8 @@ class DemonstrationAudit:
         contact_threshold_n: force above the free-air level that counts as contact.
         contacts: [start, stop, peak] of every contact [s, s, N].
         stalls: [{what, start, stop}] of every stretch that repeats one value: the wrench, a channel, the pose [s].
-        onsets_unseen: starts of contacts that follow a stall, and so began nobody knows when [s].
+        faults: [{kind, what, start, stop, value}] of every step of the bias, copied stretch, saturation and jump.
+        onsets_unseen: starts of contacts that follow a stall or a copy, and so began nobody knows when [s].
         wrench_late_s: how late the wrench is against the pose (`lateness`), None where the recording does not tell [s].
         notes: what the reader did.
         warnings: sentences with evidence.
@@ -83,6 +87,7 @@ class DemonstrationAudit:
     contact_threshold_n: float
     contacts: list[list[float]]
     stalls: list[dict[str, Any]]
+    faults: list[dict[str, Any]]
     onsets_unseen: list[float]
     wrench_late_s: float | None
     notes: list[str]
@@ -104,23 +109,28 @@ def audit(demonstration: Demonstration) -> DemonstrationAudit:
     step = np.diff(d.time)
     period = float(np.median(step))
     found = stalls(d)
-    live = alive(d, found)
+    wrong = faults(d, found)
+    live = alive(d, found, wrong)
+    touching = pressing(d, live, wrong)
     noise = _noise(d, live)
     level = free_air_level(d.time[live], d.wrench[live]) if np.any(live) else np.zeros(6)
-    contacts = contact_intervals(d.time, d.wrench, noise, level, live)
-    unseen = [c.start for c in contacts if any(s.what != POSE and 0.0 <= c.start - s.stop < LEVEL_TIME for s in found)]
+    contacts = contact_intervals(d.time, d.wrench, noise, level, touching)
+    dark = [s.stop for s in found if s.what != POSE]
+    dark += [f.stop for f in wrong if f.kind == fault.COPY and f.what != POSE]
+    unseen = [c.start for c in contacts if any(0.0 <= c.start - stop < LEVEL_TIME for stop in dark)]
     drift = _drift(d, contacts, level, live)
     path, turned = _travel(d)
     usable = path > LEAST_PATH or turned > LEAST_TURN
     warnings = [text for suspicion in AUDITS for text in suspicion(d)]
     warnings += [f"stall: {stall.words()}: it counts as neither free air, contact nor noise" for stall in found]
+    warnings += _told(wrong)
     warnings += _wrench_warnings(d, noise, level, drift, contacts)
-    late = lateness(d)
+    late = lateness(d, live)
     if late is not None and late.counts:
         warnings.append(late.words())
     if unseen:
         at = ", ".join(f"{start:.2f}" for start in unseen)
-        warnings.append(f"contact: from {at} s it follows a stall: when it began, nobody saw")
+        warnings.append(f"contact: from {at} s it follows a stall or a copy: when it began, nobody saw")
     if not usable:
         warnings.append(
             f"motion: the tool moves by {path * 1e3:.3f} mm and {np.rad2deg(turned):.3f} degrees: nothing to learn"
@@ -133,12 +143,21 @@ def audit(demonstration: Demonstration) -> DemonstrationAudit:
         bias=level.tolist(), noise=noise.quiet.tolist(), noise_typical=noise.typical.tolist(),
         drift=None if drift is None else drift.tolist(), spikes=len(broken_samples(d)),
         peak_force_n=float(norm(d.wrench[:, :3]).max()),
-        contact_threshold_n=contact_strength(d.time, d.wrench, noise, level, live)[1],
-        contacts=[list(contact) for contact in contacts], stalls=as_meta(found), onsets_unseen=unseen,
+        contact_threshold_n=contact_strength(d.time, d.wrench, noise, level, touching)[1],
+        contacts=[list(contact) for contact in contacts], stalls=as_meta(found), faults=fault.as_meta(wrong),
+        onsets_unseen=unseen,
         wrench_late_s=None if late is None else late.seconds,
         notes=list(d.meta.get(NOTES, [])), warnings=warnings,
         usable=usable,
     )  # fmt: skip
+
+
+def _told(found: list[Flaw]) -> list[str]:
+    """A sentence for every kind of fault and channel."""
+    groups: dict[tuple[str, str, bool], list[Flaw]] = {}
+    for f in sorted(found, key=lambda f: (f.kind, f.what, f.start)):
+        groups.setdefault((f.kind, f.what, f.value > 0.0), []).append(f)
+    return [group[0].warning(len(group) - 1) for group in groups.values()]
 
 
 def _noise(d: Demonstration, live: NDArray[np.bool_]) -> NoiseFigures:

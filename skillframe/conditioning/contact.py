@@ -134,8 +134,8 @@ def first_free_air(
     if stalled.size and time[stalled[0]] - time[0] < LEVEL_TIME:
         raise InputError(
             where,
-            f"the wrench repeats one value from {time[stalled[0]]:.2f} s on, and what follows may be contact already: "
-            "no free air is known",
+            f"the wrench repeats one value (or shows another fault) from {time[stalled[0]]:.2f} s on, and what follows "
+            "may be contact already: no free air is known",
             "name a stretch without contact (--free-air FROM,TO), or leave the bias (--no-bias)",
         )  # fmt: skip
     contacts = contact_intervals(time, wrench, noise, free_air_level(time, wrench), alive)

@@ -17,9 +17,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from skillframe.demonstration.faults.find import alive
 from skillframe.demonstration.record import Demonstration
-from skillframe.demonstration.stalls import alive
 from skillframe.frames import Float, norm
 
 RATE, SPAN, LEAST_TIME = 50.0, 35, 4.0
@@ -59,18 +60,19 @@ class Lateness(NamedTuple):
         )
 
 
-def lateness(demonstration: Demonstration) -> Lateness | None:
+def lateness(demonstration: Demonstration, live: NDArray[np.bool_] | None = None) -> Lateness | None:
     """How late the wrench is, or None where the recording does not tell.
 
     Args:
         demonstration: as read.
+        live: (T,) where its sensor is alive; looked for if not given.
     """
     d = demonstration
     clock_is_sound = LOWEST <= d.rate <= HIGHEST and d.duration * d.rate < MOST_GAPS * len(d)
     if not clock_is_sound or d.duration < LEAST_TIME or d.meta.get("contact") is False:
         return None
     time = np.arange(d.time[0], d.time[-1], 1.0 / RATE)
-    motion, force = _motion(d, time), _force(d, time)
+    motion, force = _motion(d, time), _force(d, time, alive(d) if live is None else live)
     if motion.shape[1] == 0 or not np.any(force):
         return None
     share = _shares(motion, force)
@@ -89,15 +91,15 @@ def _motion(d: Demonstration, time: Float) -> Float:
     return np.asarray((changes - changes.mean(axis=0))[:, size > 1e-9] / size[size > 1e-9])
 
 
-def _force(d: Demonstration, time: Float) -> Float:
+def _force(d: Demonstration, time: Float, live: NDArray[np.bool_]) -> Float:
     """Changes (T - 1, 3) of the force, averaged over 20 ms. Zero where the wrench stalls."""
     width = max(1, round(d.rate / RATE))
     total = np.concatenate([np.zeros((1, 3)), np.cumsum(d.wrench[:, :3], axis=0)])
     first = np.clip(np.arange(len(d)) - width // 2, 0, len(d) - width)
     mean = (total[first + width] - total[first]) / width
     force = np.stack([np.interp(time, d.time, column) for column in mean.T], axis=1)
-    live = np.interp(time, d.time, alive(d).astype(float)) >= 1.0
-    return np.where((live[1:] & live[:-1])[:, None], _clipped(np.diff(force, axis=0)), 0.0)
+    there = np.interp(time, d.time, live.astype(float)) >= 1.0
+    return np.where((there[1:] & there[:-1])[:, None], _clipped(np.diff(force, axis=0)), 0.0)
 
 
 def _clipped(changes: Float) -> Float:

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.demonstration.faults.find import alive as alive_samples
 from skillframe.demonstration.record import Demonstration
-from skillframe.demonstration.stalls import alive as alive_samples
 from skillframe.errors import InputError
 from skillframe.frames import Float
 from skillframe.signals.kalman import CHUNK, WrenchModel, chunks, steady_gain

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from skillframe.conditioning.contact import first_free_air
 from skillframe.conditioning.noise import LEAST_SAMPLES, model_of, noise_figures
 from skillframe.conditioning.payload import Payload, gravity_in_tool, identify_payload, refuse_absurd
+from skillframe.demonstration.faults.fault import COPY, SATURATED, STEP
+from skillframe.demonstration.faults.find import alive, faults, remembered
 from skillframe.demonstration.record import Demonstration
-from skillframe.demonstration.stalls import KEY as STALLS
-from skillframe.demonstration.stalls import alive, as_meta, stalls
+from skillframe.demonstration.stalls import stalls
 from skillframe.errors import InputError
 from skillframe.frames import Float, norm, rotate_spatial
 from skillframe.signals.kalman import WrenchFilter, WrenchModel
@@ -21,6 +22,7 @@ from skillframe.signals.kalman import WrenchFilter, WrenchModel
 METHODS = ("smoother", "filter", "none")
 LEAST_STRETCH = 0.2
 LEAST_DOUBT = 0.5
+VERBS = {STEP: "steps to another bias", COPY: "is copied", SATURATED: "saturates"}
 
 
 class Removed(NamedTuple):
@@ -59,13 +61,13 @@ def _with_filter(demonstration: Demonstration, model: WrenchModel | None, method
     run = design.smooth if method == "smoother" else design.filter
     said = {"method": method, "noise": model.noise.tolist(), "corner_hz": model.corner(dt).tolist()}
     wrench = run(demonstration.time, demonstration.wrench)
-    return replace(demonstration, wrench=wrench, meta=_noted(with_stalls(demonstration), said))
+    return replace(demonstration, wrench=wrench, meta=_noted(with_faults(demonstration), said))
 
 
-def with_stalls(demonstration: Demonstration) -> dict[str, Any]:
-    """Metadata that name the stalls: a wrench that was turned or smoothed shows them no longer."""
-    found = stalls(demonstration)
-    return {**demonstration.meta, **({STALLS: as_meta(found)} if found else {})}
+def with_faults(demonstration: Demonstration) -> dict[str, Any]:
+    """Metadata that name stalls and faults: a wrench that was turned or smoothed shows them no longer."""
+    d = demonstration
+    return remembered(d.time, np.concatenate([d.position, d.quaternion], axis=1), d.wrench, d.meta, d.source)
 
 
 def _noted(meta: dict[str, Any], said: dict[str, Any]) -> dict[str, Any]:
@@ -84,8 +86,8 @@ def remove_bias(
         weight: whether the wrench holds the tool's weight; the metadata's word if not given.
 
     Raises:
-        InputError: the stretch is shorter than 0.2 s or holds a stall, no free air is known, or what was identified
-            cannot be a tool.
+        InputError: the stretch is shorter than 0.2 s or holds a stall or fault, no free air is known, or what was
+            identified cannot be a tool.
     """
     d = demonstration
     live = alive(d)
@@ -94,8 +96,9 @@ def remove_bias(
     if not np.all(live[inside]):
         raise InputError(
             d.source or "demonstration",
-            f"the wrench stalls within {stretch[0]:.3g} to {stretch[1]:.3g} s, so that it shows no free air there",
-            "name a stretch without a stall (skillframe demonstration check shows them), or leave the bias (--no-bias)",
+            f"the wrench {_fault_within(d, stretch)} within {stretch[0]:.3g} to {stretch[1]:.3g} s, so that it shows "
+            "no free air there",
+            "name a sound stretch (skillframe demonstration check shows what is wrong), or leave the bias (--no-bias)",
         )  # fmt: skip
     if stretch[1] - stretch[0] < LEAST_STRETCH or inside.sum() < 2:
         raise InputError(
@@ -111,12 +114,21 @@ def remove_bias(
     else:
         payload = _without_mass(d, inside, payload)
     wrench = d.wrench - payload.wrench(d.pose.rotation)
-    meta = _noted(with_stalls(d), {"free_air_s": list(stretch), "payload": payload.as_meta()})
+    meta = _noted(with_faults(d), {"free_air_s": list(stretch), "payload": payload.as_meta()})
     if weight and not payload.mass:
         meta = {**meta, "wrench": {**said, "includes_tool_weight": True}}
     elif "includes_tool_weight" in said or weight:
         meta = {**meta, "wrench": {**said, "includes_tool_weight": False}}
     return Removed(replace(d, wrench=wrench, meta=meta), payload, stretch)
+
+
+def _fault_within(demonstration: Demonstration, stretch: tuple[float, float]) -> str:
+    """What is wrong with the wrench in a stretch, as a verb."""
+    held = stalls(demonstration)
+    if any(s.start <= stretch[1] and stretch[0] <= s.stop for s in held):
+        return "stalls"
+    kinds = {f.kind for f in faults(demonstration, held) if f.start <= stretch[1] and stretch[0] <= f.stop}
+    return next(verb for kind, verb in VERBS.items() if kind in kinds)
 
 
 def doubtful_bias(demonstration: Demonstration, removed: Removed) -> float | None:

@@ -20,6 +20,8 @@ from skillframe.demonstration.columns import (
 )
 from skillframe.demonstration.contradiction import refuse_contradiction
 from skillframe.demonstration.convention import declared_wrench, to_standard
+from skillframe.demonstration.faults import fault
+from skillframe.demonstration.faults.find import remembered
 from skillframe.demonstration.join import join, within
 from skillframe.demonstration.metafile import check_meta, nested
 from skillframe.demonstration.options import ReadOptions
@@ -55,7 +57,7 @@ def assemble(
     rate = options.rate or _meta_rate(source, meta, columns)
     pose = _clocked(select_arm(columns, options.arm), rate, notes)
     zero = -float(pose["t"][0]) if options.zero_time else 0.0  # one shift for both files: their clocks stay together
-    meta = stalls.moved(meta, zero, source)
+    meta = fault.moved(stalls.moved(meta, zero, source), zero, source)
     pose = _checked_pose(_shifted(pose, zero), options, notes)
     if wrench is not None:
         pose = join(pose, _checked_wrench_file(wrench, options, rate, zero, notes), options, notes)
@@ -163,18 +165,9 @@ def _finish(columns: Columns, meta: dict[str, Any], options: ReadOptions, notes:
     wrench, said, more = to_standard(columns.stack(WRENCH), rotation, declared, meta, source)
     notes = list(dict.fromkeys([*meta.get(NOTES, []), *notes, *more]))
     meta = {**meta, **({"wrench": said} if said else {}), **({NOTES: notes} if notes else {})}
-    meta = _with_stalls(columns, meta)
+    pose = columns.stack((*POSITION, *QUATERNION))
+    meta = remembered(columns["t"], pose, columns.stack(WRENCH), meta, source)
     return Demonstration(
         time=columns["t"], position=columns.stack(POSITION), quaternion=quaternion, wrench=wrench, meta=meta,
         extra={n: v for n, v in columns.items() if n not in CANONICAL}, source=source,
     )  # fmt: skip
-
-
-def _with_stalls(columns: Columns, meta: dict[str, Any]) -> dict[str, Any]:
-    """Metadata with the stalls of the wrench as recorded: turned into base axes, or smoothed later, it hides them."""
-    pose, wrench = columns.stack((*POSITION, *QUATERNION)), columns.stack(WRENCH)
-    found = stalls.every_stall(columns["t"], pose, wrench, meta, columns.source)
-    return {
-        **{k: v for k, v in meta.items() if k != stalls.KEY},
-        **({stalls.KEY: stalls.as_meta(found)} if found else {}),
-    }

@@ -4,11 +4,11 @@ A live sensor has noise, so that all six channels cannot repeat for long. What m
 
 - a recorder faster than its sensor: runs of a typical length. A stall is ten times longer than nine in ten runs of the
   same file, and at least 0.25 s: the stretch that free air and noise are judged over;
-- a simulation without noise, or a closed form: where the rest of the file has no white noise (1 mN), nothing tells a
-  held value from a constant force, and nothing is said;
+- a simulation without noise, or a closed form: where the rest of the file has no white noise (1 mN, 0.01 mNm), nothing
+  tells a held value from a constant force, and nothing is said;
 - exactly zero in every channel: what a simulation or a sensor with a dead zone reads in free air;
-- a sensor that resolves less than its noise (resolution q, the least difference of two values). A held value within
-  2 q of the levels before and after it says nothing false. Where q exceeds 0.3 of the noise of the rest, which may be
+- a sensor that resolves less than its noise (resolution q, the least difference of two values). A held value within 2
+  q of the levels before and after it says nothing false. Where q exceeds 0.3 of the noise of the rest, which may be
   ten times that at rest, one of the two levels is enough, and a hold at an end of the file is believed;
 - a recording said to be without contact (`contact = false`).
 
@@ -35,7 +35,8 @@ KEY = "stalls"
 """Metadata key of stalls found when the recording was first read: [{what, start, stop}] [s]."""
 POSE = "pose"
 LEAST_TIME, LEAST_TIME_CHANNEL, TYPICAL_RUNS, RUN_QUANTILE = 0.25, 1.0, 10.0, 0.9
-LEAST_NOISE, LEAST_LIVE, LEVEL_TIME = 1e-3, 20, 0.25
+LEAST_NOISE = np.repeat([1e-3, 1e-5], 3)  # [N, Nm]
+LEAST_LIVE, LEVEL_TIME = 20, 0.25
 STEPS, COARSE = 2.0, 0.3
 JUMP_RATIO, JUMP_QUANTILE, LEAST_JUMP, LEAST_JUMP_TURN = 5.0, 0.95, 5e-4, np.deg2rad(0.2)
 
@@ -101,16 +102,6 @@ def as_meta(found: Sequence[Stall]) -> list[dict[str, Any]]:
     return [stall._asdict() for stall in found]
 
 
-def alive(demonstration: Demonstration, found: Sequence[Stall] | None = None) -> NDArray[np.bool_]:
-    """Mask (T,) of samples whose wrench is no stall's. The stalls are looked for if they are not given."""
-    time = demonstration.time
-    mask = np.ones(len(time), dtype=bool)
-    for stall in stalls(demonstration) if found is None else found:
-        if stall.what != POSE:
-            mask &= (time < stall.start) | (time > stall.stop)
-    return mask
-
-
 def find(time: Float, pose: Float, wrench: Float, meta: Mapping[str, Any]) -> list[Stall]:
     """Stalls that samples show.
 
@@ -123,13 +114,13 @@ def find(time: Float, pose: Float, wrench: Float, meta: Mapping[str, Any]) -> li
     result = [Stall(POSE, *_span(time, run)) for run in _long(time, pose, LEAST_TIME) if _jumps(pose, run)]
     if meta.get("contact") is False:
         return result
-    whole = _held(time, wrench, LEAST_TIME)
+    whole = _held(time, wrench, LEAST_TIME, LEAST_NOISE)
     result += [Stall("wrench", *_span(time, run)) for run in whole]
     free = np.ones(len(time), dtype=bool)
     for first, last in whole:
         free[first : last + 1] = False
     for i, name in enumerate(WRENCH):
-        runs = _held(time, wrench[:, i : i + 1], LEAST_TIME_CHANNEL)
+        runs = _held(time, wrench[:, i : i + 1], LEAST_TIME_CHANNEL, LEAST_NOISE[i : i + 1])
         result += [Stall(name, *_span(time, (a, b))) for a, b in runs if free[a : b + 1].all()]
     return sorted(result, key=lambda s: (s.start, s.what))
 
@@ -138,36 +129,46 @@ def _span(time: Float, run: tuple[int, int]) -> tuple[float, float]:
     return float(time[run[0]]), float(time[run[1]])
 
 
-def _starts(values: Float) -> NDArray[np.intp]:
-    """Where a new value begins, the first sample included."""
+def starts(values: Float) -> NDArray[np.intp]:
+    """Samples at which a new value of (T, n) begins, the first included."""
     changes = np.any(values[1:] != values[:-1], axis=1)
     return np.concatenate([[0], np.flatnonzero(changes) + 1])
 
 
 def _long(time: Float, values: Float, least: float) -> list[tuple[int, int]]:
     """First and last sample of every run that is long for the file."""
-    starts = _starts(values)
-    if len(starts) < LEAST_LIVE:
+    first = starts(values)
+    if len(first) < LEAST_LIVE:
         return []
-    ends = np.append(starts[1:], len(time)) - 1
+    ends = np.append(first[1:], len(time)) - 1
     period = float(np.median(np.diff(time)))
-    held = time[ends] - time[starts]
+    held = time[ends] - time[first]
     limit = max(least, TYPICAL_RUNS * (float(np.quantile(held, RUN_QUANTILE)) + period))
-    return [(int(starts[k]), int(ends[k])) for k in np.flatnonzero(held >= limit)]
+    return [(int(first[k]), int(ends[k])) for k in np.flatnonzero(held >= limit)]
 
 
-def _held(time: Float, values: Float, least: float) -> list[tuple[int, int]]:
+def _held(time: Float, values: Float, least: float, least_noise: Float) -> list[tuple[int, int]]:
     """Long runs of a sensor's values (T, n) that neither a simulation nor its resolution explains."""
     runs = [run for run in _long(time, values, least) if np.any(values[run[0]])]
     if not runs:
         return []
-    fresh = values[_starts(values)]
+    noise, step = _noise_and_resolution(values)
+    if not np.any(noise > least_noise):
+        return []
+    return [run for run in runs if not _resolved(time, values, run, step, noise)]
+
+
+def explained(time: Float, values: Float, run: tuple[int, int]) -> bool:
+    """Whether the resolution of a sensor (T, n) explains that it repeats its values from a first to a last sample."""
+    noise, step = _noise_and_resolution(values)
+    return _resolved(time, values, run, step, noise)
+
+
+def _noise_and_resolution(values: Float) -> tuple[Float, Float]:
+    fresh = values[starts(values)]
     second = fresh[2:] - 2.0 * fresh[1:-1] + fresh[:-2]
     noise = np.median(np.abs(second), axis=0) / (0.6745 * np.sqrt(6.0))
-    if not np.any(noise > LEAST_NOISE):
-        return []
-    step = np.array([_resolution(column) for column in fresh.T])
-    return [run for run in runs if not _resolved(time, values, run, step, noise)]
+    return noise, np.array([_resolution(column) for column in fresh.T])
 
 
 def _resolution(values: Float) -> float:
@@ -189,7 +190,7 @@ def _resolved(time: Float, values: Float, run: tuple[int, int], step: Float, noi
 
 def _jumps(pose: Float, run: tuple[int, int]) -> bool:
     """Whether a pose that stood still jumps at the end of it."""
-    fresh = pose[_starts(pose)]
+    fresh = pose[starts(pose)]
     if run[1] + 1 >= len(pose):
         return False
     moved, turned = _steps(fresh)
@@ -202,24 +203,3 @@ def _steps(pose: Float) -> tuple[Float, Float]:
     """Distance [m] and angle [rad] from each sample (T, 7) to the next."""
     rotation = matrix_from_quaternion(pose[:, 3:])
     return norm(np.diff(pose[:, :3], axis=0)), norm(rotation_vector(np.swapaxes(rotation[:-1], -1, -2) @ rotation[1:]))
-
-
-def refuse_stalls(demonstration: Demonstration) -> None:
-    """Refuse to learn from a demonstration that stalls, with the line that cuts the stall off.
-
-    Raises:
-        InputError: with the stall's times, and the longer part beside it.
-    """
-    found = stalls(demonstration)
-    if not found:
-        return
-    d, first = demonstration, found[0]
-    before, after = first.start - float(d.time[0]), float(d.time[-1]) - first.stop
-    step = 1.0 / d.rate  # one sample beyond the stall
-    part = f"--to {first.start - step:.3f}" if before > after else f"--from {first.stop + step:.3f}"
-    name = d.source or "demonstration"
-    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-    raise InputError(
-        name, f"{first.words()}{more}: what happened then was not recorded, so nothing can be learned from it",
-        f"cut it off (skillframe demonstration convert {name} {part} --out cut.npz), or record it again",
-    )  # fmt: skip

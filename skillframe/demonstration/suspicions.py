@@ -12,16 +12,15 @@ import numpy as np
 from skillframe.demonstration.checks import GAP
 from skillframe.demonstration.columns import WRENCH
 from skillframe.demonstration.contradiction import WORK_COSINE, Turning, weight_evidence, work_cosine
+from skillframe.demonstration.faults.find import alive
 from skillframe.demonstration.landings import Indices, landings
 from skillframe.demonstration.record import Demonstration
-from skillframe.demonstration.stalls import alive
 from skillframe.frames import Float, norm
 
 Suspicion = Callable[[Demonstration], Iterator[str]]
 HELD_LEAST = 10  # steps of a held pose from which its rate is told
-FARTHEST, FASTEST = 20.0, 10.0
+FARTHEST = 20.0
 PAST_HALF = 0.05  # of the scalar part, 6 degrees beyond half a turn: less is no change of sign that means anything
-SATURATED_SAMPLES, SATURATED_LEAST_RUNS = 5.0, 20
 LARGEST_FORCE, LONGEST_LEVER = 2e4, 3.0
 UNMEASURED = "unmeasured"
 """Metadata: names of wrench channels that nobody measured, as across a machine's plane; zero says nothing there."""
@@ -85,15 +84,10 @@ def kept_positive(q: Float) -> tuple[list[int], int]:
 
 
 def motion(d: Demonstration) -> Iterator[str]:
-    """Positions in another unit, or that jump."""
+    """Positions in another unit."""
     far = float(np.abs(d.position).max())
     if far > FARTHEST:
         yield f"position: up to {far:.4g} m from the base; is it in millimetres (--units mm)?"
-    step, dt = norm(np.diff(d.position, axis=0)), np.diff(d.time)
-    fast = np.flatnonzero((step > FASTEST * dt) & (step > 0.02))
-    if fast.size:
-        worst = int(fast[np.argmax(step[fast])])
-        yield f"position: jumps by {step[worst] * 1e3:.1f} mm at t = {d.time[worst + 1]:.3f} s ({fast.size} jumps)"
 
 
 def channels(d: Demonstration) -> Iterator[str]:
@@ -106,39 +100,13 @@ def channels(d: Demonstration) -> Iterator[str]:
             moves = np.any(d.wrench[:, i] != d.wrench[0, i])
             if moves and np.array_equal(d.wrench[:, i], d.wrench[:, j]):
                 yield f"{WRENCH[i]} and {WRENCH[j]} are identical: was a column pasted twice?"
-    live = alive(d)
+    live = alive(d, found=())
     both = live[1:] & live[:-1]
     if not np.any(both):
         return
     held = float(np.mean(np.all(d.wrench[1:] == d.wrench[:-1], axis=1)[both]))
     if held > 0.5:
         yield f"wrench: {held:.0%} of the samples repeat the one before: its rate is about {d.rate * (1 - held):.3g} Hz"
-
-
-def saturation(d: Demonstration) -> Iterator[str]:
-    """Channels that stay at their largest or least value: a sensor shows no more than its range.
-
-    Noise makes a live channel leave its extreme at once. It saturates if it stays there for five samples or more, three
-    times as long as nine in ten of its runs, while the rest of the wrench goes on. From a second on it is a stall too.
-    """
-    changes = np.concatenate([[0], np.cumsum(np.any(d.wrench[1:] != d.wrench[:-1], axis=1))])
-    for i, name in enumerate(WRENCH):
-        channel = d.wrench[:, i]
-        starts = np.concatenate([[0], np.flatnonzero(channel[1:] != channel[:-1]) + 1])
-        lengths = np.diff(np.append(starts, len(channel)))
-        if len(starts) < SATURATED_LEAST_RUNS:
-            continue
-        goes_on = changes[starts + lengths - 1] > changes[starts]
-        least = max(SATURATED_SAMPLES, 3.0 * float(np.quantile(lengths, 0.9)))
-        for extreme, way in ((float(channel.max()), "largest"), (float(channel.min()), "least")):
-            stays = (channel[starts] == extreme) & (lengths >= least) & goes_on & (extreme != 0.0)
-            if np.any(stays):
-                first, unit = d.time[starts[np.flatnonzero(stays)[0]]], "N" if i < 3 else "Nm"
-                total = int(lengths[stays].sum())
-                yield (
-                    f"saturation: {name} stays at its {way} value, {extreme:.4g} {unit}, for {total} samples from "
-                    f"t = {first:.3f} s on: the sensor's range ended, and the force was larger"
-                )
 
 
 def held_pose(d: Demonstration) -> Iterator[str]:
@@ -215,5 +183,5 @@ def frame_and_sign(d: Demonstration) -> Iterator[str]:
 
 
 AUDITS: Sequence[Suspicion] = (
-    clock, quaternions, motion, held_pose, channels, saturation, magnitudes, spikes, frame_and_sign,
+    clock, quaternions, motion, held_pose, channels, magnitudes, spikes, frame_and_sign,
 )  # fmt: skip

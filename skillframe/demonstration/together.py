@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from skillframe.demonstration.faults.find import refuse_faults
 from skillframe.demonstration.metafile import point_of
 from skillframe.demonstration.record import Demonstration
-from skillframe.demonstration.stalls import refuse_stalls
 from skillframe.errors import InputError
 from skillframe.frames import norm
 
@@ -16,7 +16,7 @@ SAME_POINT_M = 1e-6
 
 
 def refuse_unfit(demonstrations: Sequence[Demonstration]) -> None:
-    """Refuse demonstrations that no learner may take: of different tools, or with a stall.
+    """Refuse demonstrations that no learner may take: of different tools, or with a stretch that is not what happened.
 
     Raises:
         InputError: with the file, and what is wrong with it.
@@ -24,7 +24,7 @@ def refuse_unfit(demonstrations: Sequence[Demonstration]) -> None:
     if len(demonstrations) > 1:
         common_frames(demonstrations)
     for demonstration in demonstrations:
-        refuse_stalls(demonstration)
+        refuse_faults(demonstration)
 
 
 def common_frames(demonstrations: Sequence[Demonstration]) -> dict[str, list[float]]:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from skillframe.conditioning.lateness import lateness
 from skillframe.demonstration.record import Demonstration
-from skillframe.extend.reading import read_demonstration
-from skillframe.paths import recordings_dir
+from tests.figures.recorded import recordings
 from tests.unit.conditioning.test_lateness import late, recorded
 
 pytestmark = pytest.mark.figures
@@ -20,21 +17,7 @@ CLOSE = 0.03
 
 
 def real() -> dict[str, Demonstration]:
-    base = recordings_dir()
-    if base is None:
-        return {}
-    found = {f"snap {trial}": snap(base / "hiro_snap_assembly" / trial) for trial in ("02", "10", "22")}
-    columns = "t,px,py,pz,qw,qx,qy,qz,fx,fy,fz,tx,ty,tz"
-    return found | {
-        f"wipe {i}": read_demonstration(base / "icsc_wiping" / f"rim{i}.csv", columns=columns) for i in range(3)
-    }
-
-
-def snap(folder: Path) -> Demonstration:
-    return read_demonstration(
-        folder / "R_CartPos.dat", columns="t,px,py,pz,roll,pitch,yaw", euler="xyz",
-        wrench=folder / "worldforce.dat", wrench_columns="t,fx,fy,fz,tx,ty,tz",
-    )  # fmt: skip
+    return {name: d for name, d in recordings().items() if not name.startswith("peel")}
 
 
 def test_clocks_that_differ_are_found_and_others_raise_no_alarm() -> None:

@@ -173,6 +173,7 @@ def two_phases(path: Path) -> str:
     slide = one.time >= 0.5
     after = (one.position[slide] - one.position[slide][0]) @ turn.T + one.position[-1]
     wrench = np.concatenate([one.wrench[slide, :3] @ turn.T, one.wrench[slide, 3:]], axis=1)
+    wrench += np.random.default_rng(0).normal(scale=1e-3, size=wrench.shape)  # noise does not repeat itself
     both = replace(
         one, time=np.arange(len(one) + slide.sum()) / one.rate, position=np.concatenate([one.position, after]),
         quaternion=np.concatenate([one.quaternion, one.quaternion[slide]]),

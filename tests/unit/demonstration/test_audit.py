@@ -66,7 +66,7 @@ WARNINGS: dict[str, tuple[Callable[[Demonstration], Demonstration], str]] = {
     "millimetres": (lambda d: replace(d, position=d.position * 1e3), "millimetres"),
     "a jump in position": (
         lambda d: replace(d, position=d.position + 0.2 * (np.arange(200) > 80)[:, None]),
-        "position: jumps by 34",
+        "jump: the tool point jumps by 34",
     ),
     "a channel of zeros": (lambda d: with_wrench(d, zeroed), "ty: is exactly 0 throughout"),
     "a pasted channel": (lambda d: with_wrench(d, pasted), "fy and tx are identical"),
