@@ -41,7 +41,8 @@ def table_of(source: str, arrays: Mapping[str, NDArray[Any]], notes: list[str] |
     Raises:
         InputError: none of them has a row per sample.
     """
-    usable = {name: array for name, array in arrays.items() if array.dtype.kind in "fiub" and array.ndim in (1, 2, 3)}
+    numbers = {name: array for name, array in arrays.items() if array.dtype.kind in "fiub" and array.size}
+    usable = {name: array for name, array in numbers.items() if array.ndim in (1, 2, 3)}
     count = _rows(usable)
     columns: dict[str, NDArray[np.float64]] = {}
     for name, array in usable.items():

@@ -5,6 +5,7 @@ Nothing is unpickled. What a library raises on foreign bytes becomes one sentenc
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.demonstration.arrays import read_as_table, table_of
+from skillframe.demonstration.matfile import whole_variables
 from skillframe.demonstration.record import Demonstration
 from skillframe.demonstration.table import Table
 from skillframe.errors import InputError, SkillframeError
@@ -57,6 +59,7 @@ def npy_table(path: Path, options: Mapping[str, Any], notes: list[str] | None = 
     """The table of one array (T, n): numbered columns, or the fields of a structured array."""
     refuse_no_file(path)
     with foreign(path, "an npy file"):
+        _refuse_short(path)
         array = np.load(path, allow_pickle=False)
     if array.dtype.names:
         return table_of(str(path), {name: array[name] for name in array.dtype.names}, notes)
@@ -66,6 +69,25 @@ def npy_table(path: Path, options: Mapping[str, Any], notes: list[str] | None = 
         )
     rows = np.arange(1, len(array) + 1)
     return Table(source=str(path), names=[], values=array.astype(float), rows=rows, text={})
+
+
+def _refuse_short(path: Path) -> None:
+    """Refuse an npy file that is shorter than its header says, before memory is asked for it.
+
+    Raises:
+        ValueError: what the header says.
+    """
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        version = np.lib.format.read_magic(file)  # type: ignore[no-untyped-call]
+        length = int.from_bytes(file.read(2 if version == (1, 0) else 4), "little")
+        if file.tell() + length > size:
+            raise ValueError(f"a header of {length} bytes in a file of {size}")
+        file.seek(-2 if version == (1, 0) else -4, 1)
+        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, _, kind = read(file)  # type: ignore[no-untyped-call]
+        if kind.hasobject or math.prod(shape) * kind.itemsize > size - file.tell():
+            raise ValueError(f"says {kind} of shape {shape}, more than its {size} bytes")
 
 
 def npz_table(path: Path, options: Mapping[str, Any], notes: list[str] | None = None) -> Table:
@@ -85,7 +107,8 @@ def mat_table(path: Path, options: Mapping[str, Any], notes: list[str] | None = 
     from scipy.io import loadmat
 
     with foreign(path, "a MATLAB file"):
-        content = loadmat(str(path), squeeze_me=True, struct_as_record=False)
+        names = whole_variables(path.read_bytes())
+        content = loadmat(str(path), squeeze_me=True, struct_as_record=False, variable_names=names)
         arrays = dict(_fields({k: v for k, v in content.items() if not k.startswith("__")}, ""))
     return table_of(str(path), arrays, notes)
 

@@ -43,7 +43,8 @@ def hdf5_table(path: Path, options: Mapping[str, Any], notes: list[str] | None =
         group = _episode(path, file, options.get("episode"))
         arrays: Arrays = {}
 
-        def take(name: str, item: Any) -> None:
+        def take(name: str | bytes, item: Any) -> None:
+            name = name if isinstance(name, str) else name.decode(errors="replace")
             if isinstance(item, h5py.Dataset) and _is_signal(item):
                 arrays[name] = item[()]
 

@@ -70,7 +70,7 @@ def spec_of(table: Table, picks: Mapping[str, int]) -> str:
 
 def whole_clock(table: Table, picks: Mapping[str, int]) -> Float | None:
     """The clock (T,) in its own unit, or None where there is none that increases."""
-    if SECONDS in picks:
+    if SECONDS in picks and NANOSECONDS in picks:
         return np.asarray(table.values[:, picks[SECONDS]] + 1e-9 * table.values[:, picks[NANOSECONDS]])
     if "t" not in picks:
         return None
