@@ -10,7 +10,7 @@ import click
 from skillframe.cli.output import emit_json, note, table
 
 if TYPE_CHECKING:
-    from skillframe.campaign.claims.compare import Judgement, Pair
+    from skillframe.campaign.claims.compare import Judgement, Pair, Ranked
 
 
 @click.command(name="compare")
@@ -22,8 +22,10 @@ if TYPE_CHECKING:
 @click.option(
     "--draws", metavar="COLUMN,...", help="Columns of what was drawn, to check that a trial is the same for all."
 )
+@click.option("--score", metavar="COLUMN", help="Compare this figure instead of successes; the higher the better.")
+@click.option("--lower", is_flag=True, help="The lower the score, the better.")
 @click.option("--json", "as_json", is_flag=True, help="JSON alone on stdout.")
-def command(file: Path, alpha: float, draws: str | None, as_json: bool) -> None:
+def command(file: Path, alpha: float, draws: str | None, score: str | None, lower: bool, as_json: bool) -> None:
     """Say which policies in FILE are better than others, and which are not told apart.
 
     FILE is a table with the columns trial, policy (or skill) and success, in the order in which the trials were run:
@@ -34,15 +36,20 @@ def command(file: Path, alpha: float, draws: str | None, as_json: bool) -> None:
     Examples:
       skillframe compare results/results.csv
       skillframe compare trials.csv --draws friction,tilt --json
+      skillframe compare results/results.csv --score peak_force_n --lower
     """
     from skillframe.campaign.claims.compare import compare
     from skillframe.campaign.claims.trials import read_trials
+    from skillframe.errors import InputError
 
-    found = compare(read_trials(file, [name.strip() for name in draws.split(",")] if draws else []), alpha)
+    if lower and score is None:
+        raise InputError("--lower", "says how a score is better, and there is none", "give --score COLUMN, too")
+    drawn = [name.strip() for name in draws.split(",")] if draws else []
+    found = compare(read_trials(file, drawn, score), alpha, 0 if score is None else -1 if lower else 1)
     if as_json:
         emit_json(_plain(found))
         return
-    _tell(found)
+    _tell(found, score)
 
 
 def _plain(found: Judgement) -> dict[str, Any]:
@@ -53,25 +60,34 @@ def _plain(found: Judgement) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _tell(found: Judgement) -> None:
+def _tell(found: Judgement, score: str | None) -> None:
     for text in found.doubts:
         note(f"note: {text}")
-    lines = [
-        (r.policy, r.trials, r.successes, f"{r.successes / r.trials:.3f}", f"{r.low:.3f} .. {r.high:.3f}", r.letters)
-        for r in found.standings
-    ]
-    table(("policy", "trials", "successes", "rate", "95 % interval", "alike"), lines)
+    head = ("rate", "95 % interval") if score is None else (score, "middle half")
+    lines = [(r.policy, r.trials, r.successes, *_figures(r), r.letters) for r in found.standings]
+    table(("policy", "trials", "successes", *head, "alike"), lines)
     click.echo(f"policies that share a letter are not told apart (any false decision: at most {100 * found.alpha:g} %)")
     for pair in found.pairs:
-        click.echo(f"{pair.first} against {pair.second}: {_counts(pair)}")
+        click.echo(f"{pair.first} against {pair.second}: {_counts(pair, score)}")
         click.echo(f"  p = {pair.p_value:.2g}: {_decision(pair)}")
     several = f", Holm over {len(found.pairs)} pairs" if len(found.pairs) > 1 else ""
-    click.echo(f"p: McNemar's test in the form that holds at every look, its smallest value so far{several}")
+    test = "McNemar's test" if score is None else "the test of signed ranks"
+    click.echo(f"p: {test} in the form that holds at every look, its smallest value so far{several}")
 
 
-def _counts(pair: Pair) -> str:
+def _figures(ranked: Ranked) -> tuple[str, str]:
+    """Rate and interval, or the median of the score and the quartiles about it."""
+    if ranked.quartiles:
+        low, middle, high = ranked.quartiles
+        return f"{middle:.4g}", f"{low:.4g} .. {high:.4g}"
+    return f"{ranked.successes / ranked.trials:.3f}", f"{ranked.low:.3f} .. {ranked.high:.3f}"
+
+
+def _counts(pair: Pair, score: str | None) -> str:
     other = pair.pairs - pair.by_number
     paired = f"{pair.pairs} pairs of trials" + (f", {other} of them in order of arrival" if other else "")
+    if score is not None:
+        return f"{paired}; the first is better in {pair.only_first}, the second in {pair.only_second}"
     return f"{paired}; only the first succeeds in {pair.only_first}, only the second in {pair.only_second}"
 
 

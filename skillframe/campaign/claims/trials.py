@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,11 +37,13 @@ class Trial(NamedTuple):
         trial: its number, or another name.
         policy: who ran.
         success: how it ended.
+        score: a figure of it, not a number where none was asked for.
     """
 
     trial: str
     policy: str
     success: bool
+    score: float = math.nan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,26 +61,32 @@ class Trials:
     doubts: tuple[str, ...] = ()
 
 
-def read_trials(path: Path, draws: Sequence[str] = ()) -> Trials:
+def read_trials(path: Path, draws: Sequence[str] = (), score: str | None = None) -> Trials:
     """The trials in a file.
 
     Args:
         path: text with a header, its cells parted by commas, semicolons or tabs. Columns `trial`, `policy` (or `skill`,
             `method`) and `success` (1 or 0, true or false); others are left alone.
         draws: columns of what was drawn, which have to agree between the policies of a trial.
+        score: column of a figure, which every trial has to have.
 
     Raises:
-        InputError: no such table, a policy that ran the same trial twice, draws that differ, rows that a search picked.
+        InputError: no such table, a policy that ran the same trial twice, draws that differ, rows that a search picked,
+            a trial without its score.
     """
     head, body = _cells(path)
-    columns = {name: _place(path, head, name) for name in ("trial", "success", *draws)}
+    columns = {name: _place(path, head, name) for name in ("trial", "success", *draws, *([score] if score else []))}
     policy = next((head.index(name) for name in POLICY if name in head), None)
     if policy is None:
         raise InputError(path, "has no column policy", f"call one of its columns {', '.join(POLICY)}")
     _check_sampled(path, head, body)
     rows = tuple(
-        Trial(cells[columns["trial"]], cells[policy], _success(path, n, cells[columns["success"]])) for n, cells in body
-    )
+        Trial(
+            cells[columns["trial"]], cells[policy], _success(path, n, cells[columns["success"]]),
+            _score(path, n, score, cells[columns[score]]) if score else math.nan,
+        )
+        for n, cells in body
+    )  # fmt: skip
     numbers = [n for n, _ in body]
     _check_once(path, rows, numbers)
     _check_draws(path, rows, [[cells[columns[name]] for name in draws] for _, cells in body], draws, numbers)
@@ -116,6 +125,19 @@ def _success(path: Path, number: int, cell: str) -> bool:
     found = TRUTH.get(cell.lower())
     if found is None:
         raise InputError(f"{path}: row {number}", f"success is {cell!r}", "write 1 or 0, true or false")
+    return found
+
+
+def _score(path: Path, number: int, name: str, cell: str) -> float:
+    try:
+        found = float(cell)
+    except ValueError:
+        found = math.nan
+    if not math.isfinite(found):
+        raise InputError(
+            f"{path}: row {number}", f"{name} is {cell!r}",
+            "give each trial a number, failed ones the worst there is: left out, they would favour who fails more",
+        )  # fmt: skip
     return found
 
 
