@@ -62,18 +62,16 @@ def command(task: Path, out: Path, workers: int | None) -> int:
     given = TaskFile.from_toml(task)
     given.settle(out)
     steps = steps_of(given, out, workers)
-    answers = []
     for number, step in enumerate(steps, start=1):
         said = f"[{number} of {len(steps)}] $ skillframe {shlex.join(step.command)}"
         if step.done():
             click.echo(bold(f"\n{said}  (done)"))
             continue
         click.echo(bold(f"\n{said}"))
+        given.bring_demonstrations(out)
         code = run([*step.command, "--quiet"] if is_quiet() and step.command[0] != "learn" else step.command)
         if code and not (step.may_say_no and code == NOT_CERTIFIED):
             return code
-        answers.append(code)
-        given.bring_demonstrations(out)
     return _conclude(out)
 
 
