@@ -109,7 +109,7 @@ def statement(
     """
     question, seen = read_question(folder), looked(folder, params, rounds)
     spec = load(folder / LOOK, params)
-    subject = [*sorted((folder / LOOK / "skills").iterdir()), folder / QUESTION]
+    subject = [*sorted((folder / LOOK / "skills").iterdir()), folder / QUESTION, folder / LOOK / RESULTS]
     predicate: dict[str, Any] = {
         "certified": found is not None and found.best is not None, "skill": spec.labels[0], "robot": spec.robot_name,
         "world": spec.world, "rate": question.rate, "declared": {k: list(v) for k, v in question.ranges.items()},

@@ -195,6 +195,22 @@ def test_a_box_is_certified_and_lies_where_the_skill_works(tmp_path):
     assert check_certificate(out, ValleyParams) == []
 
 
+def test_a_certificate_whose_files_are_gone_or_changed_does_not_hold(tmp_path):
+    out = asked(tmp_path)
+    named = [each["name"] for each in through(out)["subject"]]
+    assert {"look/results.csv", "claim1/claim.json", "claim1/fresh/results.csv", "question.json"} <= set(named)
+    for name in named:
+        kept = (out / name).read_bytes()
+        (out / name).write_bytes(kept + b"\n")
+        assert check_certificate(out, ValleyParams) == [f"{name} was changed"]
+        (out / name).unlink()
+        assert check_certificate(out, ValleyParams) == [f"{name} is gone"]
+        (out / name).write_bytes(kept)
+    path = out / "certificate.json"
+    path.write_text(path.read_text().replace('"failures": ', '"failures": 1', 1))
+    assert check_certificate(out, ValleyParams) == ["the figures do not follow from the trials"]
+
+
 @pytest.mark.parametrize("edited", ["boxes", "seed", "trials"])
 def test_only_fresh_draws_as_the_claim_announced_them_carry_it(tmp_path, edited):
     out = asked(tmp_path)
