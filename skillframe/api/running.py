@@ -15,6 +15,7 @@ from skillframe.api.inputs import File
 from skillframe.api.learning import LearnedSkill, Skills, skill_of
 from skillframe.api.tasks import Robot, Settings, World, robot_of, scene_of
 from skillframe.config.of_runs import DURATION, TRACE_RATE
+from skillframe.demonstration.places import load_places
 from skillframe.demonstration.record import resolve_point
 from skillframe.errors import InputError, SkillframeError
 from skillframe.execution.arms import ArmsResult
@@ -178,6 +179,7 @@ def run(
     skill: Skills | Skill, world: World, robot: Robot = "panda", *, coc: str | None = None,
     set: Settings | None = None, seed: int = 0, duration_s: float = LONGEST_S, rate_hz: float = RATE_HZ,
     scores: Sequence[str] = (), progress: Callable[[float, float], None] | None = None,
+    places: File | None = None,
 ) -> SingleRun:  # fmt: skip
     """Run a skill once in a simulated world.
 
@@ -192,6 +194,7 @@ def run(
         rate_hz: of the trace.
         scores: names of figures that plug-ins compute from the trace.
         progress: called with seconds simulated and the longest duration.
+        places: TOML file with poses of places in base, for a skill that goes by places; None: as the world says.
 
     Raises:
         SkillframeError: something given cannot be used, or a score failed; says what, where, and what to do.
@@ -199,7 +202,7 @@ def run(
     """
     done = once(
         skill, world, robot, coc=coc, set=set, seed=seed, duration_s=duration_s, rate_hz=rate_hz, scores=scores,
-        progress=progress,
+        progress=progress, places=places,
     )  # fmt: skip
     if done.interrupted:
         raise KeyboardInterrupt
@@ -211,6 +214,7 @@ def run(
 def once(
     skill: Skills | Skill, world: World, robot: Robot, *, coc: str | None, set: Settings | None, seed: int,
     duration_s: float, rate_hz: float, scores: Sequence[str], progress: Callable[[float, float], None] | None,
+    places: File | None = None,
 ) -> SingleRun:  # fmt: skip
     """As `run`, but a run that Ctrl-C ended, or whose scores failed, is given back as it stood."""
     for each in scores:
@@ -223,7 +227,8 @@ def once(
         runnable, setup = own, _setup(model, scene, coc)
     else:
         assert learned is not None
-        runnable, setup = prepare(model, scene, learned.document, coc)
+        told = None if places is None else load_places(Path(places))
+        runnable, setup = prepare(model, scene, learned.document, coc, told)
     result = simulate(
         runnable, setup, {key: np.array([value]) for key, value in draws.items()}, [np.random.default_rng(seed)],
         duration_s=duration_s, trace_hz=rate_hz,
@@ -233,7 +238,8 @@ def once(
     trace = result.traces[0]
     name = type(skill).__name__ if learned is None else learned.name
     trace.meta.update({"skill": name, "seed": seed, "draws": draws})
-    typed = "" if learned is None else _command(learned, world, robot, coc, set, seed, duration_s, rate_hz, scores)
+    how = (coc, set, seed, duration_s, rate_hz, scores, places)
+    typed = "" if learned is None else _command(learned, world, robot, *how)
     if typed:
         trace.meta["command"] = typed
     if not result.success[0]:
@@ -261,7 +267,7 @@ def _setup(robot: RobotModel, scene: Scene, coc: str | None) -> Setup:
 
 def _command(
     skill: LearnedSkill, world: World, robot: Robot, coc: str | None, settings: Settings | None, seed: int,
-    duration_s: float, rate_hz: float, scores: Sequence[str],
+    duration_s: float, rate_hz: float, scores: Sequence[str], places: File | None,
 ) -> str:  # fmt: skip
     """What to type to get the same run again, without where it goes. "" where objects of Python cannot be typed."""
     named = robot if isinstance(robot, str | os.PathLike) else None
@@ -269,6 +275,7 @@ def _command(
         return ""
     words = ["run", skill.source, "--world", os.fspath(world), "--robot", os.fspath(named)]
     words += [] if coc is None else ["--coc", coc]
+    words += [] if places is None else ["--places", os.fspath(places)]
     words += [word for key, value in (settings or {}).items() for word in ("--set", f"{key}={_typed(value)}")]
     words += ["--seed", f"{seed}"]
     words += [] if duration_s == LONGEST_S else ["--duration", f"{duration_s:g}"]

@@ -27,6 +27,10 @@ QUIET_S = 5.0  # a run that is over by then needs no progress
 @robot_option
 @click.option("--coc", help='Centre of compliance: "x,y,z" in the tool frame, or a frame (tip, wrist) [as learned].')
 @click.option(
+    "--places", type=click.Path(path_type=Path),
+    help="TOML file: where the places are that the skill goes by [as the world says].",
+)  # fmt: skip
+@click.option(
     "--set",
     "settings",
     multiple=True,
@@ -62,8 +66,9 @@ QUIET_S = 5.0  # a run that is over by then needs no progress
 @click.option("--json", "as_json", is_flag=True, help="The outcome as JSON on stdout.")
 @quiet_option
 def command(
-    skill: str, world: str, robot: str, coc: str | None, settings: tuple[str, ...], out: Path | None,
-    replay: Path | None, video: Path | None, seed: int, duration: float, rate: float, scores: tuple[str, ...],
+    skill: str, world: str, robot: str, coc: str | None, places: Path | None, settings: tuple[str, ...],
+    out: Path | None, replay: Path | None, video: Path | None, seed: int, duration: float, rate: float,
+    scores: tuple[str, ...],
     as_json: bool,
 ) -> int:  # fmt: skip
     """Run SKILL (a skill file, or TYPE:DEMONSTRATION) once in a simulated world.
@@ -88,7 +93,7 @@ def command(
         done = once(
             skill, world, robot, coc=coc, set=dict(parse_setting(text) for text in settings), seed=seed,
             duration_s=duration, rate_hz=rate, scores=scores,
-            progress=lambda now, longest: show(round(now, 2), longest),
+            progress=lambda now, longest: show(round(now, 2), longest), places=places,
         )  # fmt: skip
     if out is not None:
         done.save(out)

@@ -17,6 +17,7 @@ import numpy as np
 from skillframe.config.ranges import require_within
 from skillframe.config.units import si
 from skillframe.cosim.servos import require_servos
+from skillframe.demonstration.places import KEY, as_plain
 from skillframe.demonstration.record import resolve_point
 from skillframe.document.file import understood
 from skillframe.document.frame import read_frame, with_center
@@ -31,7 +32,7 @@ from skillframe.robot.kinematics import UnreachablePose, inverse_kinematics
 from skillframe.robot.model import RobotModel, load_model
 from skillframe.robot.spec import OWN_DRIVES, RobotSpec, load_robot
 from skillframe.skill import Skill
-from skillframe.world.placement import start_poses
+from skillframe.world.placement import places_in_base, start_poses
 from skillframe.world.quantities import QUANTITIES, RANGES, UNITS
 from skillframe.world.scene import Scene
 
@@ -119,13 +120,24 @@ def center_of_compliance(document: Document, scene: Scene, coc: str | None) -> F
     return frame.center_of_compliance if coc is None else resolve_point(coc, {**frame.points, **scene.tool.frames})
 
 
-def prepare(robot: RobotModel, scene: Scene, document: Document, coc: str | None = None) -> tuple[Skill, Setup]:
+def prepare(
+    robot: RobotModel, scene: Scene, document: Document, coc: str | None = None,
+    places: Mapping[str, Pose] | None = None,
+) -> tuple[Skill, Setup]:  # fmt: skip
     """A runnable skill and its set-up from a checked skill document.
 
+    Args:
+        robot: who runs it.
+        scene: where. A skill that goes by places is told where the scene's are, the fixture standing as it should.
+        document: as read.
+        coc: centre of compliance, as typed; None as learned.
+        places: poses of places in base, in place of the scene's.
+
     Raises:
-        UnknownName: the skill's type or the centre of compliance is unknown.
+        UnknownName: the skill's type or the centre of compliance is unknown, or nobody says where a place is.
         InputError: the skill says where it goes, and that is outside the robot's workspace.
     """
+    document = _told_places(document, {**places_in_base(robot, scene), **(places or {})})
     kind = registry().behaviour(document["type"])
     what, made = f"the {kind.name} skill", drive_maker(robot)
     if isinstance(kind, CoordinatorType):
@@ -144,6 +156,18 @@ def prepare(robot: RobotModel, scene: Scene, document: Document, coc: str | None
     return skill, Setup(
         robot=robot, scene=scene, center_of_compliance=center, make_drive=made, skill_speed=speed
     )  # fmt: skip
+
+
+def _told_places(document: Document, known: Mapping[str, Pose]) -> Document:
+    """The document with the poses of its places as they are now, not as they were shown."""
+    needed = document.get(KEY)
+    if not isinstance(needed, dict) or not needed:
+        return document
+    for name in needed:
+        if name not in known:
+            note = "the skill goes by it; say where it is: --places FILE.toml"
+            raise UnknownName("place", name, known, note=note)
+    return {**document, KEY: as_plain({name: known[name] for name in needed})}
 
 
 def _centers(kind: CoordinatorType, document: Document, scene: Scene, coc: str | None) -> Float:

@@ -20,6 +20,7 @@ from skillframe.world.worlds import (
     peg_in_hole,
     pit,
     socket,
+    task_board,
     valley,
 )
 
@@ -56,6 +57,10 @@ def world_types() -> Iterable[WorldType]:
     yield WorldType(
         name="bayonet", summary="a cap with two pins to push and turn at once", params=bayonet.BayonetParams,
         build=bayonet.build,
+    )  # fmt: skip
+    yield WorldType(
+        name="task_board", summary="five places on a board that can be moved: hole, slot, button, groove, corner",
+        params=task_board.BoardParams, build=task_board.build,
     )  # fmt: skip
     yield WorldType(
         name="pallets", summary="a stack of pallets and a stop, for machines", params=pallets.PalletsParams,

@@ -112,7 +112,7 @@ def demonstration_of_machine(
     trace: Trace, scene: Scene, settings: OperatorSettings, **provenance: int
 ) -> Demonstration:
     """What the machine knew of itself: pose, estimated wrench, the estimate's sigma, and whether pistons slid."""
-    plain = demonstration_from(trace, scene, settings, None, **provenance)
+    plain = demonstration_from(trace, scene, settings, None, places=None, **provenance)
     meta = {key: value for key, value in plain.meta.items() if key != "sensor"}
     meta |= {
         "wrench": dict(STANDARD), "wrench_source": "estimated from chamber pressures, without a force sensor",

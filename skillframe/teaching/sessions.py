@@ -14,6 +14,7 @@ from typing import overload
 import numpy as np
 
 from skillframe.demonstration.convention import STANDARD
+from skillframe.demonstration.places import KEY, as_plain
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import SkillframeError
 from skillframe.execution.executor import Result, Setup, simulate
@@ -27,7 +28,7 @@ from skillframe.teaching.blind import BlindSettings
 from skillframe.teaching.staged import teacher_for
 from skillframe.teaching.teacher import TeacherSettings
 from skillframe.teaching.teleoperation import OperatorSettings
-from skillframe.world.placement import fixture_poses
+from skillframe.world.placement import fixture_poses, places_in_base
 from skillframe.world.scene import Scene
 from skillframe.world.sensors import SensorSettings
 
@@ -96,7 +97,7 @@ def record(
     seed: int,
     draws: Mapping[str, float] | None = None,
     rate_hz: float = 500.0,
-    duration_s: float = 12.0,
+    duration_s: float | None = None,
     sensors: SensorSettings | None = None,
     progress: Callable[[str], None] | None = None,
     watch: Watch | None = None,
@@ -112,7 +113,7 @@ def record(
         seed: everything random follows from it.
         draws: quantities that hold for every demonstration (`start.*` is added to the task's own start).
         rate_hz: sample rate of the files.
-        duration_s: longest demonstration.
+        duration_s: longest demonstration; None: `longest_s`.
         sensors: noise of the sensors; a wrist sensor's if not given, an estimate's for teleoperation.
         progress: told in words what happens.
         watch: told now and then how many seconds are simulated, and of how many at most.
@@ -121,15 +122,23 @@ def record(
     Raises:
         SkillframeError: a slot still fails after all attempts; says with what.
     """
+    longest = longest_s(scene) if duration_s is None else duration_s
     sensors = sensors or (ESTIMATED if settings.kind == "teleoperation" else SensorSettings())
 
     def attempt(slots: list[int], number: int) -> Result:
-        return _attempt(robot, scene, settings, slots, number, seed, draws or {}, rate_hz, duration_s, sensors, watch)
+        return _attempt(robot, scene, settings, slots, number, seed, draws or {}, rate_hz, longest, sensors, watch)
 
     def keep(trace: Trace, slot: int, number: int) -> Demonstration:
-        return demonstration_from(trace, scene, settings, sensors, seed=seed, slot=slot, attempt=number)
+        return demonstration_from(
+            trace, scene, settings, sensors, places=places_in_base(robot, scene), seed=seed, slot=slot, attempt=number
+        )  # fmt: skip
 
     return collect(robot, scene, count, attempt, keep, progress, attempts)
+
+
+def longest_s(scene: Scene) -> float:
+    """How long a person may take [s]: 12 s, or 3 s for each stage of a task of many (our choice)."""
+    return max(12.0, 3.0 * (1 + len(scene.task.then)))
 
 
 def collect(
@@ -222,10 +231,13 @@ def start_columns(scene: Scene, slots: Sequence[int], draws: Mapping[str, float]
 
 def demonstration_from(
     trace: Trace, scene: Scene, settings: TeacherSettings | BlindSettings | OperatorSettings,
-    sensors: SensorSettings | None = None,
+    sensors: SensorSettings | None = None, *, places: Mapping[str, Pose] | None = None,
     **provenance: int,
 ) -> Demonstration:  # fmt: skip
-    """A demonstration at the tool point out of a trace taken at the handle. The wrench is as sensed, not filtered."""
+    """A demonstration at the tool point out of a trace taken at the handle. The wrench is as sensed, not filtered.
+
+    `places` are poses in base that the recording is to name.
+    """
     pose = Pose(trace.position, matrix_from_quaternion(trace.quaternion))
     handle: Float = np.array(trace.meta["center_of_compliance"])
     noise = sensors or SensorSettings()
@@ -236,6 +248,7 @@ def demonstration_from(
         "robot": trace.meta["robot"], "world": {"name": scene.name, "params": scene.params},
         "sensor": {"force_noise": noise.force_noise, "torque_noise": noise.torque_noise},
         "stages": [time for time, _ in trace.meta["events"]], "wrench": dict(STANDARD),
+        **({KEY: as_plain(dict(places))} if places else {}),
     }  # fmt: skip
     return Demonstration(
         time=trace.time.copy(), position=pose.at(-handle).position, quaternion=trace.quaternion.copy(),

@@ -26,6 +26,7 @@ from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_
 from skillframe.world.scene import Task
 
 AIM_TIME, TREMOR_TIME = 0.5, 0.1  # correlation times of aim and tremor [s]
+SLOWING_S = 0.2  # a hand that carries something to a place slows down by so much before it
 BLOCK = 500
 
 
@@ -58,6 +59,10 @@ HANDS = {
     "lever": Hand(
         stiffness=400.0, damping=40.0, relaxation=0.3, turn_stiffness=15.0, turn_damping=0.8, turn_rate=0.25,
         torque_max=3.0,
+    ),
+    "carrying": Hand(
+        stiffness=1000.0, damping=60.0, relaxation=1.0, turn_stiffness=20.0, turn_damping=1.0, speed=0.15,
+        turn_rate=0.8,
     ),
     "hold": Hand(stiffness=1000.0, damping=60.0, relaxation=1.0, turn_stiffness=20.0, turn_damping=1.0),
     "master": Hand(
@@ -135,6 +140,7 @@ class Teacher(Skill):
         turned = self._fixture.rotation
         task = self._task
         self._direction = None if task.direction is None else rotate(turned, np.array(task.direction))
+        self._goal = None if task.to is None else self._fixture.at(np.array(task.to)).position
         self._aligned = None if task.aligned is None else turned @ matrix_from_quaternion(task.aligned)
         self._turn = None if task.turn is None else rotate(turned, np.array(task.turn))
         self._delay = _Delay(round(self._settings.delay_s / observation.dt))
@@ -179,25 +185,33 @@ class Teacher(Skill):
         """Advance the hand's position. Returns its velocity (N, 3)."""
         settings, hand = self._settings, self._hand
         error = self._position - seen
-        if self._direction is None:
+        if self._direction is None and self._goal is None:
             self._position = self._position - error * (dt / hand.relaxation)
             return np.zeros_like(error)
         direction = self._aimed(noise, seen, dt)
         along = (error * direction).sum(-1, keepdims=True)
         sideways = error - along * direction
         excess = np.maximum(along - settings.force_max / hand.stiffness, 0.0)
-        velocity: Float = (hand.speed if settings.speed is None else settings.speed) * direction
+        velocity: Float = self._speed() * direction
         if not hand.gives_way:
             left = 1.0 - along * (hand.stiffness / settings.force_max)
             velocity, excess = np.clip(left, 0.0, 1.0) * velocity, np.zeros_like(excess)
         self._position = self._position + velocity * dt - sideways * (dt / hand.relaxation) - excess * direction
         return velocity
 
+    def _speed(self) -> float | Float:
+        """How fast the hand goes: as it does, and more slowly near the place that it carries the tool to."""
+        own = self._hand.speed if self._settings.speed is None or self._goal is not None else self._settings.speed
+        if self._goal is None:
+            return own
+        return np.minimum(own, norm(self._goal - self._position) / SLOWING_S)[:, None]
+
     def _aimed(self, noise: Float, seen: Float, dt: float) -> Float:
         """Where the person pushes now (N, 3), who sees the hand at (N, 3)."""
-        assert self._direction is not None
+        straight = self._direction if self._goal is None else unit(self._goal - self._position)
+        assert straight is not None
         self._aim += -self._aim * (dt / AIM_TIME) + self._settings.aim_noise * np.sqrt(2.0 * dt / AIM_TIME) * noise
-        result: Float = unit(self._direction + self._aim)
+        result: Float = unit(straight + self._aim)
         return result
 
     def _turn_hand(self, seen: Float, dt: float) -> Float:

@@ -81,6 +81,15 @@ def fixture_poses(robot: RobotModel, draws: Mapping[str, Float], count: int) -> 
     return nominal.compose(moved)
 
 
+def places_in_base(robot: RobotModel, scene: Scene) -> dict[str, Pose]:
+    """The scene's places for this robot, where the fixture is said to stand: (3,), (3, 3) in base each."""
+    fixture = nominal_fixture(robot)
+    return {
+        name: fixture.compose(Pose(np.array(position), matrix_from_quaternion(quaternion)))
+        for name, (position, quaternion) in scene.places.items()
+    }
+
+
 def start_poses(robot: RobotModel, scene: Scene, draws: Mapping[str, Float], count: int) -> Pose:
     """Pose of the tool frame at the start of each trial, in base."""
     zero = np.zeros(count)

@@ -126,6 +126,7 @@ class Task:
         direction: unit vector along which the teacher pushes, or None to hold still.
         aligned: attitude (quaternion) of the tool the teacher turns it to, or None to leave the attitude.
         turn: rotation vector along which a levering teacher turns the tool, or None.
+        to: where the teacher's hand carries the tool in free air, in place of a direction, or None.
         hand: "aligning" (soft and active in rotation), "sliding", "hold" or "lever".
         starts: nominal starts of the demonstrations, cycled through: dicts of `start.*` quantities.
         done: predicate of a finished demonstration, or of a finished stage; the goal if None.
@@ -138,6 +139,7 @@ class Task:
     direction: Vector | None
     aligned: tuple[float, float, float, float] | None = None
     turn: Vector | None = None
+    to: Vector | None = None
     hand: str = "sliding"
     starts: tuple[dict[str, float], ...] = ({},)
     done: Callable[[State], NDArray[np.bool_]] | None = None
@@ -181,6 +183,7 @@ class Scene:
         way: how far a run has got, of a task that has a depth; None for any other.
         analytic: figures of closed-form theory for the report (e.g. {"largest_tilt": ...}).
         params: the parameters it was built from, plain values.
+        places: named poses in the fixture frame that skills may go by: position and quaternion of each.
 
     Raises:
         InputError: a mesh that collides is not convex, not closed, flat or of the wrong scale.
@@ -202,6 +205,7 @@ class Scene:
     way: Way | None = None
     analytic: dict[str, float] = field(default_factory=dict)
     params: dict[str, Any] = field(default_factory=dict)
+    places: dict[str, tuple[Vector, tuple[float, float, float, float]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         groups = {"fixture": self.fixture, "tool": self.tool.geoms}

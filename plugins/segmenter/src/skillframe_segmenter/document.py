@@ -13,6 +13,7 @@ from skillframe.extend.records import Document
 from skillframe.extend.registry import registry
 from skillframe.frames import Float
 from skillframe_segmenter.model import PhaseModel, from_document
+from skillframe_segmenter.placed import is_placed, learned_of, placement_of
 
 FOLLOWED = ("wrench_hmm", "pose_hmm")
 SHARED = ("phases", "phase_model", "demonstrations", "type", "type_version", "recoveries")
@@ -52,6 +53,9 @@ def read(document: Document) -> PolicyDocument:
     recoveries = _get(document, "recoveries", int)
     if recoveries < 0:
         raise InputError("recoveries", "should not be negative", "0 takes the first failure")
+    for i, phase in enumerate(phases):
+        if is_placed(phase):
+            placement_of(document, i)
     return PolicyDocument(
         skills=[skill_of(document, i) for i in range(len(phases))], model=followed, successors=successors,
         recoveries=recoveries,
@@ -73,6 +77,8 @@ def check(document: Document) -> None:
 def skill_of(document: Document, index: int) -> Document:
     """Phase `index` as a skill document of its own."""
     phase = document["phases"][index]
+    if is_placed(phase):
+        return learned_of(document, index)
     kind = _get(phase, "skill", str, f"phases[{index}].")
     shared = {key: value for key, value in document.items() if key not in SHARED}
     own = {k: v for k, v in phase.items() if k not in ("skill", "beside")}

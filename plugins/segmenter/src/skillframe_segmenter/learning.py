@@ -14,6 +14,7 @@ leans on the friction cone explains both. Our choice; the papers join phases by 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from itertools import groupby, pairwise
 from math import cos, inf, radians
 from typing import Any
@@ -26,6 +27,7 @@ from skillframe.extend.records import Document, LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import norm
 from skillframe_segmenter.agreement import check_agreement
+from skillframe_segmenter.boards import learn_places, names_places
 from skillframe_segmenter.boundaries import Move, moved, parse_move
 from skillframe_segmenter.segmentation import refitted
 from skillframe_segmenter.settings import PolicySettings, Settings
@@ -33,21 +35,27 @@ from skillframe_segmenter.zvc import ZvcSettings
 
 SHORTEST_S = 0.25
 SAME_PUSH = cos(radians(35.0))
-OWN = ("segmenter", "skill", "phases", "recoveries", "set_boundary")
+OWN = ("segmenter", "skill", "phases", "recoveries", "set_boundary", "places")
+
+
+BETWEEN = ("recoveries", "set_boundary", "places")  # settings of the whole, not of what is done at one place
 
 
 def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
-    """The body of a policy document.
+    """The body of a policy document. Demonstrations that name places are learned from place by place (`boards`).
 
-    Settings: `segmenter` (wrench_hmm), `skill` (lmc), `phases` (found), `recoveries` (1), `set_boundary` (a list of
-    "DEMONSTRATION:BOUNDARY=SECONDS", counted as they stand without it), those of the segmenter, and those of the
-    phases' learner.
+    Settings: `places` (true), `segmenter` (wrench_hmm), `skill` (lmc), `phases` (found), `recoveries` (1),
+    `set_boundary` (a list of "DEMONSTRATION:BOUNDARY=SECONDS", counted as they stand without it), those of the
+    segmenter, and those of the phases' learner.
 
     Raises:
         InputError: demonstrations that cannot be cut or do not agree, or an unknown setting.
         UnknownName: no such segmenter or skill.
     """
     own, cutting, learning = _sorted(options)
+    if own["places"] and names_places(demonstrations):
+        each = replace(options, settings={k: v for k, v in options.settings.items() if k not in BETWEEN})
+        return learn_places(demonstrations, each, own["recoveries"], bool(own["set_boundary"]), learn)
     segmenter = registry().segmenter(own["segmenter"])
     names = [d.source for d in demonstrations]
     moves = [parse_move(text, names) for text in own["set_boundary"] or ()]

@@ -26,6 +26,7 @@ from skillframe.sequence import END, Composition, Part
 from skillframe.skill import Command, Observation, Skill, Status
 from skillframe_segmenter.document import PolicyDocument, read
 from skillframe_segmenter.observer import NOBODY, Gate
+from skillframe_segmenter.placed import Placed, is_placed, placement_of
 
 SETTLE_S = 0.15  # after entering a phase, before the gate may end it: three windows
 PATIENCE = 20  # windows
@@ -34,7 +35,7 @@ PATIENCE = 20  # windows
 def build(document: Document) -> Policy:
     """The runnable policy of a checked document."""
     policy = read(document)
-    parts = [Part(f"phase {i + 1}", _maker(sub)) for i, sub in enumerate(policy.skills)]
+    parts = [Part(f"phase {i + 1}", _placed(document, i, _maker(sub))) for i, sub in enumerate(policy.skills)]
     center = read_frame(document).center_of_compliance
     return Policy(parts, policy, None if policy.model is None else Gate(policy.model, center))
 
@@ -42,6 +43,14 @@ def build(document: Document) -> Policy:
 def _maker(document: Document) -> Callable[[], Skill]:
     kind = registry().skill(document["type"])
     return lambda: kind.build(document)
+
+
+def _placed(document: Document, index: int, make: Callable[[], Skill]) -> Callable[[], Skill]:
+    """The phase where its place is, if it belongs to one."""
+    if not is_placed(document["phases"][index]):
+        return make
+    placement = placement_of(document, index)
+    return lambda: Placed(placement, make)
 
 
 class Policy(Composition):

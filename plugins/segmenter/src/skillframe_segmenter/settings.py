@@ -77,6 +77,7 @@ class PolicySettings(Cutting):
         phases: how many there are; found where it is not given.
         recoveries: how often a run may go back to an earlier phase.
         set_boundary: a list of "DEMONSTRATION:BOUNDARY=SECONDS" that a person has moved, counted as they stand without.
+        places: learn in the frames of the places that the recordings name; where they name none it says nothing.
     """
 
     segmenter: str = "wrench_hmm"
@@ -84,3 +85,4 @@ class PolicySettings(Cutting):
     phases: int | None = None
     recoveries: int = 1
     set_boundary: tuple[str, ...] | None = None
+    places: bool = True

@@ -1,0 +1,121 @@
+"""From demonstrations that name places to a policy whose phases each belong to a place.
+
+What is done at each place is learned from all demonstrations seen from it, as a policy of its own: whether the place
+takes one motion or several is found there. So places of one board are never pooled, and a board that stood elsewhere
+in each demonstration is no noise. Ways in free air are the mean of the demonstrations in the place's frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from skillframe.demonstration.places import KEY, as_plain, places_of, seen_from
+from skillframe.demonstration.record import Demonstration
+from skillframe.document.frame import frame_of
+from skillframe.errors import InputError
+from skillframe.extend.records import Document, LearnOptions
+from skillframe.frames import Pose, norm
+from skillframe_segmenter.boundaries import OPTION
+from skillframe_segmenter.visits import BASE, Visit, index_at, path_of, visits_of
+
+FASTEST, SLOWEST = 0.25, 0.02  # m/s, in free air
+NOWHERE = Pose(np.zeros(3), np.eye(3))
+LearnPlace = Callable[[Sequence[Demonstration], LearnOptions], Document]
+
+
+def names_places(demonstrations: Sequence[Demonstration]) -> bool:
+    """Whether all demonstrations name places."""
+    return bool(demonstrations) and all(bool(places_of(d)) for d in demonstrations)
+
+
+def learn_places(
+    demonstrations: Sequence[Demonstration], options: LearnOptions, recoveries: int, moved: bool, learn: LearnPlace
+) -> Document:  # fmt: skip
+    """The body of a policy whose phases belong to places.
+
+    Args:
+        demonstrations: all naming places.
+        options: handed to the learner of each place.
+        recoveries: of the whole.
+        moved: a person has asked for boundaries to be moved, which here are between places.
+        learn: learns what is done at a place, from demonstrations in its frame.
+
+    Raises:
+        InputError: demonstrations that do not agree on places, or one that cannot be learned from.
+    """
+    if moved:
+        raise InputError(OPTION, "moves boundaries between phases of one frame, and these demonstrations name places",
+                         "give --set places=false, or leave it out")  # fmt: skip
+    visits, scatters = visits_of(demonstrations)
+    frames = [{**places_of(d), BASE: NOWHERE} for d in demonstrations]
+    count = len(visits[0])
+    phases = []
+    for k in range(count):
+        here = [each[k] for each in visits]
+        seen = [seen_from(d, f[here[0].place]) for d, f in zip(demonstrations, frames, strict=True)]
+        phases.append(_phase(seen, here, _speed(demonstrations, visits), options, learn, scatters[k]))
+    used = {phase["place"] for phase in phases} - {BASE}
+    return {
+        "frame": frame_of(demonstrations, options),
+        "phases": phases,
+        "recoveries": recoveries,
+        KEY: as_plain({name: frames[0][name] for name in sorted(used)}),
+        "phase_model": {"type": "places", "successors": np.eye(count, count + 1, 1).tolist()},
+        "demonstrations": [_row(d, each) for d, each in zip(demonstrations, visits, strict=True)],
+    }
+
+
+def _phase(
+    seen: Sequence[Demonstration], visits: Sequence[Visit], speed: float, options: LearnOptions, learn: LearnPlace,
+    scatter: dict[str, float],
+) -> Document:  # fmt: skip
+    pairs = list(zip(seen, visits, strict=True))
+    ways = [[_mean([_pose(d, t) for d, t in column]) for column in columns] for columns in (
+        [[(d, v.far) for d, v in pairs], [(d, v.near) for d, v in pairs]],
+        [[(d, v.out[i]) for d, v in pairs if i < len(v.out)] for i in range(min(len(v.out) for v in visits))],
+    )]  # fmt: skip
+    body = learn([d.between(v.near, v.leaves) for d, v in pairs], options)
+    return {
+        "place": visits[0].place, "skill": "policy", "speed": speed, "learned": body,
+        "way_in": _plain(ways[0]), "way_out": _plain(ways[1]), "touch_scatter_m": scatter,
+    }  # fmt: skip
+
+
+def _pose(demonstration: Demonstration, time: float) -> Pose:
+    i = index_at(demonstration, time)
+    return Pose(demonstration.position[i], demonstration.pose.rotation[i])
+
+
+def _mean(poses: Sequence[Pose]) -> Pose:
+    """Mean position, and the rotation nearest to the mean of rotation matrices."""
+    left, _, right = np.linalg.svd(np.mean([pose.rotation for pose in poses], axis=0))
+    rotation = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    return Pose(np.mean([pose.position for pose in poses], axis=0), rotation)
+
+
+def _plain(poses: Sequence[Pose]) -> list[dict[str, list[float]]]:
+    return list(as_plain({str(i): pose for i, pose in enumerate(poses)}).values())
+
+
+def _speed(demonstrations: Sequence[Demonstration], visits: Sequence[Sequence[Visit]]) -> float:
+    """Median speed between places [m/s], within what an arm can do carefully."""
+    speeds: list[float] = []
+    for d, mine in zip(demonstrations, visits, strict=True):
+        path = path_of(d)
+        for before, after in pairwise(mine):
+            first, last = (index_at(d, t) for t in ((before.out or (before.leaves,))[-1], after.far))
+            if last > first:
+                length = float(norm(np.diff(path[first : last + 1], axis=0)).sum())
+                speeds.append(length / float(d.time[last] - d.time[first]))
+    return float(np.clip(np.median(speeds), SLOWEST, FASTEST)) if speeds else SLOWEST
+
+
+def _row(demonstration: Demonstration, visits: Sequence[Visit]) -> Document:
+    """A row of `demonstrations`: boundaries where the tool has left a place."""
+    return {
+        "file": demonstration.source, "start": float(demonstration.time[0]), "end": float(demonstration.time[-1]),
+        "boundaries": [(v.out or (v.leaves,))[-1] for v in visits[:-1]], "labels": list(range(len(visits))),
+    }  # fmt: skip
