@@ -5,6 +5,7 @@ from __future__ import annotations
 from skillframe.extend.records import Document, Illustration
 from skillframe.extend.registry import registry
 from skillframe_segmenter.document import PolicyDocument, read
+from skillframe_segmenter.explained import words as explained_words
 from skillframe_segmenter.pictures import cuts
 from skillframe_segmenter.placed import is_placed, learned_of
 from skillframe_segmenter.policy import successor_words
@@ -41,6 +42,7 @@ def describe(document: Document) -> list[str]:
         )
     again = f"retried at most {policy.recoveries} time{'s' * (policy.recoveries != 1)}"
     lines.append(f"a phase that fails (its force, time or travel limit) is {again if policy.recoveries else 'the end'}")
+    lines += explained_words(document["explained"]) if "explained" in document else []
     for row in document.get("demonstrations", []):
         cuts = ", ".join(f"{t:.2f} s" for t in row["boundaries"]) or "nowhere"
         lines.append(
