@@ -23,7 +23,8 @@ from skillframe.parts.checks import (
 from skillframe.parts.declared import DENSITY, FixtureFile, mesh_files, read_fixture
 from skillframe.parts.field import error_of, memory_of, surface_of
 from skillframe.parts.fit import PartsFit, corners, fit, lowest, tilted
-from skillframe.parts.pieces import MOST_PIECES, ConvexPieces, pieces_of
+from skillframe.parts.kept import pieces_of
+from skillframe.parts.pieces import MOST_PIECES, ConvexPieces
 from skillframe.parts.solid import MeshPart, arrays_of, read_part
 from skillframe.world.surfaces import Surface, available
 
@@ -141,8 +142,8 @@ def _prepared(plug: MeshPart, socket: MeshPart, found: PartsFit) -> tuple[Prepar
         InputError: neither is, or there is no compiler for surfaces.
     """
     pairs = ((plug, found.plug), (socket, found.socket))
-    made = []
-    for part, solid in pairs:
+    made = {}
+    for part, solid in sorted(pairs, key=lambda pair: -pair[1].num_tri()):  # the one that is likelier to be refused
         side = _in_pieces(solid, found)
         assert side.pieces is not None
         refused = unfit_pieces(side.pieces, found, part)
@@ -151,9 +152,9 @@ def _prepared(plug: MeshPart, socket: MeshPart, found: PartsFit) -> tuple[Prepar
             raise InputError(part.name, what, refused.fix)
         if refused is not None:
             break
-        made.append(side)
+        made[part.name] = side
     else:
-        return made[0], made[1]
+        return made[plug.name], made[socket.name]
     surfaces = [_as_surface(part, solid, found) for part, solid in pairs]
     return surfaces[0], surfaces[1]
 

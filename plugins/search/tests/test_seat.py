@@ -1,7 +1,6 @@
 """Seating: what demonstrations, user and hand give, which part follows which, and what is added to the push."""
 
 from dataclasses import replace
-from itertools import pairwise
 from math import radians, sqrt, tan
 from pathlib import Path
 
@@ -13,7 +12,6 @@ from skillframe_search.example import seated
 from skillframe_search.phase import read_phase
 from skillframe_search.reach import Reach
 from skillframe_search.seat_document import Seat, part_of, read_seat
-from skillframe_search.seat_learner import _way_begins
 
 from skillframe.cli.main import run as typed
 from skillframe.demonstration.npz import write_npz
@@ -380,27 +378,3 @@ def test_what_the_command_cannot_compose_is_one_sentence(tmp_path, capsys):
         assert typed(["learn", file, *more, "--out", str(tmp_path / "a.json")]) == 2
         told = capsys.readouterr().err
         assert said in told and told.count("\n") == 1
-
-
-def tip_path(*corners):
-    """Places (T, 3) on straight lines between corners, 100 on each."""
-    return np.concatenate([np.linspace(a, b, 100) for a, b in pairwise(corners)])
-
-
-def test_the_way_of_loose_parts_is_where_the_tip_came_from_and_not_where_it_slid():
-    # straight down through a wide hole, then 2 mm aside on the shoulder, which is the first that is touched
-    path = tip_path((0.0, 0.0, 0.02), (0.0, 0.0, 0.001), (0.002, 0.0, 0.0))
-    begins = _way_begins(path, 100)
-    way = (path[-1] - begins) / np.linalg.norm(path[-1] - begins)
-    assert np.degrees(np.arccos(-way[2])) < np.degrees(0.002 / 0.02) + 0.1  # the slide over all of the length
-    slid = path[-1] - path[100]
-    assert np.degrees(np.arccos(-slid[2] / np.linalg.norm(slid))) > 60.0  # what contact alone would have said
-
-
-def test_where_contact_begins_early_or_the_tip_came_from_aside_the_way_begins_at_the_contact():
-    down = tip_path((0.0, 0.0, 0.02), (0.0, 0.0, 0.012), (0.0, 0.0, 0.0))
-    np.testing.assert_array_equal(_way_begins(down, 100), down[100])
-    aside = tip_path((0.04, 0.0, 0.02), (0.0, 0.0, 0.01), (0.0, 0.0, 0.0))
-    np.testing.assert_array_equal(_way_begins(aside, 100), aside[100])
-    shallow = tip_path((0.0, 0.0, 0.02), (0.0, 0.0, 0.004), (0.0, 0.0, 0.0))  # a free way down, then a shallow hole
-    np.testing.assert_array_equal(_way_begins(shallow, 100), shallow[100])

@@ -1,0 +1,30 @@
+"""Where the way of a seating begins, by paths of a tip that are drawn by hand."""
+
+from itertools import pairwise
+
+import numpy as np
+from skillframe_search.seat_learner import _way_begins
+
+
+def tip_path(*corners):
+    """Places (T, 3) on straight lines between corners, 100 on each."""
+    return np.concatenate([np.linspace(a, b, 100) for a, b in pairwise(corners)])
+
+
+def test_the_way_of_loose_parts_is_where_the_tip_came_from_and_not_where_it_slid():
+    # straight down through a wide hole, then 2 mm aside on the shoulder, which is the first that is touched
+    path = tip_path((0.0, 0.0, 0.02), (0.0, 0.0, 0.001), (0.002, 0.0, 0.0))
+    begins = _way_begins(path, 100)
+    way = (path[-1] - begins) / np.linalg.norm(path[-1] - begins)
+    assert np.degrees(np.arccos(-way[2])) < np.degrees(0.002 / 0.02) + 0.1  # the slide over all of the length
+    slid = path[-1] - path[100]
+    assert np.degrees(np.arccos(-slid[2] / np.linalg.norm(slid))) > 60.0  # what contact alone would have said
+
+
+def test_where_contact_begins_early_or_the_tip_came_from_aside_the_way_begins_at_the_contact():
+    down = tip_path((0.0, 0.0, 0.02), (0.0, 0.0, 0.012), (0.0, 0.0, 0.0))
+    np.testing.assert_array_equal(_way_begins(down, 100), down[100])
+    aside = tip_path((0.04, 0.0, 0.02), (0.0, 0.0, 0.01), (0.0, 0.0, 0.0))
+    np.testing.assert_array_equal(_way_begins(aside, 100), aside[100])
+    shallow = tip_path((0.0, 0.0, 0.02), (0.0, 0.0, 0.004), (0.0, 0.0, 0.0))  # a free way down, then a shallow hole
+    np.testing.assert_array_equal(_way_begins(shallow, 100), shallow[100])
