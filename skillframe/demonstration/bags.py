@@ -2,7 +2,8 @@
 
 The pose is a topic of `PoseStamped`, `PoseWithCovarianceStamped`, `TransformStamped` or `Odometry`, or of `JointState`
 with the robot whose forward kinematics it is, or what the bag's transforms say of one frame in another (`transforms`);
-the wrench is a topic of `WrenchStamped`. Every topic keeps its own clock, and both are joined on time as two files are.
+the wrench is a topic of `WrenchStamped`. States of a Franka hold both (`franka`). Every topic keeps its own clock, and
+both are joined on time as two files are.
 The clock is that of the headers, because a bag's receive times are late by up to seconds and jitter; it starts at 0
 with the pose's first stamp, which the metadata keeps, because seconds since 1970 leave a double no more than 0.24 us.
 """
@@ -30,6 +31,7 @@ from skillframe.demonstration.bagfile import (
     topics_of,
 )
 from skillframe.demonstration.columns import POSITION, QUATERNION, WRENCH, Columns
+from skillframe.demonstration.franka import FRANKA, FRANKA_NOTE, six, tool_poses_of, wrenches_of
 from skillframe.demonstration.metafile import read_meta
 from skillframe.demonstration.options import ReadOptions, read_options
 from skillframe.demonstration.record import Demonstration
@@ -47,6 +49,7 @@ POSES: Mapping[str, Callable[[Any], tuple[Any, Any]]] = {
     "nav_msgs/msg/Odometry": lambda m: (m.pose.pose.position, m.pose.pose.orientation),
 }
 JOINTS, WRENCHES = "sensor_msgs/msg/JointState", "geometry_msgs/msg/WrenchStamped"
+POSE_TYPES, WRENCH_TYPES = [*POSES, *FRANKA], [WRENCHES, *FRANKA]
 FORCE_WORDS = ("wrench", "force", "franka", "robotstate", "torque")
 """What types of messages are called that may hold a wrench."""
 STAMP_START = "header_stamp_start_ns"
@@ -84,7 +87,7 @@ def read_bag(path: Path, options: Mapping[str, Any], tool_poses: ToolPoses) -> D
         none = {name: np.zeros(len(recorded[0].messages)) for name in WRENCH}
         return assemble(pose.with_values({**pose, **none}), {**meta, STAMP_START: zero}, _plain(chosen), notes)
     wrench = _wrench(path, recorded[1], zero, chosen)
-    notes += _frame_note(recorded, chosen, meta)
+    notes += [FRANKA_NOTE] if recorded[1].kind in FRANKA else _frame_note(recorded, chosen, meta)
     joined = replace(_plain(chosen), wrench=path)  # a second source, so that cuts keep a margin until they are joined
     return assemble(pose, {**meta, STAMP_START: zero}, joined, notes, wrench)
 
@@ -104,10 +107,10 @@ def _refuse_text_options(path: Path, options: ReadOptions) -> None:
 
 
 def _pose_topic(path: Path, topics: Mapping[str, str], options: ReadOptions) -> str:
-    kinds = [JOINTS] if options.robot is not None else list(POSES)
-    name = _chosen(
-        path, topics, options.pose_topic, [*POSES, JOINTS] if options.robot is None else kinds, "pose", kinds
-    )
+    states = [k for k in FRANKA if k in topics.values()] if not any(k in POSES for k in topics.values()) else []
+    kinds = [JOINTS] if options.robot is not None else states or list(POSES)
+    allowed = [*POSE_TYPES, JOINTS] if options.robot is None else kinds
+    name = _chosen(path, topics, options.pose_topic, allowed, "pose", kinds)
     if topics[name] == JOINTS and options.robot is None:
         raise InputError(f"{path}: {name}", "holds joint states", "name the robot they are of with --robot")
     return name
@@ -115,9 +118,11 @@ def _pose_topic(path: Path, topics: Mapping[str, str], options: ReadOptions) -> 
 
 def _wrench_topic(path: Path, topics: Mapping[str, str], options: ReadOptions, meta: Mapping[str, Any]) -> str | None:
     """The wrench's topic, or None where the metadata says that nothing was touched and there is none."""
-    if options.wrench_topic is None and meta.get("contact") is False and WRENCHES not in topics.values():
+    there = any(kind in WRENCH_TYPES for kind in topics.values())
+    if options.wrench_topic is None and meta.get("contact") is False and not there:
         return None
-    return _chosen(path, topics, options.wrench_topic, [WRENCHES], "wrench", [WRENCHES])
+    plain = [k for k in FRANKA if k in topics.values()] if WRENCHES not in topics.values() else []
+    return _chosen(path, topics, options.wrench_topic, WRENCH_TYPES, "wrench", plain or [WRENCHES])
 
 
 def _chosen(
@@ -201,6 +206,9 @@ def _pose(path: Path, recorded: Recorded, zero: int, options: ReadOptions, tool_
         names, positions = _joint_positions(path, recorded)
         pose = tool_poses(options.robot, options.arm, names, positions)
         values = np.concatenate([pose.position, quaternion_from_matrix(pose.rotation)], axis=1)
+    elif recorded.kind in FRANKA:
+        with fields_of(path, recorded.topic, recorded.kind):
+            values = tool_poses_of(recorded.kind, recorded.messages)
     else:
         pick = POSES[recorded.kind]
         with fields_of(path, recorded.topic, recorded.kind):
@@ -236,9 +244,10 @@ def _joint_rows(path: Path, recorded: Recorded) -> tuple[list[str], Float]:
 def _wrench(path: Path, recorded: Recorded, zero: int, options: ReadOptions) -> Columns:
     columns = _clock(path, recorded, zero, options.wrench_rate or options.rate, "--wrench-rate")
     with fields_of(path, recorded.topic, recorded.kind):
-        parts = [message.wrench for message in recorded.messages]
-        rows = [(w.force.x, w.force.y, w.force.z, w.torque.x, w.torque.y, w.torque.z) for w in parts]
-        values = np.array(rows, dtype=float)
+        if recorded.kind in FRANKA:
+            values = wrenches_of(recorded.kind, recorded.messages)
+        else:
+            values = np.array([six(message.wrench) for message in recorded.messages], dtype=float)
     columns.update(zip(WRENCH, values.T.copy(), strict=True))
     return Columns(columns, f"{path}: {recorded.topic}")
 
