@@ -4,7 +4,8 @@ The force is in contact where it leaves its free-air level by more than \(\max(6
 being the typical scatter of the force vector and \(F_{99}\) its 99th percentile (inertia and what is left of the weight
 count in proportion to how hard the task presses), until it falls below half of that; intervals closer than 50 ms are
 one, shorter ones are spikes. Where the noise alone sets the bound, the force is averaged first, over as many samples as
-bring it down to the others, 50 ms at most: else a noisy sensor's contact would count as free air. The free-air level is
+bring it down to the others, 50 ms at most: else a noisy sensor's contact would count as free air. What scatter the
+averaged force has left is measured, since vibration averages less than white noise does. The free-air level is
 the mean of the first 0.25 s, that is, a recording is taken to start in free air unless another stretch is named. A
 stall (`demonstration.stalls`) is neither: it ends a contact, and what follows it shows no onset. All of this is our
 choice.
@@ -17,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.conditioning.noise import NoiseFigures
+from skillframe.conditioning.noise import NoiseFigures, scatter_left
 from skillframe.errors import InputError
 from skillframe.frames import Float, norm
 
@@ -74,8 +75,10 @@ def contact_strength(
         return strength, contact_threshold(noise, strength)
     total = np.concatenate([np.zeros((1, 3)), np.cumsum(force, axis=0)])
     first = np.clip(np.arange(len(time)) - width // 2, 0, len(time) - width)
-    strength = norm((total[first + width] - total[first]) / width)
-    return strength, max(SIGMAS * _scatter(noise) / np.sqrt(width), _least(strength))
+    force = (total[first + width] - total[first]) / width
+    left = max(_scatter(noise) / float(np.sqrt(width)), scatter_left(time, force, alive))
+    strength = norm(force)
+    return strength, max(SIGMAS * left, _least(strength))
 
 
 def free_air_level(time: Float, wrench: Float, stretch: tuple[float, float] | None = None) -> Float:

@@ -86,6 +86,12 @@ def has_window(time: Float, alive: NDArray[np.bool_]) -> bool:
     return bool(len(_windows(time, alive)[1]))
 
 
+def scatter_left(time: Float, force: Float, alive: NDArray[np.bool_] | None = None) -> float:
+    """Typical scatter of a force (T, 3) that was averaged over samples: the median length over the windows [N]."""
+    width, live = _windows(time, alive)
+    return float(np.median(np.linalg.norm(detrended_std(_cut(force, width)[live]), axis=1))) if len(live) else 0.0
+
+
 def detrended_std(windows: Float) -> Float:
     """Standard deviation (K, C) about the best straight line within windows (K, W, C), unbiased for white noise."""
     width = windows.shape[1]

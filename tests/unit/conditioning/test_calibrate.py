@@ -9,10 +9,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from skillframe.cli.main import run
+from skillframe.conditioning.audit import audit
 from skillframe.conditioning.calibrate import calibrate
 from skillframe.demonstration.calibration import Calibration, read_calibration, write_calibration
 from skillframe.errors import InputError
 from skillframe.extend.reading import read_demonstration
+from skillframe.frames import norm
 from skillframe.paths import recordings_dir
 
 BIAS, MASS, COM = np.array([9.0, -1.0, 10.0, 0.1, 0.2, -0.3]), 0.9, np.array([0.01, -0.02, 0.06])
@@ -193,7 +195,12 @@ def test_a_real_sensors_24_poses_calibrate_it_and_explain_another_recording(tmp_
     )  # fmt: skip
     from skillframe.conditioning.offline import smooth
 
-    assert np.sqrt(np.mean(smooth(moving).wrench[:, :3] ** 2)) < 0.6  # its vibration alone reads 0.2 to 0.65 N
+    assert np.sqrt(np.mean(norm(smooth(moving).wrench[:, :3]) ** 2)) < 0.6  # its vibration alone reads 0.2 to 0.65 N
+    assert audit(moving).contacts == []
+    motion = [str(place / "1-baseline_orientations.csv"), "--wrench", str(place / "1-baseline_wrench.csv")]
+    start = ["--units", "us", "--position", "0,0,0", "--zero-time", "--to", "0.4", "--out", str(tmp_path / "no.json")]
+    assert run(["calibrate", *motion, *start]) == 2  # it turns by 1 degree
+    assert "weight and bias cannot be told apart" in capsys.readouterr().err and not (tmp_path / "no.json").exists()
 
 
 @pytest.mark.parametrize(("degrees", "used"), [(0.5, False), (2.0, True)])
