@@ -19,6 +19,7 @@ HOMES = {
     "command:reproduce": "papers",
     "command:benchmark": "benchmarks",
     **{f"score:automate_{name}": "benchmarks" for name in ("distance", "height")},
+    **{f"score:{name}": "benchmarks" for name in ("insertion_points", "jerk", "force_time", "energy", "path")},
 }
 """The entry point, and folder under plugins/, of every name that is not the core's."""
 

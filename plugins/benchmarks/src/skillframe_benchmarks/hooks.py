@@ -9,11 +9,19 @@ from skillframe.extend.outputs import ScoreType
 from skillframe.extend.records import Lazy
 
 skillframe_contract = "0.2"
+INSERTION = (
+    ("insertion_points", "1", "points of the AI for Industry Challenge, of 100"),
+    ("jerk", "m/s^3", "mean magnitude of the jerk while the tool moves"),
+    ("force_time", "s", "longest time on end with a measured force above 20 N"),
+    ("energy", "J", "mechanical work of the hand, given and taken alike"),
+    ("path", "m", "length of the tip's way"),
+)
+"""Name, unit and summary of the scores of an insertion."""
 
 
 @hookimpl
 def skillframe_scores() -> Iterable[ScoreType]:
-    """The two figures that AutoMate's check of an assembly looks at."""
+    """The two figures that AutoMate's check of an assembly looks at, and an insertion's points and what makes them."""
     yield ScoreType(
         name="automate_height", unit="m", compute=Lazy("skillframe_benchmarks.scores:height"),
         summary="height of the held part's origin above where it is when assembled, at the end",
@@ -22,3 +30,8 @@ def skillframe_scores() -> Iterable[ScoreType]:
         name="automate_distance", unit="m", compute=Lazy("skillframe_benchmarks.scores:distance"),
         summary="mean distance of four key points on a line of 1 m from where they are when assembled, at the end",
     )  # fmt: skip
+    for name, unit, summary in INSERTION:
+        yield ScoreType(
+            name=name, unit=unit, compute=Lazy(f"skillframe_benchmarks.insertion:{name.removeprefix('insertion_')}"),
+            summary=summary,
+        )  # fmt: skip

@@ -1,0 +1,112 @@
+"""The 100 points of the AI for Industry Challenge for one insertion, and the figures that they are made of.
+
+Rules: docs/scoring.md of github.com/intrinsic-dev/aic, as of 2026-03-13. 1 point for a trial that ran; up to 6 for
+smoothness, 12 for time, 6 for a short way, where the third tier gives any; 75 for success, else 38 to 50 for part of
+the way in or up to 25 for being near; -12 for force, -24 for a collision. The port is the fixture's origin, into which
+the way is `progress` deep. There is one port, so none is wrong.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from skillframe.frames import Float, matrix_from_quaternion, norm
+
+if TYPE_CHECKING:
+    from skillframe.execution.trace import Trace
+
+WINDOW, ORDER = 15, 2
+"""Samples and degree of the local polynomial that is fitted to the velocity."""
+MOVING_M_S, ROUGH = 0.01, 50.0
+"""Speed from which jerk counts [m/s], and the jerk that earns nothing [m/s^3]."""
+FORCE_N, FORCE_S = 20.0, 1.0
+"""A force above this [N] for longer than that [s] costs points."""
+QUICK_S, SLOW_S, DETOUR_M = 5.0, 60.0, 1.0
+ASIDE_M = 0.005
+"""How far from the port's axis, along x and along y, a part still counts as inside [m]."""
+
+
+def jerk(trace: Trace) -> float:
+    """Mean magnitude of the jerk while the tool moves [m/s^3], by samples of the trace. NaN if it is too short."""
+    from scipy.signal import savgol_filter
+
+    velocity = trace.twist[:, :3]
+    moves = norm(velocity) > MOVING_M_S
+    if len(velocity) < WINDOW or not moves.any():
+        return math.nan
+    step = float(np.median(np.diff(trace.time)))
+    return float(norm(savgol_filter(velocity, WINDOW, ORDER, deriv=2, delta=step, axis=0))[moves].mean())
+
+
+def force_time(trace: Trace) -> float:
+    """The longest time on end for which the measured force is above 20 N [s]."""
+    longest, since = 0.0, None
+    for time, high in zip(trace.time.tolist(), (norm(trace.wrench[:, :3]) > FORCE_N).tolist(), strict=True):
+        since = (time if since is None else since) if high else None
+        longest = max(longest, 0.0 if since is None else time - since)
+    return longest
+
+
+def energy(trace: Trace) -> float:
+    """Mechanical work of the hand at the centre of compliance, given and taken alike [J]."""
+    power = np.abs(np.sum(trace.command_wrench * trace.twist, axis=1))
+    return float(np.sum(0.5 * (power[1:] + power[:-1]) * np.diff(trace.time)))
+
+
+def path(trace: Trace) -> float:
+    """Length of the tip's way [m]."""
+    return float(np.sum(norm(np.diff(_tip(trace), axis=0))))
+
+
+def points(trace: Trace) -> float:
+    """Points of a trial. NaN in a world without a fixture or a depth."""
+    meta = trace.meta
+    deep = (meta.get("progress") or {}).get("of_m")
+    names = [each["name"] for each in meta.get("bodies", ())]
+    if not deep or "fixture" not in names:
+        return math.nan
+    tip = _from_port(trace, _tip(trace), names.index("fixture"))
+    start = float(np.linalg.norm(tip[0]))
+    third = 75.0 if meta["success"] else _short_of_success(tip[-1], float(deep), 0.5 * start)
+    penalty = 12.0 * (force_time(trace) > FORCE_S) + 24.0 * bool(meta.get("touched"))
+    return 1.0 + third - penalty + (_motion(trace, start) if third > 0.0 else 0.0)
+
+
+def _motion(trace: Trace, start: float) -> float:
+    """The second tier without its penalties. A trial too short for a jerk did not move to speak of."""
+    rough = jerk(trace)
+    return (
+        6.0 * _left(0.0 if math.isnan(rough) else rough, 0.0, ROUGH)
+        + 12.0 * _left(float(trace.meta["duration_s"]), QUICK_S, SLOW_S)
+        + 6.0 * _left(path(trace), start, start + DETOUR_M)
+    )
+
+
+def _short_of_success(tip: Float, deep: float, far: float) -> float:
+    """The third tier of a trial that failed, from where the tip (3,) ended, seen from the port."""
+    if abs(tip[0]) <= ASIDE_M and abs(tip[1]) <= ASIDE_M and tip[2] < 0.0:
+        return 38.0 + 12.0 * min(1.0, -float(tip[2]) / deep)
+    return 25.0 * _left(float(np.linalg.norm(tip)), 0.0, far) if far > 0.0 else 0.0
+
+
+def _left(value: float, best: float, worst: float) -> float:
+    """1 up to the best value, 0 from the worst one on, a line between."""
+    return min(1.0, max(0.0, (worst - value) / (worst - best)))
+
+
+def _tip(trace: Trace) -> Float:
+    """(T, 3) way of the tip in base [m], or of the centre of compliance where a tool names no tip."""
+    center = np.array(trace.meta.get("center_of_compliance", np.zeros(3)))
+    tip = np.array(trace.meta.get("frames", {}).get("tip", center)) - center
+    result: Float = trace.position + matrix_from_quaternion(trace.quaternion) @ tip
+    return result
+
+
+def _from_port(trace: Trace, way: Float, fixture: int) -> Float:
+    """(T, 3) points of base in the fixture frame."""
+    turn = matrix_from_quaternion(trace.body_quaternion[:, fixture])
+    result: Float = np.einsum("tji,tj->ti", turn, way - trace.body_position[:, fixture])
+    return result
