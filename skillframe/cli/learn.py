@@ -48,10 +48,12 @@ OF_ONE_PHASE = "lmc"
     "--blind", multiple=True, type=click.Path(path_type=Path),
     help="A recorded blind search, to learn that of --exception from (repeatable).",
 )  # fmt: skip
+@click.option("--leave-one-out", is_flag=True, help="Say what each demonstration contributes, and which contradicts.")
 @click.option("--json", "as_json", is_flag=True, help="Print the skill document as JSON on stdout as well.")
 def command(
     files: tuple[Path, ...], out: Path, skill: str, at: str | None, hand: str | None, axes: str,
-    settings: tuple[str, ...], exception: str | None, blind: tuple[Path, ...], as_json: bool,
+    settings: tuple[str, ...], exception: str | None, blind: tuple[Path, ...], leave_one_out: bool,
+    as_json: bool,
 ) -> int:  # fmt: skip
     """Learn a skill from FILES, demonstrations of one phase, and say in words what was learned.
 
@@ -79,13 +81,18 @@ def command(
     elif blind:
         raise InputError("--blind", "is for the search of --exception", "give --exception search as well")
     demonstrations = demonstrations_of(files)
+    told: list[str] = []
     with warned():
         learned = learn_with(demonstrations, kind, options)
+    if leave_one_out:
+        from skillframe.api.left_out import left_out
+
+        told = left_out(learned, demonstrations, registry().behaviour(kind), options)
     learned.save(out)
     if kind == OF_ONE_PHASE:
         _point_to_segment(demonstrations)
     made = f"{out}: {learned.type} from {len(files)} demonstration{'s' * (len(files) != 1)}"
-    tell([made, *learned.words], err=as_json)
+    tell([made, *learned.words, *told], err=as_json)
     if as_json:
         emit_json(learned.document)
     return 0

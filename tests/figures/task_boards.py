@@ -6,7 +6,7 @@ boards that stand elsewhere again, from starts up to 10 mm away. Boards are move
 side by side, and policies are told where the places are. A run counts if all five were done, in order, and it ended
 well.
 
-    python -m tests.figures.task_boards [places|base|pooled ...]
+    python -m tests.figures.task_boards [places|base|pooled ...] [policies=3] [boards=6]
 
 `base` learns from the same demonstrations with every place's pose written down as if the board had stood still, that
 is, in the base frame, with the same cuts; `pooled` is `segment --set places=false`.
@@ -44,7 +44,8 @@ from skillframe.world.placement import fixture_poses, places_in_base
 from skillframe.world.scene import Scene
 from skillframe.world.worlds.task_board import done_in_order
 
-LAYOUTS, POLICIES, EACH, BOARDS, SEED = (1, 2, 3), 3, 3, 6, 9100
+LAYOUTS, EACH, SEED = (1, 2, 3), 3, 9100
+COUNTS = {"policies": 3, "boards": 6}  # of a layout, and of a policy
 MOVES = {"offset_x": 0.05, "offset_y": 0.05, "tilt_x": 0.15, "tilt_z": 0.6}  # m, rad, each way
 AWAY, LONGEST_S, PLACES = 0.01, 80.0, 5
 
@@ -72,7 +73,11 @@ def places_at(scene: Scene, fixture: Pose) -> dict[str, Pose]:
 
 def shown(layout: int) -> list[Demonstration]:
     """Demonstrations for all policies of a board, each on one that stands elsewhere, as its metadata say."""
-    robot, scene, count = load_robot_model("free_tool"), load_world("task_board", {"layout": layout}), POLICIES * EACH
+    robot, scene, count = (
+        load_robot_model("free_tool"),
+        load_world("task_board", {"layout": layout}),
+        COUNTS["policies"] * EACH,
+    )
     columns = moves(layout, 0, count)
     starts = tuple({key: float(values[i]) for key, values in columns.items()} for i in range(count))
     there = replace(scene, task=replace(scene.task, starts=starts))
@@ -107,14 +112,15 @@ def told(document: Document, places: Mapping[str, Pose]) -> Skill:
 def runs(document: Document, layout: int, how: str, number: int) -> list[Outcome]:
     """A policy on boards that stand elsewhere again."""
     robot, scene = load_robot_model("free_tool"), load_world("task_board", {"layout": layout})
-    draws = moves(layout, 1 + number, BOARDS)
-    fixture = fixture_poses(robot, draws, BOARDS)
+    count = COUNTS["boards"]
+    draws = moves(layout, 1 + number, count)
+    fixture = fixture_poses(robot, draws, count)
     rng = np.random.default_rng([SEED, layout, number, 3])
-    draws |= {f"start.offset_{axis}": rng.uniform(-AWAY, AWAY, BOARDS) for axis in "xy"}
+    draws |= {f"start.offset_{axis}": rng.uniform(-AWAY, AWAY, count) for axis in "xy"}
     still = places_in_base(robot, scene)
     skill, setup = prepare(robot, scene, document, places=still)
     skill = told(document, places_at(scene, fixture)) if how == "places" else skill
-    rngs = [np.random.default_rng([SEED, layout, number, 4, i]) for i in range(BOARDS)]
+    rngs = [np.random.default_rng([SEED, layout, number, 4, i]) for i in range(count)]
     result = simulate(skill, setup, draws, rngs, duration_s=LONGEST_S, trace_hz=200.0)
     assert result.traces is not None
     outcomes = []
@@ -139,11 +145,11 @@ def places_done(trace: Trace, scene: Scene, fixture: Pose) -> int:
 def row(layout: int, how: str, demonstrations: list[Demonstration]) -> list[Outcome]:
     """All runs on one board."""
     outcomes: list[Outcome] = []
-    for number in range(POLICIES):
+    for number in range(COUNTS["policies"]):
         try:
             document = policy(demonstrations[EACH * number : EACH * (number + 1)], how, layout)
         except SkillframeError as error:
-            outcomes += [Outcome(False, 0, 0.0, f"not learned: {error}")] * BOARDS
+            outcomes += [Outcome(False, 0, 0.0, f"not learned: {error}")] * COUNTS["boards"]
             continue
         outcomes += runs(document, layout, how, number)
     return outcomes
@@ -151,8 +157,9 @@ def row(layout: int, how: str, demonstrations: list[Demonstration]) -> list[Outc
 
 def main(names: list[str]) -> None:
     """Print a row for each board and way of learning."""
+    COUNTS.update({key: int(value) for key, _, value in (name.partition("=") for name in names) if value})
     taught = {layout: shown(layout) for layout in LAYOUTS}
-    for how in names or ["places", "base", "pooled"]:
+    for how in [name for name in names if "=" not in name] or ["places", "base", "pooled"]:
         every = []
         for layout in LAYOUTS:
             outcomes = row(layout, how, taught[layout])
