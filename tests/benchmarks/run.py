@@ -221,7 +221,7 @@ def main():
     for name in CASES:
         batch(name)
     single("arm in the valley", 6.0)
-    single("arm with the peg", 4.0)
+    single("arm with the peg", 6.0)
     two_arms()
     interfaces.ratios(show)
     interfaces.real_time(show)
