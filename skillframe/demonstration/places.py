@@ -26,6 +26,7 @@ from skillframe.frames import (
 )
 
 KEY = "places"
+"""Of a recording's metadata, and the table of a file."""
 UNTURNED = [0.0, 0.0, 0.0, 1.0]
 UNIT_WITHIN = 0.01  # of a quaternion's norm, as in recordings
 _FIX = "write position = [x, y, z] and quaternion = [x, y, z, w], metres in base"
