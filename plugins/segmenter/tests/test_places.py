@@ -88,8 +88,14 @@ def test_visits_begin_and_end_where_the_tool_came_and_went():
 
 
 def test_a_contact_belongs_to_what_it_moved_with_and_not_to_what_was_nearer():
-    near = [named(d, lamp=Pose(d.position[250] + 0.001 * i * np.ones(3), rotation_matrix([0.0, 0.0, 2.0 * i])))
-            for i, d in enumerate(shown())]  # fmt: skip
+    aside = BOARD["level"].at(np.array([0.02, 0.0, 0.0]))  # named 20 mm beside where it was touched
+    near = [
+        named(
+            d, level=board.compose(aside),
+            lamp=Pose(d.position[250] + 0.001 * i * np.ones(3), rotation_matrix([0.0, 0.0, 2.0 * i])),
+        )
+        for i, (d, board) in enumerate(zip(shown(), STOOD, strict=True))
+    ]  # fmt: skip
     # the lamp follows the touch itself to 3 mm; what is fixed to the board agrees to the micrometre
     rows, scatters = visits_of(near)
     assert rows[0][0].place == "level"
