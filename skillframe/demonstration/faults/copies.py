@@ -54,7 +54,11 @@ def _copied(time: Float, values: Float) -> list[tuple[float, float, float]]:
         return []
     ends = np.append(fresh[1:], len(time)) - 1
     values, time, until = values[fresh], time[fresh], time[ends]
-    before = _last_equal(_bits(values, ends - fresh))
+    bits = _bits(values, ends - fresh)
+    ordered = np.sort(bits)
+    if not np.any(ordered[1:] == ordered[:-1]):
+        return []  # as in nearly every recording
+    before = _last_equal(bits)
     distance = np.where(before >= 0, np.arange(len(before)) - before, 0)
     edges = np.concatenate([[0], np.flatnonzero(np.diff(distance)) + 1, [len(distance)]])
     chosen = np.flatnonzero(distance[edges[:-1]] > 0)

@@ -189,3 +189,16 @@ def test_each_kind_says_what_where_and_what_it_touches() -> None:
         "another bias; it counts as neither free air, contact nor noise"
     )
     assert copy.words() == "the pose from 1.00 to 2.00 s is that from 5.00 to 6.00 s bit for bit"
+
+
+def test_a_level_is_a_fault_only_where_one_of_its_ends_shows() -> None:
+    """A part that was cut out of the new level has one bias throughout."""
+    step = Flaw("step", "fx", 4.0, 16.0, 2.0)
+    assert [step.within(a, b) for a, b in ((0.0, 16.0), (4.0, 16.0), (5.0, 9.0), (4.0, 17.0))] == [
+        True,
+        False,
+        False,
+        True,
+    ]
+    copy = step._replace(kind="copy")
+    assert copy.within(5.0, 9.0) and not copy.within(16.0, 20.0)
