@@ -6,7 +6,7 @@ nominal values. Shades are a guess by the surrogate, never a rate: the trials be
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import groupby
 
 import numpy as np
@@ -19,6 +19,7 @@ from skillframe.reports.asked import Asked
 from skillframe.reports.markup import Markup, figure, join, note, number, percent, tag
 from skillframe.reports.quantities import quantity
 from skillframe.reports.svg import Axes, picture
+from skillframe.reports.theory import Region, boundary, said
 
 CELLS = 60
 OVERLAP = 0.4
@@ -28,8 +29,13 @@ UNSURE = 0.674489750196082
 """Quantile of 75 % of the normal distribution: the guess gives success between 25 and 75 % inside the band (ours)."""
 
 
-def border_map(asked: Asked) -> Markup:
-    """The map with its caption, or a sentence where there is nothing to draw."""
+def border_map(asked: Asked, theory: Sequence[Region] = ()) -> Markup:
+    """The map with its caption, or a sentence where there is nothing to draw.
+
+    Args:
+        asked: the question.
+        theory: regions in which closed-form theory says that it works.
+    """
     surrogate = asked.surrogate()
     if surrogate is None:
         how = "succeeded" if len(asked.works) and asked.works.all() else "failed"
@@ -46,10 +52,12 @@ def border_map(asked: Asked) -> Markup:
     cut = _cut(asked)
     drawn = picture(
         axes, "Where trials are predicted to succeed", _shades(axes, surrogate, cut, across, up), axes.frame(),
-        _dots(axes, asked, across, up), _box(axes, asked, across, up), _breaking(axes, asked, across, up),
+        join(boundary(axes, (x, y), region) for region in theory), _dots(axes, asked, across, up),
+        _box(axes, asked, across, up), _breaking(axes, asked, across, up),
         class_="border-map",
     )  # fmt: skip
-    return figure("", _caption(asked, cut, across, up), drawn, class_="plot")
+    shown = [region for region in theory if region.name in (x.name, y.name)]
+    return figure("", _caption(asked, cut, across, up, shown), drawn, class_="plot")
 
 
 def _shown(ends: tuple[float, float], factor: float) -> tuple[float, float]:
@@ -132,19 +140,21 @@ def _breaking(axes: Axes, asked: Asked, across: int, up: int) -> Markup:
     ])  # fmt: skip
 
 
-def _caption(asked: Asked, cut: Float, across: int, up: int) -> Markup:
+def _caption(asked: Asked, cut: Float, across: int, up: int, theory: Sequence[Region]) -> Markup:
     rest = [i for i in range(len(asked.names)) if i not in (across, up)]
     at = asked.question.in_si(cut)
     shown = [(quantity(asked.names[i]), at[i]) for i in rest]
     held = [f"{q.label} {number(q.factor * value)} {q.unit}".strip() for q, value in shown]
+    picked = "many of them picked near the border" if asked.found.get(BORDER) else "spread evenly and no sample"
     parts: list[object] = [
         tag("span", "", class_="swatch holds"), " predicted to succeed, ", tag("span", "", class_="swatch fails"),
         " to fail, ", tag("span", "", class_="swatch unsure"), " as likely as not (25 to 75 %). Dots: trials that "
-        "were looked at, many of them picked near the border, so no rate may be read from them. ",
+        f"were looked at, {picked}, so no rate may be read from them. ",
     ]  # fmt: skip
     parts += ["Outline: the certified box. "] if (asked.predicate or {}).get("box") else []
     parts += ["Dashed: the box that was claimed. "] if asked.claim and not (asked.predicate or {}).get("box") else []
     parts += ["Cross: the smallest disturbance found. "] if asked.found.get(BREAK, {}).get("confirmed") else []
+    parts += [f"Dashed line: closed-form theory says that it works within {said(r)}. " for r in theory]
     parts += [f"The axes matter most; the cut is at {', '.join(held)}. "] if held else []
     found = asked.found.get(BORDER)
     if found:

@@ -24,6 +24,7 @@ from skillframe.reports.markup import Markup, join, number, percent, tag
 from skillframe.reports.quantities import quantity
 from skillframe.reports.scope import standing
 from skillframe.reports.sources import Chapter
+from skillframe.reports.theory import regions
 from skillframe.reports.who import facts
 
 ELSE = "real sensors, hands, wear, temperature, people"
@@ -75,10 +76,11 @@ def certificate_page(chapter: Chapter) -> Markup:
         "div", tag("p", words[found.word], class_="verdict-word"), tag("p", found.why), class_=f"verdict {found.word}"
     )
     beside, below = (_list(part) for part in (told[:BESIDE], told[BESIDE:]))
+    drawn = border_map(asked, regions(chapter.scene, asked.names))
     signed = tag("p", "Signed: ", tag("span", "", class_="line"), " Date: ", tag("span", "", class_="line short"))
     return tag(
         "section", tag("h2", f"Certificate: {chapter.name}"), head,
-        tag("div", beside, border_map(asked), class_="certified"), below, signed, class_="certificate",
+        tag("div", beside, drawn, class_="certified"), below, signed, class_="certificate",
         aria_label="Certificate",
     )  # fmt: skip
 

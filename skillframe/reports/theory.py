@@ -109,7 +109,7 @@ def theory_sentence(found: Sequence[Region], varied: Sequence[str]) -> Markup:
     """What the dashed lines are."""
     if not found:
         return Markup("")
-    regions = "; ".join(map(_said, found))
+    regions = "; ".join(map(said, found))
     text = f" Dashed: closed-form theory predicts that a compliant push succeeds from any start within {regions}"
     worlds = [n for n in varied if n.startswith("world.") and not any(n in region.over for region in found)]
     nominal = f" (at the nominal {', '.join(quantity(n).label for n in worlds)}, which varied)" if worlds else ""
@@ -118,7 +118,8 @@ def theory_sentence(found: Sequence[Region], varied: Sequence[str]) -> Markup:
     )
 
 
-def _said(region: Region) -> str:
+def said(region: Region) -> str:
+    """A region in words."""
     q = quantity(region.name)
     limit = f"|{q.label}| < {number(region.limit * q.factor)} {q.unit}".strip()
     over = ", ".join(quantity(name).label for name in region.over)

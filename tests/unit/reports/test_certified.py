@@ -13,6 +13,7 @@ from skillframe.reports.asked import Asked
 from skillframe.reports.border_map import border_map
 from skillframe.reports.certified import certificate_page, stand
 from skillframe.reports.sources import Chapter, read_chapters
+from skillframe.reports.theory import regions
 
 RANGES = {"fixture.offset_x": (-0.02, 0.02), "fixture.tilt_y": (-0.4, 0.4), "world.friction": (0.1, 0.5)}
 POINTS = 2.0 * qmc.Sobol(3, scramble=True, rng=np.random.default_rng(0)).random(128) - 1.0
@@ -98,3 +99,15 @@ def test_a_folder_with_a_question_gives_the_chapter_of_its_evidence(tmp_path):
     assert chapter.asked.works.tolist() == [False, True, False, True]
     assert chapter.asked.points[:, 0] == pytest.approx([0.0, 0.05, 0.1, 0.15])
     assert stand(chapter.asked).word == "undecided"
+
+
+def test_theorys_border_lies_where_it_says_and_even_trials_are_not_said_to_be_picked():
+    """0.2 rad of 0.4 to either side: a quarter of the frame from its ends."""
+    drawn = border_map(asked(), regions({"analytic": {"largest_tilt_rad": 0.2}}, list(RANGES)))
+    lines = re.findall(r'<line x1="([\d.]+)" x2="([\d.]+)" y1="[\d.]+" y2="[\d.]+" class="theory"', drawn)
+    across = pytest.approx([52.0 + 99.0, 448.0 - 99.0], abs=0.2)
+    assert sorted(float(a) for a, b in lines if a == b) == across
+    assert "theory says that it works within |fixture tilt about y| &lt; 11.5 °" in drawn
+    assert "spread evenly" in drawn and "picked near" not in drawn
+    searched = border_map(asked(found={"border": {"smallest_island": 0.02}}))
+    assert "picked near the border" in searched and "theory" not in searched
