@@ -7,7 +7,7 @@ import pytest
 from skillframe_dualarm.dual_peg import DualPegParams, build
 from skillframe_papers.published import INSERTION
 from skillframe_papers.rows.insertion import PUBLISHED, insert, largest, posed
-from skillframe_papers.rows.two_arms import phase_of
+from skillframe_papers.rows.sweep import phase_of
 
 from skillframe.errors import UnknownName
 from skillframe.execution.prepare import load_robot_model

@@ -6,10 +6,13 @@ from math import atan, degrees, radians
 import numpy as np
 import pytest
 from skillframe_papers import bars, committed, document, refresh, store
-from skillframe_papers.rows import crane, lmc, nulls, skills
+from skillframe_papers.rows import crane, lmc, nulls, skills, two_arms
+from skillframe_papers.rows.insertion import Row, link_weights, raised, sticking
+from skillframe_papers.rows.sweep import HEIGHTS_M, NAMES, Sweep
 from skillframe_papers.rows.uneven import Valley, valley_scene
 
 from skillframe.demonstration.record import Demonstration
+from skillframe.execution.prepare import load_robot_model
 from skillframe.extend.records import RowRun
 from skillframe.frames import Pose
 from skillframe.world.scene import State
@@ -91,6 +94,108 @@ def test_a_verdict_on_several_shares_is_the_worst_of_them_and_fails_beside_a_nul
     assert bars.together(["pass", "pass"], True) == "pass" and bars.together(["pass"], False) == "fail"
     assert bars.together(["pass", "reported"], True) == "reported"
     assert bars.together(["reported", "fail"], True) == "fail"
+
+
+def test_a_joint_weighs_as_much_as_the_chain_beyond_it_is_long():
+    robot = load_robot_model("dual_panda")
+    weights = link_weights(robot)
+    assert weights.shape == (2, 7) and np.allclose(weights[0], weights[1])
+    assert weights[0, 0] == 1.0 and np.all(np.diff(weights[0]) <= 0.0)
+    # Panda: d3 0.316, a 0.0825, d5 0.384 with a back, a 0.088, flange 0.107 [m], from joint 2 on (joints 1 and 2 meet)
+    steps = np.array([0.316, 0.0825, np.hypot(0.384, 0.0825), 0.0, 0.088, 0.107])
+    expected = np.cumsum(steps[::-1])[::-1] / steps.sum()
+    assert np.allclose(weights[0], [1.0, *expected], atol=2e-3)
+
+
+def test_friction_can_be_in_one_arm_alone_and_the_fixture_at_another_height():
+    robot = load_robot_model("dual_panda")
+    share = sticking(robot, 1).spec.friction_share
+    assert all(share[f"left_joint{i}"] == 0.0 for i in range(1, 8)) and share["right_joint5"] == 0.5
+    assert raised(robot, 0.8).spec.workspace.fixture == (0.0, 0.0, 0.8)
+
+
+def ended(tilt, outcome="success", stuck=0.5, force=5.0, time=3.0, path=1.0):
+    pair = (0.6 * path, 0.4 * path)
+    return Row(
+        tilt_deg=tilt, joint_friction=stuck, outcome=outcome, time_s=time, force_n=force, joint_path_rad=pair,
+        weighted_rad=pair, largest_joint_rad=pair, turned_deg=(0.0, 0.0), reason="",
+    )  # fmt: skip
+
+
+LIMITS = {"A": 4.0, "B": 12.0, "C": 0.0, "D": 8.0, "E": 12.0, "E*": 12.0}
+BOTH = [s * t for s in (1.0, -1.0) for t in (4.0, 6.0, 8.0, 10.0, 12.0, 14.0)]
+LESS = {"B": 3.0, "D": 2.0, "E": 1.0}
+
+
+def as_published(**changed):
+    """A sweep in which everything is as the paper has it, but for what is changed."""
+
+    def rows(name, stuck, limits=LIMITS):
+        less = LESS.get(name, 4.0)
+        return [
+            ended(t, "success" if not stuck or abs(t) <= limits[name] else "jam", stuck, less, less, less) for t in BOTH
+        ]
+
+    parts = {(n, f): rows(n, 0.5) for n in NAMES[:5] for f in (0.05, 0.2)}
+    parts["E", 0.05] = [ended(12.0, "common rotation")]
+    whole = {(n, p): [*rows(n, 0.0), *rows(n, 0.5)] for n in NAMES for p in ("upright", "mirrored")}
+    found = Sweep(whole, 0.5, {(n, h): rows(n, 0.5) for n in NAMES[:5] for h in HEIGHTS_M}, {}, parts, {})
+    return found._replace(**changed)
+
+
+def verdict(row, monkeypatch, found):
+    monkeypatch.setattr(two_arms, "sweep", lambda job: found)
+    monkeypatch.setattr(two_arms, "_picture", lambda found: None)
+    job = RowRun(settings={"speed": 0.02, "lead_force_n": 30.0})
+    return row(job)
+
+
+ROWS = (two_arms.table, two_arms.times, two_arms.paths, two_arms.signs, two_arms.failures, two_arms.forces,
+        two_arms.best)  # fmt: skip
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_what_comes_out_as_published_passes(row, monkeypatch):
+    assert verdict(row, monkeypatch, as_published()).verdict == "pass"
+
+
+def stuck_as(limits):
+    return [ended(t, "success" if abs(t) <= limits else "jam") for t in BOTH]
+
+
+def missing():
+    found = as_published()
+    free = [ended(t, stuck=0.0) for t in BOTH]
+    one = {**found.rows, ("E", "upright"): [*free, *stuck_as(0.0)]}
+    signed = [*free, *(ended(t, "success" if t >= -6.0 else "jam") for t in BOTH)]
+    return {
+        two_arms.table: {"heights": {**found.heights, ("D", 0.80): stuck_as(14.0)}},
+        two_arms.times: {"rows": one}, two_arms.paths: {"rows": one}, two_arms.forces: {"rows": one},
+        two_arms.best: {"rows": one},
+        two_arms.signs: {"rows": {**found.rows, ("B", "mirrored"): signed}},
+        two_arms.failures: {"parts": {**found.parts, ("E", 0.2): [ended(-8.0, "turned away")]}},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_each_of_these_rows_can_fail(row, monkeypatch):
+    assert verdict(row, monkeypatch, as_published(**missing()[row])).verdict == "fail"
+
+
+def test_where_no_pair_ever_turns_the_wrong_way_nothing_was_shown(monkeypatch):
+    never = {key: [r for r in rows if r.outcome != "common rotation"] for key, rows in as_published().parts.items()}
+    assert verdict(two_arms.failures, monkeypatch, as_published(parts=never)).verdict == "fail"
+
+
+@pytest.mark.parametrize(
+    ("master", "slave", "expected"), [("success", "jam", "pass"), ("jam", "jam", "fail"), ("success",) * 2 + ("fail",)]
+)
+def test_the_slave_is_to_blame_only_if_its_friction_alone_jams(master, slave, expected, monkeypatch):
+    def alone(settings, seed, arm, quick):
+        return [ended(s * t, (master, slave)[arm]) for t in (4.0, 8.0) for s in (1.0, -1.0)]
+
+    monkeypatch.setattr(two_arms, "stuck_in", alone)
+    assert verdict(two_arms.slave, monkeypatch, as_published()).verdict == expected
 
 
 def fake_document(number, fully=False):

@@ -100,30 +100,35 @@ def _executed() -> Iterable[RowType]:
 def _two_arms() -> Iterable[RowType]:
     chosen = "largest push 30 N, on B and D with joint friction, + sign"
 
-    def row(name: str, summary: str, published: str, bar: str, run: str, weak: str = "") -> RowType:
+    def row(name: str, summary: str, published: str, bar: str, run: str) -> RowType:
         return RowType(
-            name=name, summary=summary, published=published, source=TWO_ARMS, bar=bar, calibrated=chosen, weak=weak,
+            name=name, summary=summary, published=published, source=TWO_ARMS, bar=bar, calibrated=chosen,
             settings=INSERTION, group="two arms", run=Lazy(f"skillframe_papers.rows.two_arms:{run}"),
         )  # fmt: skip
 
     yield row("7", "two arms insert up to a tilt that depends on who gives way where (Table I)",
               "A 4, B 12, C fails at 4, D 8, E 12 degrees",
-              "with joint friction, + sign: each of A to E within 4 degrees (two steps) of the published",
-              "table")  # fmt: skip
+              "with joint friction, + sign, fixture at 0.70, 0.75 and 0.80 m (quick: 0.75): each of A to E within 4 "
+              "degrees (two steps) of the published", "table")  # fmt: skip
     yield row("8", "C fails because of static friction in the slave's joints", "C fails at 4 degrees",
-              "C at 8 degrees succeeds without joint friction and fails with it", "slave")  # fmt: skip
+              "C at 8 degrees, both signs: succeeds without joint friction and with the master's alone, fails with the "
+              "slave's alone", "slave")  # fmt: skip
     yield row("9", "both arms compliant insert in shorter time (from 8 degrees)", "B 26.5 s, D 13.0 s, E 5.0 s",
               "with joint friction, + sign: E inserts in less time than D, and D in less than B", "times")  # fmt: skip
-    yield row("10", "both arms compliant insert with less joint motion (from 8 degrees)", "B 1.45, D 0.99, E 0.59 rad",
-              "with joint friction, + sign: the joints of E move less than those of D, and D's less than B's",
-              "paths")  # fmt: skip
+    yield row("10", "both arms compliant insert with less joint motion (from 8 degrees, Table II)",
+              "B 1.45, D 0.99, E 0.59 rad; weighted by link length 1.18, 0.76, 0.51; largest joint 1.1, 0.47, 0.32",
+              "with joint friction, + sign: E less than D, and D less than B, in all three lines", "paths")  # fmt: skip
     yield row("11", "the opposite sign of the tilt works as well", "works",
-              "without joint friction the signs differ by at most 2 degrees for A to D", "signs",
-              "every configuration reaches the end of the sweep there, so the difference is 0 by its ceiling",
-              )  # fmt: skip
+              "signs differ by at most 2 degrees for A to D: with joint friction in both postures and at 0.70, 0.75, "
+              "0.80 m, without it in a sweep up to 24 degrees (quick: with it, upright, at 0.75 m)",
+              "signs")  # fmt: skip
     yield row("12", "the pair turns the wrong way only at large angles or low friction", "only there",
-              "without joint friction A to D never turn as a pair", "failures",
-              "all of these trials succeed, E is left out, and the friction of the parts is never varied")  # fmt: skip
+              "with joint friction, A to E, both signs: never at up to 8 degrees and friction of the parts of 0.2 or "
+              "more, and at least once at larger tilts or lower friction", "failures")  # fmt: skip
+    yield row("24", "both arms compliant push less hard (from 8 degrees)", "lower forces, no figures",
+              "with joint friction, + sign: E inserts with a smaller largest force than B", "forces")  # fmt: skip
+    yield row("25", "the learned parameters do best", "learned parameters produce the best results",
+              "with joint friction, + sign: E inserts from at least the largest tilt of A to D", "best")  # fmt: skip
 
 
 def _search() -> Iterable[RowType]:

@@ -19,19 +19,25 @@ from skillframe_dualarm.runtime import DualArm
 from skillframe.errors import UnknownName
 from skillframe.execution.arms import ArmsResult, simulate_arms
 from skillframe.execution.executor import Setup
-from skillframe.frames import rotate
+from skillframe.frames import Float, rotate
 from skillframe.robot.model import RobotModel
 from skillframe.world.placement import nominal_fixture
 from skillframe.world.scene import Scene
 from skillframe_papers.rows.outcome import classify
 
 POSTURES = ("upright", "mirrored")
+Arms = tuple[float, float]
 PUBLISHED = {
-    "A": {"largest_deg": 4.0}, "B": {"largest_deg": 12.0, "time_s": 26.5, "joint_path_rad": 1.45},
-    "C": {"largest_deg": 0.0}, "D": {"largest_deg": 8.0, "time_s": 13.0, "joint_path_rad": 0.99},
-    "E": {"largest_deg": 12.0, "time_s": 5.0, "joint_path_rad": 0.59},
+    "A": {"largest_deg": 4.0}, "B": {"largest_deg": 12.0, "time_s": 26.5}, "C": {"largest_deg": 0.0},
+    "D": {"largest_deg": 8.0, "time_s": 13.0}, "E": {"largest_deg": 12.0, "time_s": 5.0},
 }  # fmt: skip
-"""Table I and the figures at 8 degrees, both arms together; C failed at 4 degrees, the smallest tried."""
+"""Table I and times from 8 degrees. C failed at 4 degrees, the smallest tried."""
+MOTION: dict[str, tuple[Arms, Arms, Arms]] = {
+    "B": ((1.45, 0.0), (1.18, 0.0), (1.1, 0.0)),
+    "D": ((0.64, 0.35), (0.53, 0.23), (0.47, 0.19)),
+    "E": ((0.41, 0.18), (0.36, 0.15), (0.32, 0.13)),
+}
+"""Table II from 8 degrees, by arm [rad]: way of all joints, the same weighted by link length, largest of a joint."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +46,9 @@ class Row:
 
     Attributes:
         tilt_deg: at the start; joint_friction: of joints 1-4 [Nm]; outcome: of `CLASSES`.
-        force_n: largest contact force; joint_path_rad: way of all joints, by arm; turned_deg: about the tilt axis.
+        force_n: largest contact force; turned_deg: about the tilt axis, by arm.
+        joint_path_rad: way of all joints, by arm; weighted_rad: the same, see `link_weights`.
+        largest_joint_rad: way of the joint that moved most, by arm.
     """
 
     tilt_deg: float
@@ -48,8 +56,10 @@ class Row:
     outcome: str
     time_s: float
     force_n: float
-    joint_path_rad: tuple[float, float]
-    turned_deg: tuple[float, float]
+    joint_path_rad: Arms
+    weighted_rad: Arms
+    largest_joint_rad: Arms
+    turned_deg: Arms
     reason: str
 
 
@@ -70,6 +80,34 @@ def posed(robot: RobotModel, scene: Scene, posture: str) -> tuple[RobotModel, Sc
     model.jointPlacements[first] = half_turn * model.jointPlacements[first]
     turned_grip = replace(scene.holder, quaternion=(0.0, 0.0, 1.0, 0.0))  # the hole is round: its grip may be, too
     return replace(robot, model=model), replace(scene, holder=turned_grip)
+
+
+def raised(robot: RobotModel, height_m: float) -> RobotModel:
+    """The robot with its fixture at another height over the floor [m]."""
+    x, y, _ = robot.spec.workspace.fixture
+    return replace(robot, spec=replace(robot.spec, workspace=replace(robot.spec.workspace, fixture=(x, y, height_m))))
+
+
+def sticking(robot: RobotModel, arm: int) -> RobotModel:
+    """The robot with joint friction in one arm alone: 0, the master, or 1, the slave."""
+    other = robot.spec.arm[1 - arm].name
+    none = {name: 0.0 for name in robot.model.names if name.startswith(f"{other}_")}
+    return replace(robot, spec=replace(robot.spec, friction_share={**robot.spec.friction_share, **none}))
+
+
+def link_weights(robot: RobotModel) -> Float:
+    """Weight (2, J) of each joint: length of the chain from it to the flange over that of the whole chain.
+
+    The paper says "weighted by link length" and no more; this is our reading. Both arms are alike.
+    """
+    model, found = robot.model, []
+    for frame in robot.tool_frames:
+        flange = model.frames[frame]
+        joints = list(model.supports[flange.parentJoint])[1:]
+        steps = [model.jointPlacements[j].translation for j in joints[1:]] + [flange.placement.translation]
+        beyond = np.cumsum([float(np.linalg.norm(step)) for step in steps][::-1])[::-1]
+        found.append(beyond / beyond[0])
+    return np.array(found)
 
 
 def insert(
@@ -96,16 +134,21 @@ def rows_of(result: ArmsResult, robot: RobotModel, tilt_deg: np.ndarray, frictio
     """The result as rows. Tilts are about the fixture's y axis."""
     axis = rotate(nominal_fixture(robot).rotation, np.array([0.0, 1.0, 0.0]))
     outcome = classify(result, np.radians(tilt_deg), axis)
-    path, turned = result.joint_path_rad.sum(-1), np.degrees(result.turned_rad @ axis)
+    turned, ways = np.degrees(result.turned_rad @ axis), result.joint_path_rad
+    path, weighted, most = ways.sum(-1), (ways * link_weights(robot)).sum(-1), ways.max(-1)
     return [
         Row(
             tilt_deg=float(tilt_deg[i]), joint_friction=float(friction[i]), outcome=outcome[i],
             time_s=float(result.duration_s[i]), force_n=float(result.peak_force_n[i]),
-            joint_path_rad=(float(path[i, 0]), float(path[i, 1])),
-            turned_deg=(float(turned[i, 0]), float(turned[i, 1])), reason=str(result.reason[i]),
+            joint_path_rad=_arms(path[i]), weighted_rad=_arms(weighted[i]), largest_joint_rad=_arms(most[i]),
+            turned_deg=_arms(turned[i]), reason=str(result.reason[i]),
         )
         for i in range(len(tilt_deg))
     ]  # fmt: skip
+
+
+def _arms(values: Float) -> Arms:
+    return float(values[0]), float(values[1])
 
 
 def largest(rows: Sequence[Row], sign: int, friction: float) -> float:

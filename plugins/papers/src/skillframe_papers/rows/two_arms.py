@@ -1,124 +1,83 @@
-"""Rows 7 to 12 of the papers' results: Table I of the two-arm paper and what it says about it.
+"""Rows 7 to 12, 24 and 25 of the papers' results: Table I and II of the two-arm paper, and what it says about them.
 
-All rows read one sweep: configurations A to E (and the relative task E*), tilts of both signs, with and without joint
-friction, arms standing and one of them hanging. It is computed once for the rows of the group.
+All rows read one sweep (`sweep`). A *null* is what a row's claim must be told from: the same bar, without the cause
+that the paper names. Each row prints what its null comes to.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import cache
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
 
 import numpy as np
-from skillframe_dualarm.document import Arm, Phase, configured, relative
 
-from skillframe.execution.prepare import load_robot_model, load_world
 from skillframe.extend.records import Illustration, RowResult, RowRun
-from skillframe_papers.rows.insertion import POSTURES, PUBLISHED, Row, insert, largest
+from skillframe_papers.rows.insertion import MOTION, PUBLISHED, Arms, Row
+from skillframe_papers.rows.sweep import HEIGHTS_M, Sweep, stuck_in, sweep
 
-NAMES = ("A", "B", "C", "D", "E", "E*")
-FULL, QUICK = (4.0, 6.0, 8.0, 10.0, 12.0, 14.0), (4.0, 8.0, 12.0)
 STEP_DEG = 2.0
 FAR_DEG = 4.0
 """The quick sweep's step, and what C, which fails at the first tilt of the paper, may be off by."""
-DIFFERENCE = {
-    "7": "A reaches further than the published 4 (with no stiffness along compliant axes the centre of compliance "
-    "enters through damping and the line of the push only), and E is worse than B: both arms are free along x and "
-    "about y, so that nothing holds the pair, which turns as a whole. Holding it (E*, ours) removes that.",
-    "9": "Times depend on the speed, which is ours (20 mm/s), the paper's is not given; E does not insert with joint "
-    "friction.",
-    "10": "Postures and speed are ours; E moves more than B without joint friction and does not insert with it.",
-    "11": "With joint friction one sign helps A; the paper does not say which sign it shows.",
-    "12": "Failure (c) comes with E already at smaller angles than published: see row 7.",
-}
-
-
-class Sweep(NamedTuple):
-    """Insertions by configuration and posture, each over both frictions of the joints and both signs."""
-
-    rows: dict[tuple[str, str], list[Row]]
-    stiff: float
-
-    def of(self, name: str, posture: str = "upright", *, stuck: bool) -> list[Row]:
-        """Rows of a configuration, with joint friction or without."""
-        return [r for r in self.rows[name, posture] if (r.joint_friction > 0.0) == stuck]
-
-    def reach(self, name: str, sign: int, posture: str = "upright", *, stuck: bool) -> float:
-        """Largest tilt of a sign up to which all succeed [degrees]."""
-        return largest(self.of(name, posture, stuck=stuck), sign, self.stiff if stuck else 0.0)
-
-    @property
-    def names(self) -> list[str]:
-        """Configurations that were run."""
-        return [n for n in NAMES if (n, "upright") in self.rows]
-
-    @property
-    def postures(self) -> list[str]:
-        """Those that were run."""
-        return [p for p in POSTURES if ("A", p) in self.rows]
-
-
-def _sweep(job: RowRun) -> Sweep:
-    return _computed(tuple(sorted(job.settings.items())), job.seed, job.quick)
-
-
-@cache
-def _computed(settings: tuple[tuple[str, float], ...], seed: int, quick: bool) -> Sweep:
-    values = dict(settings)
-    scene = load_world("dual_peg", {"friction": values["world.friction"]})
-    robot = load_robot_model("dual_panda")
-    tilts = [sign * tilt for sign in (1.0, -1.0) for tilt in (QUICK if quick else FULL)]
-    rows = {}
-    for posture in POSTURES[:1] if quick else POSTURES:
-        for name in NAMES[:5] if quick else NAMES:
-            phase = phase_of(name, scene.tool.frames, values)
-            stiff = [0.0, values["robot.joint_friction"]]
-            rows[name, posture] = insert(
-                robot, scene, phase, tilts, stiff, posture=posture, seed=seed, duration_s=9.0 if quick else 20.0
-            )
-    return Sweep(rows, values["robot.joint_friction"])
-
-
-def phase_of(name: str, frames: dict[str, Any], values: Mapping[str, float]) -> Phase:
-    """A configuration of `NAMES`, "E*" for the relative task of E, pushed as the row's settings say."""
-    arm = Arm(center_of_compliance=frames["tip"], share=1.0), Arm(center_of_compliance=frames["tip"])
-    phase = Phase(arms=arm, lead_force_n=values["lead_force_n"], speed=values["speed"])
-    made = configured(phase, name[0], frames)
-    return relative(made) if name.endswith("*") else made
+WRONG = ("common rotation", "turned away")
+SLAVE = "the slave's alone"
+SMALL_DEG, ROUGH = 8.0, 0.2
+"""Up to this tilt and from this friction of the parts on, the paper has no pair turn the wrong way (our reading)."""
 
 
 def table(job: RowRun) -> RowResult:
-    """Row 7: Table I."""
-    sweep = _sweep(job)
-    names = sweep.names
-    reach = {n: sweep.reach(n, 1, stuck=True) for n in names}
-    unlike = _unlike(reach)
-    columns = [(stuck, posture) for stuck in (False, True) for posture in sweep.postures]
+    """Row 7: Table I, at every height of the fixture."""
+    found = sweep(job)
+    names, heights = found.names, found.heights_run
+    reach = {h: {n: found.reach_at(n, 1, h) for n in names[:5]} for h in heights}
+    unlike = {h: _unlike(reach[h]) for h in heights}
+    free = _unlike({n: found.reach(n, 1, stuck=False) for n in names[:5]})
+    columns = [(False, "upright"), *((True, posture) for posture in found.postures)]
     head = ["largest tilt [degrees]", "published"]
-    head += [f"{sweep.stiff if stuck else 0:g} Nm, {posture}, + / -" for stuck, posture in columns]
+    head += [f"{found.stiff if stuck else 0:g} Nm, {posture}, + / -" for stuck, posture in columns]
+    head += [f"{found.stiff:g} Nm, fixture at {h:.2f} m, + / -" for h in heights if h != HEIGHTS_M[1]]
     rows = [
         [n, _number(PUBLISHED.get(n, {}).get("largest_deg")),
-         *(_both(sweep, n, posture, stuck) for stuck, posture in columns)]
+         *(_both(found, n, posture, stuck) for stuck, posture in columns), *_at_heights(found, n)]
         for n in names
     ]  # fmt: skip
+    own = reach[HEIGHTS_M[1]]
     return RowResult(
-        ours=", ".join(f"{n} {reach[n]:g}" for n in names[:5])
-        + f" degrees at {sweep.stiff:g} Nm, + sign{unlike}",
-        verdict="fail" if unlike else "pass", difference=DIFFERENCE["7"], head=head, rows=rows,
-        values={f"largest_{n}_deg": reach[n] for n in names}, pictures=[_picture(sweep)],
+        ours=", ".join(f"{n} {own[n]:g}" for n in own) + f" degrees at {found.stiff:g} Nm, + sign, {HEIGHTS_M[1]} m; "
+        "not as published: " + ", ".join(f"{' and '.join(unlike[h]) or 'none'} at {h:.2f} m" for h in heights),
+        verdict="fail" if any(unlike.values()) else "pass", head=head, rows=rows, pictures=[_picture(found)],
+        values={f"largest_{n}_deg": own[n] for n in own},
+        difference=f"Null: without joint friction {' and '.join(free) or 'none'} are off.{_held(found)}",
     )  # fmt: skip
 
 
-def _unlike(reach: dict[str, float]) -> str:
-    """Which configurations are far from the paper's. "" if none is."""
+def _unlike(reach: dict[str, float]) -> list[str]:
+    """Which configurations are far from the paper's."""
     published = {n: PUBLISHED[n]["largest_deg"] for n in PUBLISHED if n in reach}
-    names = [n for n, value in published.items() if abs(reach[n] - value) > FAR_DEG]
-    return f"; {' and '.join(names)} not as published" if names else ""
+    return [n for n, value in published.items() if abs(reach[n] - value) > FAR_DEG]
 
 
-def _both(sweep: Sweep, name: str, posture: str, stuck: bool) -> str:
-    return " / ".join(f"{sweep.reach(name, sign, posture, stuck=stuck):g}" for sign in (1, -1))
+def _held(found: Sweep) -> str:
+    """What holding the pair changes: E beside E*."""
+    if "E*" not in found.names:
+        return ""
+    stuck = {n: found.of(n, stuck=True) for n in ("E", "E*")}
+    told = {n: f"{sum(r.outcome in WRONG for r in each)} of {len(each)}" for n, each in stuck.items()}
+    return (
+        " Both arms of E are free along x and about y, so that nothing holds the pair: with joint friction it turns "
+        f"the wrong way in {told['E']} insertions, and in {told['E*']} if it is held (E*, ours)."
+    )
+
+
+def _at_heights(found: Sweep, name: str) -> list[str]:
+    others = [h for h in found.heights_run if h != HEIGHTS_M[1]]
+    if (name, HEIGHTS_M[1]) not in found.heights:
+        return ["-"] * len(others)
+    return [" / ".join(f"{found.reach_at(name, sign, h):g}" for sign in (1, -1)) for h in others]
+
+
+def _both(found: Sweep, name: str, posture: str, stuck: bool) -> str:
+    if (name, posture) not in found.rows:
+        return "-"
+    return " / ".join(f"{found.reach(name, sign, posture, stuck=stuck):g}" for sign in (1, -1))
 
 
 def _number(value: float | None, unit: str = "") -> str:
@@ -126,107 +85,235 @@ def _number(value: float | None, unit: str = "") -> str:
 
 
 def slave(job: RowRun) -> RowResult:
-    """Row 8: configuration C with and without joint friction."""
-    sweep = _sweep(job)
-    outcome = {
-        (stuck, sign): next(r.outcome for r in sweep.of("C", stuck=stuck) if r.tilt_deg == sign * 8.0)
-        for stuck in (False, True) for sign in (1.0, -1.0)
+    """Row 8: configuration C with joint friction in one arm, in the other, in both and in none."""
+    found, key = sweep(job), tuple(sorted(job.settings.items()))
+    cases = {
+        "none": found.of("C", stuck=False), "the master's alone (the null)": stuck_in(key, job.seed, 0, job.quick),
+        SLAVE: stuck_in(key, job.seed, 1, job.quick), "both": found.of("C", stuck=True),
     }  # fmt: skip
-    good = outcome[False, 1.0] == "success" and outcome[True, 1.0] != "success"
-    rows = [
-        (f"{sweep.stiff if stuck else 0:g} Nm", outcome[stuck, 1.0], outcome[stuck, -1.0]) for stuck in (False, True)
-    ]
+    tilts = (4.0, -4.0, 8.0, -8.0)
+    ends = {where: [_ended(rows, tilt) for tilt in tilts] for where, rows in cases.items()}
+    worked = {where: [text.startswith("success") for text in each] for where, each in ends.items()}
+    none, master, slave, _ = (each[2:] for each in worked.values())
+    good = all(none) and all(master) and not any(slave)
     return RowResult(
-        ours=f"C at 8 degrees: {outcome[False, 1.0]} without joint friction, {outcome[True, 1.0]} with it",
-        verdict="pass" if good else "fail", head=("joint friction", "+8 degrees", "-8 degrees"), rows=rows,
+        ours=f"C from 8 degrees, signs that insert: {sum(none)} of 2 without joint friction, {sum(master)} with the "
+        f"master's alone, {sum(slave)} with the slave's alone; from 4 degrees with the slave's: "
+        f"{sum(worked[SLAVE][:2])} of 2",
+        verdict="pass" if good else "fail", head=("joint friction in", *(f"{tilt:+g} degrees" for tilt in tilts)),
+        rows=[(where, *each) for where, each in ends.items()],
+        difference=f"Null: the same friction in the master's joints, where the bar has {sum(not w for w in master)} of "
+        "2 fail. The paper has C fail at 4 degrees, too.",
     )  # fmt: skip
 
 
-def _at_8(sweep: Sweep, name: str, stuck: bool, sign: float = 1.0) -> Row:
-    return next(r for r in sweep.of(name, stuck=stuck) if r.tilt_deg == sign * 8.0)
+def _ended(rows: Sequence[Row], tilt: float) -> str:
+    row = next(r for r in rows if r.tilt_deg == tilt)
+    return f"success, {row.time_s:.1f} s" if row.outcome == "success" else row.outcome
 
 
-def _compared(job: RowRun, row: str, key: str, unit: str, text: Any, ours: Any) -> RowResult:
-    sweep = _sweep(job)
-    rows = [
-        [n, _number(PUBLISHED.get(n, {}).get(key), unit),
-         *(text(_at_8(sweep, n, stuck, sign)) for stuck in (False, True) for sign in (1.0, -1.0))]
-        for n in sweep.names
-    ]  # fmt: skip
-    found = ", ".join(f"{n}: {text(_at_8(sweep, n, True))}" for n in "BDE")
-    stiff = f"{sweep.stiff:g} Nm"
-    best = [ours(r) if (r := _at_8(sweep, n, True)).outcome == "success" else np.inf for n in "EDB"]
-    return RowResult(
-        ours=f"{found} with joint friction", difference=DIFFERENCE[row], rows=rows,
-        verdict="pass" if best[0] < best[1] < best[2] else "fail",
-        head=("", "published", "0 Nm, +", "0 Nm, -", f"{stiff}, +", f"{stiff}, -"),
-        values={f"{n}_{'stuck' if stuck else 'free'}": ours(_at_8(sweep, n, stuck)) for n in sweep.names
-                for stuck in (False, True)},
-    )  # fmt: skip
+def _at_8(found: Sweep, name: str, stuck: bool, sign: float = 1.0) -> Row:
+    return next(r for r in found.of(name, stuck=stuck) if r.tilt_deg == sign * 8.0)
+
+
+Measure = Callable[[Row], float]
+
+
+def _ordered(found: Sweep, measure: Measure, *, stuck: bool) -> bool:
+    """Whether E is below D, and D below B, at +8 degrees. What does not insert is above everything."""
+    e, d, b = (measure(r) if (r := _at_8(found, n, stuck)).outcome == "success" else np.inf for n in ("E", "D", "B"))
+    return e < d < b
+
+
+def _words(holds: bool) -> str:
+    return "holds" if holds else "does not hold"
+
+
+def _columns(found: Sweep) -> list[tuple[bool, float]]:
+    return [(stuck, sign) for stuck in (False, True) for sign in (1.0, -1.0)]
+
+
+def _heads(found: Sweep) -> list[str]:
+    return [f"{found.stiff if s else 0:g} Nm, {'+' if sign > 0 else '-'}" for s, sign in _columns(found)]
 
 
 def times(job: RowRun) -> RowResult:
     """Row 9: times to insert from 8 degrees."""
-    return _compared(job, "9", "time_s", " s", lambda r: f"{r.time_s:.1f} s" if r.outcome == "success" else r.outcome,
-                     lambda r: r.time_s)  # fmt: skip
+    found = sweep(job)
+
+    def text(row: Row) -> str:
+        return f"{row.time_s:.1f} s" if row.outcome == "success" else row.outcome
+
+    rows = [
+        [n, _number(PUBLISHED.get(n, {}).get("time_s"), " s"),
+         *(text(_at_8(found, n, s, sign)) for s, sign in _columns(found))]
+        for n in found.names
+    ]  # fmt: skip
+    stuck, free = (_ordered(found, lambda r: r.time_s, stuck=s) for s in (True, False))
+    return RowResult(
+        ours=", ".join(f"{n}: {text(_at_8(found, n, True))}" for n in "BDE") + " with joint friction",
+        verdict="pass" if stuck else "fail", rows=rows, head=("", "published", *_heads(found)),
+        difference=f"Null: without joint friction E < D < B {_words(free)}. Times depend on the speed, which is ours "
+        f"({1e3 * job.settings['speed']:g} mm/s); the paper's is not given. They end at the goal, by the simulator.",
+        values={f"{n}_{'stuck' if s else 'free'}": _at_8(found, n, s).time_s for n in found.names
+                for s in (False, True)},
+    )  # fmt: skip
+
+
+LINES: dict[str, tuple[int, Callable[[Row], Arms]]] = {
+    "way of all joints": (0, lambda r: r.joint_path_rad),
+    "weighted by link length": (1, lambda r: r.weighted_rad),
+    "largest way of a joint": (2, lambda r: r.largest_joint_rad),
+}
+"""Lines of Table II: their place in `MOTION`, and ours, by arm."""
 
 
 def paths(job: RowRun) -> RowResult:
-    """Row 10: joint motion from 8 degrees."""
+    """Row 10: joint motion from 8 degrees, all three lines of Table II."""
+    found = sweep(job)
+    rows, holds = [], {}
 
     def text(row: Row) -> str:
-        first, second = row.joint_path_rad
-        return f"{first + second:.2f} rad ({first:.2f} + {second:.2f})" if row.outcome == "success" else row.outcome
+        return f"{sum(row.joint_path_rad):.2f} rad" if row.outcome == "success" else row.outcome
 
-    return _compared(job, "10", "joint_path_rad", " rad", text, lambda r: sum(r.joint_path_rad))
+    for line, (place, of) in LINES.items():
+        holds[line] = [_ordered(found, _whole(place, of), stuck=s) for s in (True, False)]
+        for n in found.names:
+            published = _pair(MOTION[n][place]) if n in MOTION else "-"
+            cells = [_at_8(found, n, s, sign) for s, sign in _columns(found)]
+            rows.append([line, n, published, *(_pair(of(r)) if r.outcome == "success" else r.outcome for r in cells)])
+    stuck, free = (sum(each[i] for each in holds.values()) for i in (0, 1))
+    own = {n: _at_8(found, n, True) for n in "BDE"}
+    return RowResult(
+        ours=", ".join(f"{n}: {text(r)}" for n, r in own.items())
+        + f" with joint friction; E < D < B in {stuck} of {len(holds)} lines",
+        verdict="pass" if stuck == len(holds) else "fail", rows=rows,
+        head=("master, slave [rad]", "", "published", *_heads(found)),
+        difference=f"Null: without joint friction the order holds in {free} of {len(holds)} lines. Postures and speed "
+        "are ours. A joint's weight is the length of the chain from it to the flange over that of the whole chain, our "
+        "reading of the paper's words.",
+        values={f"{n}_{'stuck' if s else 'free'}": sum(_at_8(found, n, s).joint_path_rad) for n in found.names
+                for s in (False, True)},
+    )  # fmt: skip
+
+
+def _whole(place: int, of: Callable[[Row], Arms]) -> Measure:
+    """Of both arms: the larger one for the last line, else their sum."""
+    return (lambda row: max(of(row))) if place == 2 else (lambda row: sum(of(row)))
+
+
+def _pair(arms: Arms) -> str:
+    return f"{arms[0]:.2f}, {arms[1]:.2f}"
 
 
 def signs(job: RowRun) -> RowResult:
-    """Row 11: largest tilts of both signs."""
-    sweep = _sweep(job)
-    columns = [(stuck, posture) for stuck in (False, True) for posture in sweep.postures]
-
-    def apart(name: str, stuck: bool, posture: str) -> float:
-        plus, minus = (sweep.reach(name, sign, posture, stuck=stuck) for sign in (1, -1))
-        return abs(plus - minus)
-
-    free = max(apart(n, False, posture) for n in "ABCD" for posture in sweep.postures)
-    stuck = {n: max(apart(n, True, posture) for posture in sweep.postures) for n in sweep.names}
-    head = ["largest tilt [degrees]", *(f"{sweep.stiff if s else 0:g} Nm, {posture}, + / -" for s, posture in columns)]
-    rows = [[n, *(_both(sweep, n, posture, s) for s, posture in columns)] for n in sweep.names]
+    """Row 11: largest tilts of both signs, with the sweep's end out of reach where it can be."""
+    found = sweep(job)
+    names = found.names[:5]
+    reaches = {f"{found.stiff:g} Nm, {p}": _signed(found, p) for p in found.postures}
+    reaches |= {
+        f"{found.stiff:g} Nm, fixture at {h:.2f} m": {
+            n: (found.reach_at(n, 1, h), found.reach_at(n, -1, h)) for n in names
+        }
+        for h in found.heights_run
+        if h != HEIGHTS_M[1]
+    }
+    free = {n: (found.reach_free(n, 1), found.reach_free(n, -1)) for n in names} if found.beyond else {}
+    if free:
+        reaches["0 Nm, upright"] = free
+    worst = {n: max(abs(each[n][0] - each[n][1]) for each in reaches.values()) for n in names}
+    rows = [
+        [n, *(f"{c[n][0]:g} / {c[n][1]:g}" if n in c else "-" for c in reaches.values())] for n in found.names
+    ]  # fmt: skip
+    top = max((abs(r.tilt_deg) for each in found.beyond.values() for r in each), default=0.0)
+    ends = [n for n, each in free.items() if min(each) >= top]
     return RowResult(
-        ours=f"signs differ by {free:g} degrees without joint friction, A by {stuck['A']:g}, B to D by "
-        f"{max(stuck[n] for n in 'BCD'):g} with it",
-        verdict="pass" if free <= STEP_DEG else "fail", head=head, rows=rows,
-        difference=DIFFERENCE["11"] if stuck["A"] > STEP_DEG else "",
-        values={"apart_free_deg": free, "apart_a_stuck_deg": stuck["A"]},
+        ours="signs differ by " + ", ".join(f"{n} {worst[n]:g}" for n in "ABCD") + " degrees at most",
+        verdict="pass" if max(worst[n] for n in "ABCD") <= STEP_DEG else "fail", rows=rows,
+        head=["largest tilt, + / - [degrees]", *reaches],
+        difference=f"Null: E, both arms of which are free, so that nothing holds the pair: by {worst['E']:g} degrees."
+        + (f" Without joint friction the sweep ends at {top:g} degrees, where {' and '.join(ends)} are not told apart."
+           if ends else ""),
+        values={f"apart_{n}_deg": worst[n] for n in worst},
     )  # fmt: skip
+
+
+def _signed(found: Sweep, posture: str) -> dict[str, tuple[float, float]]:
+    names = [n for n in found.names if (n, posture) in found.rows]
+    return {n: (found.reach(n, 1, posture, stuck=True), found.reach(n, -1, posture, stuck=True)) for n in names}
 
 
 def failures(job: RowRun) -> RowResult:
-    """Row 12: how insertions fail."""
-    sweep = _sweep(job)
-    wrong = ("common rotation", "turned away")
-    free = sum(r.outcome in wrong for n in "ABCD" for p in sweep.postures for r in sweep.of(n, p, stuck=False))
-    rows = []
-    for name in sweep.names:
-        stuck = [r for p in sweep.postures for r in sweep.of(name, p, stuck=True)]
-        first = {kind: _first(stuck, kind) for kind in ("jam", *wrong)}
-        rows.append([name, *(first[kind] for kind in first)])
+    """Row 12: at which tilts and frictions of the parts pairs turn the wrong way."""
+    found = sweep(job)
+    frictions, names = sorted({f for _, f in found.parts}), found.names[:5]
+    tilts = sorted({abs(r.tilt_deg) for each in found.parts.values() for r in each})
+    rows, early, late = [], 0, 0
+    for friction in frictions:
+        for tilt in tilts:
+            cells = {n: [r for r in found.parts[n, friction] if abs(r.tilt_deg) == tilt] for n in names}
+            wrong = {n: sum(r.outcome in WRONG for r in each) for n, each in cells.items()}
+            rows.append([f"{friction:g}", f"{tilt:g}", *(f"{wrong[n]} of {len(cells[n])}" for n in names)])
+            if tilt <= SMALL_DEG and friction >= ROUGH:
+                early += sum(wrong.values())
+            else:
+                late += sum(wrong.values())
+    never = [n for n in names if not any(r.outcome in WRONG for f in frictions for r in found.parts[n, f])]
     return RowResult(
-        ours=f"{free} of A to D turn the wrong way without joint friction; with it, first failures as in the table",
-        verdict="pass" if free == 0 else "fail", difference=DIFFERENCE["12"], rows=rows,
-        head=("with joint friction, from", "jam", "common rotation", "turned away"),
-        values={"turned_the_wrong_way": float(free)},
+        ours=f"{early} pairs turn the wrong way at up to {SMALL_DEG:g} degrees and friction of the parts of {ROUGH:g} "
+        f"or more, {late} at larger tilts or lower friction",
+        verdict="pass" if early == 0 and late > 0 else "fail", rows=rows,
+        head=("friction of the parts", "tilt [degrees]", *(f"{n} turns the wrong way" for n in names)),
+        difference=f"Null: {', '.join(never) or 'none'} never turn the wrong way, and alone would miss the second half "
+        "of the bar. With joint friction, both signs.",
+        values={"early": float(early), "late": float(late)},
     )  # fmt: skip
 
 
-def _first(rows: Sequence[Row], kind: str) -> str:
-    found = [abs(r.tilt_deg) for r in rows if r.outcome == kind]
-    return f"{min(found):g} degrees" if found else "never"
+def forces(job: RowRun) -> RowResult:
+    """Row 24: contact forces from 8 degrees, to the goal and on to the bottom."""
+    found = sweep(job)
+
+    def text(row: Row) -> str:
+        return f"{row.force_n:.0f} N" + ("" if row.outcome == "success" else f", {row.outcome}")
+
+    rows, ends = [], [f"on to the bottom, {head}" for head in _heads(found)[2:]] if found.bottom else []
+    for n in found.names:
+        cells = [_at_8(found, n, s, sign) for s, sign in _columns(found)]
+        onward = [text(r) for r in found.bottom.get(n, [])] or ["-"] * len(ends)
+        rows.append([n, *(text(r) for r in cells), *onward])
+    stuck, free = ({n: _at_8(found, n, s) for n in "BE"} for s in (True, False))
+    good = stuck["E"].outcome == "success" and stuck["E"].force_n < stuck["B"].force_n
+    after = [r.force_n for n in "ABD" for r in found.bottom.get(n, [])]
+    return RowResult(
+        ours=f"to the goal with joint friction: B {text(stuck['B'])}, E {text(stuck['E'])}"
+        + (f"; run on to the bottom, A, B and D peak at {min(after):.0f} to {max(after):.0f} N" if after else ""),
+        verdict="pass" if good else "fail", head=("", *(f"to the goal, {head}" for head in _heads(found)), *ends),
+        rows=rows,
+        difference=f"Null: without joint friction, where E reaches {free['E'].force_n:.0f} N and B "
+        f"{free['B'].force_n:.0f} N. The paper gives no figures. A pair that comes free under the push of "
+        f"{job.settings['lead_force_n']:g} N hits the bottom after the goal, where nobody catches it.",
+    )  # fmt: skip
 
 
-def _picture(sweep: Sweep) -> Illustration:
+def best(job: RowRun) -> RowResult:
+    """Row 25: whether the parameters that are learned, E's, insert from the largest tilt."""
+    found = sweep(job)
+    stuck = {n: found.reach(n, 1, stuck=True) for n in found.names[:5]}
+    free = {n: found.reach_free(n, 1) for n in found.names[:5]}
+    others = max(value for n, value in stuck.items() if n != "E")
+    return RowResult(
+        ours=f"E, which is what is learned, {stuck['E']:g} degrees; the best of the others {others:g}",
+        verdict="pass" if stuck["E"] >= others else "fail",
+        head=("", "published [degrees]", f"{found.stiff:g} Nm, + [degrees]", "0 Nm, + [degrees]"),
+        rows=[(n, _number(PUBLISHED[n]["largest_deg"]), f"{stuck[n]:g}", f"{free[n]:g}") for n in stuck],
+        difference="Null: each of A to D in E's place, of which "
+        f"{' and '.join(n for n in 'ABCD' if stuck[n] < max(stuck.values())) or 'none'} miss the bar.",
+        values={"learned_deg": stuck["E"], "others_deg": others},
+    )  # fmt: skip
+
+
+def _picture(found: Sweep) -> Illustration:
     """Table I as bars: published, and ours with and without joint friction."""
     from matplotlib.figure import Figure
 
@@ -234,23 +321,24 @@ def _picture(sweep: Sweep) -> Illustration:
 
     figure = Figure(figsize=(7.0, 3.8))
     canvas = figure.add_subplot()
-    place = np.arange(len(sweep.names), dtype=float)
+    place = np.arange(len(found.names), dtype=float)
     bars = (
-        ("published", INK, [PUBLISHED.get(n, {}).get("largest_deg", np.nan) for n in sweep.names]),
-        (f"ours, {sweep.stiff:g} Nm, +", RED, [sweep.reach(n, 1, stuck=True) for n in sweep.names]),
-        (f"ours, {sweep.stiff:g} Nm, -", BLUE, [sweep.reach(n, -1, stuck=True) for n in sweep.names]),
-        ("ours, no joint friction, +", GREY, [sweep.reach(n, 1, stuck=False) for n in sweep.names]),
+        ("published", INK, [PUBLISHED.get(n, {}).get("largest_deg", np.nan) for n in found.names]),
+        (f"ours, {found.stiff:g} Nm, +", RED, [found.reach(n, 1, stuck=True) for n in found.names]),
+        (f"ours, {found.stiff:g} Nm, -", BLUE, [found.reach(n, -1, stuck=True) for n in found.names]),
+        ("ours, no joint friction, +", GREY, [found.reach(n, 1, stuck=False) for n in found.names]),
     )
     for i, (label, colour, heights) in enumerate(bars):
         drawn = canvas.bar(place + 0.2 * (i - 1.5), heights, width=0.19, color=colour, label=label)
         canvas.bar_label(drawn, fmt="%g", padding=1, fontsize=8)
-    canvas.set_xticks(place, sweep.names)
+    canvas.set_xticks(place, found.names)
     canvas.set_ylabel("largest tilt [degrees]")
     canvas.margins(y=0.12)
     canvas.legend(ncols=2, frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=9)
-    ours = " E* is ours: E as a relative task." if "E*" in sweep.names else ""
+    ours = " E* is ours: E as a relative task." if "E*" in found.names else ""
     caption = (
         "Largest tilt up to which every insertion succeeds; 0 fails at the smallest, and the sweep ends at "
-        f"{max(abs(r.tilt_deg) for r in sweep.rows['A', 'upright']):g} degrees.{ours}"
+        f"{max(abs(r.tilt_deg) for r in found.of('A', stuck=True)):g} degrees, without joint friction at "
+        f"{max(abs(r.tilt_deg) for r in found.of('A', stuck=False)):g}.{ours}"
     )
     return Illustration("Table I of the two-arm paper", caption, svg(figure))

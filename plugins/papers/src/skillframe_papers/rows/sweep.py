@@ -1,0 +1,157 @@
+"""The insertions that the rows of the two-arm paper read: configurations, tilts, joint friction, heights, parts.
+
+Computed once for all rows of the group. A configuration's insertions of one kind are one batch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any, NamedTuple
+
+from skillframe_dualarm.document import Arm, Phase, configured, relative
+
+from skillframe.execution.prepare import load_robot_model, load_world
+from skillframe.extend.records import RowRun
+from skillframe_papers.rows.insertion import POSTURES, Row, insert, largest, raised, sticking
+
+NAMES = ("A", "B", "C", "D", "E", "E*")
+COARSE, BETWEEN = (4.0, 8.0, 12.0), (6.0, 10.0, 14.0)
+"""Tilts of everything [degrees], and those that a full run adds upright with joint friction."""
+BEYOND = (16.0, 20.0, 24.0)
+"""Tilts at which configurations without joint friction go on, so that the sweep's end is not their limit [degrees]."""
+HEIGHTS_M = (0.70, 0.75, 0.80)
+"""Of the fixture over the floor; the robot's own is the middle one."""
+PARTS = (0.05, 0.4)
+"""Friction of the parts, beside the world's own."""
+PARTS_DEG = (8.0, 12.0)
+SECONDS, QUICK_SECONDS = 12.0, 9.0
+
+
+class Sweep(NamedTuple):
+    """Insertions by configuration.
+
+    Attributes:
+        rows: by posture, too: both signs, upright with both frictions of the joints, mirrored with joint friction.
+        stiff: the joint friction that is not zero [Nm].
+        heights: with joint friction, by the fixture's height [m]; the robot's own height is among them.
+        beyond: without joint friction, at tilts past the end of `rows`.
+        parts: with joint friction, by friction of the parts; the world's own is among them.
+        bottom: at +8 and -8 degrees with joint friction, run on to the bottom of the hole.
+    """
+
+    rows: dict[tuple[str, str], list[Row]]
+    stiff: float
+    heights: dict[tuple[str, float], list[Row]]
+    beyond: dict[str, list[Row]]
+    parts: dict[tuple[str, float], list[Row]]
+    bottom: dict[str, list[Row]]
+
+    def of(self, name: str, posture: str = "upright", *, stuck: bool) -> list[Row]:
+        """Rows of a configuration, with joint friction or without."""
+        return [r for r in self.rows[name, posture] if (r.joint_friction > 0.0) == stuck]
+
+    def reach(self, name: str, sign: int, posture: str = "upright", *, stuck: bool) -> float:
+        """Largest tilt of a sign up to which all succeed [degrees]."""
+        return largest(self.of(name, posture, stuck=stuck), sign, self.stiff if stuck else 0.0)
+
+    def reach_at(self, name: str, sign: int, height: float) -> float:
+        """The same with joint friction, upright, with the fixture at a height [m]."""
+        return largest(self.heights[name, height], sign, self.stiff)
+
+    def reach_free(self, name: str, sign: int) -> float:
+        """The same without joint friction, upright, up to the last tilt of `beyond`."""
+        return largest([*self.of(name, stuck=False), *self.beyond.get(name, [])], sign, 0.0)
+
+    @property
+    def names(self) -> list[str]:
+        """Configurations that were run."""
+        return [n for n in NAMES if (n, "upright") in self.rows]
+
+    @property
+    def postures(self) -> list[str]:
+        """Those that were run."""
+        return [p for p in POSTURES if ("A", p) in self.rows]
+
+    @property
+    def heights_run(self) -> list[float]:
+        """Heights of the fixture that were run [m]."""
+        return sorted({height for _, height in self.heights})
+
+
+def sweep(job: RowRun) -> Sweep:
+    """What a row's settings ask for. The rows of a group ask once."""
+    return _computed(tuple(sorted(job.settings.items())), job.seed, job.quick)
+
+
+def both(tilts: Sequence[float]) -> list[float]:
+    """Tilts of both signs, + first."""
+    return [sign * tilt for sign in (1.0, -1.0) for tilt in tilts]
+
+
+@cache
+def _computed(settings: tuple[tuple[str, float], ...], seed: int, quick: bool) -> Sweep:
+    values = dict(settings)
+    run = _Runs(values, seed, QUICK_SECONDS if quick else SECONDS)
+    stiff, own = values["robot.joint_friction"], values["world.friction"]
+    names, between = NAMES[:5], [] if quick else both(BETWEEN)
+    rows = {(n, POSTURES[0]): run(n, both(COARSE), [0.0, stiff]) + run(n, between, [stiff]) for n in names}
+    stuck = {n: [r for r in rows[n, POSTURES[0]] if r.joint_friction > 0.0] for n in names}
+    heights = {(n, HEIGHTS_M[1]): stuck[n] for n in names}
+    parts = {(n, own): [r for r in stuck[n] if abs(r.tilt_deg) in PARTS_DEG] for n in names}
+    others = PARTS[:1] if quick else PARTS
+    parts |= {(n, f): run(n, both(PARTS_DEG), [stiff], parts=f) for f in others for n in names}
+    beyond: dict[str, list[Row]] = {}
+    bottom: dict[str, list[Row]] = {}
+    if not quick:
+        rows["E*", POSTURES[0]] = run("E*", both(COARSE), [0.0, stiff])
+        rows |= {(n, POSTURES[1]): run(n, both(COARSE), [stiff], posture=POSTURES[1]) for n in names}
+        at = [(n, h) for h in (HEIGHTS_M[0], HEIGHTS_M[2]) for n in names]
+        heights |= {(n, h): run(n, both(COARSE), [stiff], height=h) for n, h in at}
+        beyond = {n: run(n, both(BEYOND), [0.0]) for n in names}
+        bottom = {n: run(n, [8.0, -8.0], [stiff], to_the_bottom=True) for n in names}
+    return Sweep(rows, stiff, heights, beyond, parts, bottom)
+
+
+class _Runs(NamedTuple):
+    """Insertions with a row's settings."""
+
+    values: Mapping[str, float]
+    seed: int
+    seconds: float
+
+    def __call__(
+        self, name: str, tilts: Sequence[float], stiff: Sequence[float], *, posture: str = "upright",
+        height: float | None = None, parts: float | None = None, to_the_bottom: bool = False,
+    ) -> list[Row]:  # fmt: skip
+        if not tilts:
+            return []
+        robot = load_robot_model("dual_panda")
+        robot = robot if height is None else raised(robot, height)
+        scene = load_world("dual_peg", {"friction": self.values["world.friction"] if parts is None else parts})
+        phase = phase_of(name, scene.tool.frames, self.values)
+        return insert(
+            robot, scene, phase, tilts, stiff, posture=posture, seed=self.seed, duration_s=self.seconds,
+            to_the_bottom=to_the_bottom,
+        )  # fmt: skip
+
+
+@cache
+def stuck_in(settings: tuple[tuple[str, float], ...], seed: int, arm: int, quick: bool) -> list[Row]:
+    """Configuration C at 4 and 8 degrees of both signs with joint friction in one arm alone: 0 master, 1 slave."""
+    values = dict(settings)
+    robot = sticking(load_robot_model("dual_panda"), arm)
+    scene = load_world("dual_peg", {"friction": values["world.friction"]})
+    phase = phase_of("C", scene.tool.frames, values)
+    stiff = [values["robot.joint_friction"]]
+    return insert(
+        robot, scene, phase, both([4.0, 8.0]), stiff, seed=seed, duration_s=QUICK_SECONDS if quick else SECONDS
+    )
+
+
+def phase_of(name: str, frames: dict[str, Any], values: Mapping[str, float]) -> Phase:
+    """A configuration of `NAMES`, "E*" for the relative task of E, pushed as the row's settings say."""
+    arm = Arm(center_of_compliance=frames["tip"], share=1.0), Arm(center_of_compliance=frames["tip"])
+    phase = Phase(arms=arm, lead_force_n=values["lead_force_n"], speed=values["speed"])
+    made = configured(phase, name[0], frames)
+    return relative(made) if name.endswith("*") else made
