@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from skillframe.conditioning.contact import first_free_air
 from skillframe.conditioning.noise import LEAST_SAMPLES, model_of, noise_figures
 from skillframe.conditioning.payload import Payload, gravity_in_tool, identify_payload, refuse_absurd
-from skillframe.demonstration.faults.fault import COPY, SATURATED, STEP
+from skillframe.demonstration.faults.fault import COPY, SATURATED
 from skillframe.demonstration.faults.find import alive, faults, remembered
 from skillframe.demonstration.record import Demonstration
 from skillframe.demonstration.stalls import stalls
@@ -22,7 +22,7 @@ from skillframe.signals.kalman import WrenchFilter, WrenchModel
 METHODS = ("smoother", "filter", "none")
 LEAST_STRETCH = 0.2
 LEAST_DOUBT = 0.5
-VERBS = {STEP: "steps to another bias", COPY: "is copied", SATURATED: "saturates"}
+VERBS = {COPY: "is copied", SATURATED: "saturates"}
 
 
 class Removed(NamedTuple):

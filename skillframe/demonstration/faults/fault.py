@@ -14,12 +14,12 @@ KEY = "faults"
 STEP, COPY, SATURATED, JUMP = "step", "copy", "saturation", "jump"
 KINDS = (STEP, COPY, SATURATED, JUMP)
 TOUCHES = {
-    STEP: "what follows has another bias; it counts as neither free air, contact nor noise",
+    STEP: "what follows may have another bias; a hard touch between two samples can look the same, so all of it counts",
     COPY: "what happened then is not known; it counts as neither free air, contact nor noise",
     SATURATED: "the sensor's range ended, and the force was larger; it counts as contact, but not as noise",
     JUMP: "before and after it are two recordings, and no motion leads from one to the other",
 }
-"""By kind, what a fault says of the rest."""
+"""By kind, what a fault says of the rest. A step is told and changes nothing: not every one is a fault."""
 
 
 class Flaw(NamedTuple):
@@ -74,6 +74,11 @@ class Flaw(NamedTuple):
         if self.kind == STEP:
             return first < self.start <= last or first <= self.stop < last
         return self.stop > first and self.start < last
+
+    @property
+    def acts(self) -> bool:
+        """Whether nothing is concluded or learned from where it is."""
+        return self.kind != STEP
 
 
 def kept(meta: Mapping[str, Any], source: str = "") -> list[Flaw]:

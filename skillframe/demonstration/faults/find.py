@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from skillframe.demonstration.faults import fault as record
 from skillframe.demonstration.faults.copies import copies
-from skillframe.demonstration.faults.fault import COPY, JUMP, SATURATED, STEP, Flaw
+from skillframe.demonstration.faults.fault import COPY, JUMP, SATURATED, Flaw
 from skillframe.demonstration.faults.jumps import jumps
 from skillframe.demonstration.faults.saturated import saturated
 from skillframe.demonstration.faults.steps import steps
@@ -85,7 +85,7 @@ def remembered(time: Float, pose: Float, wrench: Float, meta: Mapping[str, Any],
 def alive(
     demonstration: Demonstration, held: Sequence[Stall] | None = None, found: Sequence[Flaw] | None = None
 ) -> Mask:
-    """Mask (T,) of samples whose wrench is what the sensor measured, on the level of the start.
+    """Mask (T,) of samples whose wrench is what the sensor measured.
 
     Args:
         demonstration: as read.
@@ -95,7 +95,8 @@ def alive(
     time = demonstration.time
     held = stalls(demonstration) if held is None else held
     mask = np.ones(len(time), dtype=bool)
-    spans: list[Stall | Flaw] = [*held, *(faults(demonstration, held) if found is None else found)]
+    flaws = faults(demonstration, held) if found is None else found
+    spans: list[Stall | Flaw] = [*held, *(f for f in flaws if f.acts)]
     for span in spans:
         if span.what != POSE:
             mask &= (time < span.start) | (time > span.stop)
@@ -113,7 +114,7 @@ def pressing(demonstration: Demonstration, live: Mask, found: Sequence[Flaw]) ->
     mask, time = live.copy(), demonstration.time
     for fault in (f for f in found if f.kind == SATURATED):
         mask |= (time >= fault.start) & (time <= fault.stop)
-    for fault in (f for f in found if f.kind in (STEP, COPY) and f.what != POSE):
+    for fault in (f for f in found if f.kind == COPY and f.what != POSE):
         mask &= (time < fault.start) | (time > fault.stop)
     return mask
 
@@ -126,7 +127,7 @@ def refuse_faults(demonstration: Demonstration) -> None:
     """
     d = demonstration
     held = stalls(d)
-    found: list[Stall | Flaw] = sorted([*held, *faults(d, held)], key=lambda f: f.start)
+    found: list[Stall | Flaw] = sorted([*held, *(f for f in faults(d, held) if f.acts)], key=lambda f: f.start)
     if not found:
         return
     name = d.source or "demonstration"
@@ -142,8 +143,6 @@ def refuse_faults(demonstration: Demonstration) -> None:
 
 def _consequence(found: Stall | Flaw) -> str:
     kind = found.kind if isinstance(found, Flaw) else ""
-    if kind == STEP:
-        return "what follows has another bias, so nothing can be learned from the whole"
     if kind == JUMP:
         return "before and after it are two recordings, so nothing can be learned from the whole"
     if kind == SATURATED:
@@ -154,22 +153,18 @@ def _consequence(found: Stall | Flaw) -> str:
 def longest_part(demonstration: Demonstration, found: Sequence[Stall | Flaw]) -> tuple[float, float]:
     """Start and stop of the longest part without a stall or fault, one sample apart from each [s].
 
-    A step or a jump parts two sound stretches.
+    A jump parts two sound stretches.
     """
     step, last = 1.0 / demonstration.rate, float(demonstration.time[-1])
     begin, parts = float(demonstration.time[0]), []
-    for stop, again in sorted(gap for f in found for gap in _gaps(f, step, last)):
+    for stop, again in sorted(_gap(f, step) for f in found):
         parts.append((begin, stop))
         begin = max(begin, again)
     return max([*parts, (begin, last)], key=lambda part: part[1] - part[0])
 
 
-def _gaps(found: Stall | Flaw, step: float, last: float) -> list[tuple[float, float]]:
+def _gap(found: Stall | Flaw, step: float) -> tuple[float, float]:
     """Where what is sound ends and begins again [s]."""
-    kind = found.kind if isinstance(found, Flaw) else ""
-    if kind == JUMP:
-        return [(found.start, found.stop)]
-    if kind == STEP:
-        back = [(found.stop, found.stop + step)] if found.stop < last else []
-        return [(found.start - step, found.start), *back]
-    return [(found.start - step, found.stop + step)]
+    if isinstance(found, Flaw) and found.kind == JUMP:
+        return found.start, found.stop
+    return found.start - step, found.stop + step

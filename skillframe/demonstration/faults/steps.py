@@ -17,7 +17,8 @@ of the start. So a step is told only if the force comes further from the first 5
 there, and the force over that way and at its end is still J to a quarter, along J. Others, and steps of torques
 alone, are not told from contacts. One that is told lasts until the same channels step back by as much to a quarter,
 else to the end. Nothing is said below 50 Hz, where a hand pushes within one sample, or of a simulation without noise.
-All of this is our choice.
+A touch at the end of a motion, seen at 50 Hz, or a wrench whose axes are not those of the motion, can still pass for
+one: a step is told, and nothing is left out or refused by it. All of this is our choice.
 """
 
 from __future__ import annotations
