@@ -1,13 +1,15 @@
 """What rows are judged by: closed forms, nulls, and verdicts on insertions and switches made up here."""
 
 import json
+from dataclasses import replace
 from math import atan, degrees, radians
 
 import numpy as np
 import pytest
 from skillframe_papers import bars, committed, document, refresh, store
-from skillframe_papers.rows import crane, lmc, nulls, skills, two_arms
+from skillframe_papers.rows import crane, followed, lmc, nulls, phases, plain_cuts, skills, two_arms
 from skillframe_papers.rows.insertion import Row, link_weights, raised, sticking
+from skillframe_papers.rows.phases import Taught
 from skillframe_papers.rows.sweep import HEIGHTS_M, NAMES, Sweep
 from skillframe_papers.rows.uneven import Valley, valley_scene
 
@@ -196,6 +198,58 @@ def test_the_slave_is_to_blame_only_if_its_friction_alone_jams(master, slave, ex
 
     monkeypatch.setattr(two_arms, "stuck_in", alone)
     assert verdict(two_arms.slave, monkeypatch, as_published()).verdict == expected
+
+
+def taught(change):
+    return Taught(shown([1.0, 0.0, 0.0], [0.0, 0.0, 5.0]), change, change[1] + 0.5)
+
+
+def test_a_change_lasts_until_the_tool_has_followed_and_settles_when_it_has_done_so_for_good():
+    each = shown([0.0, 1.0, 0.0], [0.0, 0.0, 5.0])  # 20 mm/s along y, the way of the valley's second stage
+    position = each.position.copy()
+    position[(each.time >= 2.2) & (each.time < 2.5)] = position[np.searchsorted(each.time, 2.0)]  # sticks again
+    shaky = replace(each, position=position, meta={**each.meta, "stages": [2.0]})
+    found = phases._timed(shaky, phases.TASKS["valley"])
+    # 1 mm at 20 mm/s is 0.05 s; samples are 2 ms apart
+    assert found.change == pytest.approx((2.0, 2.05), abs=0.004) and found.settled == pytest.approx(2.5, abs=0.004)
+
+
+def test_a_group_is_off_by_its_worst_change_and_is_mislabelled_for_as_long_as_all_are_off():
+    new = [taught((2.0, 2.2))] * 3
+    found = phases._judged(2, True, [1.9, 2.1, 2.6], new)
+    assert (found.off, found.settled) == (pytest.approx(0.4), pytest.approx(0.1))
+    assert found.mislabelled == pytest.approx(0.5 / 15.0)  # of three demonstrations of 5 s
+    assert phases._judged(2, True, None, new).off == np.inf
+    assert phases._halved(new).off == pytest.approx(0.3)  # the middle of 5 s is 0.3 s after 2.2 s
+
+
+@pytest.mark.parametrize(("off", "halves", "expected"), [
+    ([0.1] * 12, [0.4] * 12, "pass"), ([0.1] * 10 + [0.4] * 2, [0.4] * 12, "reported"),
+    ([0.1] * 6 + [0.4] * 6, [0.4] * 12, "fail"), ([0.1] * 12, [0.1] * 12, "fail"),
+])  # fmt: skip
+def test_the_valley_s_row_fails_by_its_count_or_if_a_cut_in_the_middle_does_as_well(off, halves, expected, monkeypatch):
+    made = [[phases.Found(2, True, o, o, 0.01) for o in each] for each in (off, halves)]
+    monkeypatch.setattr(phases, "_all_found", lambda job, name: tuple(made))
+    monkeypatch.setattr(phases, "_picture", lambda job, name: None)
+    assert phases.valley(RowRun(settings={})).verdict == expected
+
+
+def test_rules_are_counted_by_the_changes_they_find_and_by_what_they_cut_elsewhere():
+    policies = [{"demonstrations": [{"boundaries": [2.4]}, {"boundaries": [1.0, 2.1]}, {"boundaries": []}]}]
+    assert plain_cuts._ours(policies, [taught((2.0, 2.2))] * 3) == (2, 3, 1)
+
+
+def test_a_policy_is_without_a_mistake_if_every_change_is_followed_and_nothing_else():
+    new = [taught((2.0, 2.2))] * 6
+    times = [[[2.4], [1.8], [2.1]], [[2.1, 4.0], [], [2.1]]]
+    done = followed._followed(times, new)
+    assert (done.whole, done.near, done.changes, done.false) == ([True, False], 5, 6, 1)
+    assert done.delays == pytest.approx([0.2, -0.2, 0.0, 0.0, 0.0])
+
+
+def test_a_clock_switches_as_long_after_the_start_as_the_change_came_in_the_mean():
+    given = [taught((1.0, 1.2)), taught((2.0, 2.2)), taught((3.0, 3.2))]
+    assert followed._clock(given, given) == [[[pytest.approx(2.1)]] * 3]
 
 
 def fake_document(number, fully=False):
