@@ -12,7 +12,7 @@ from tests.figures.crane_faults import DEPTH, KINDS, LIMIT, SECONDS, Struck, con
 from tests.figures.teaching import row
 from tests.fmu_cache import own_cache  # noqa: F401
 
-pytestmark = [pytest.mark.figures, pytest.mark.needs_plugins]
+pytestmark = [pytest.mark.figures, pytest.mark.needs_plugins, pytest.mark.timeout(3600)]
 TIMES = (-6.0, -4.1, -2.003, 0.3, 1.2, 2.507, 3.9, 5.2, 6.35, 7.4)
 """In the swing, on the way down, at the touch, pressing, and sliding; some between two looks of the watch."""
 RUNS = 20
