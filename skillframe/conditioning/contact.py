@@ -5,10 +5,10 @@ being the typical scatter of the force vector and \(F_{99}\) its 99th percentile
 count in proportion to how hard the task presses), until it falls below half of that; intervals closer than 50 ms are
 one, shorter ones are spikes. Where the noise alone sets the bound, the force is averaged first, over as many samples as
 bring it down to the others, 50 ms at most: else a noisy sensor's contact would count as free air. What scatter the
-averaged force has left below that bound is measured, since vibration averages less than white noise does. The free-air level is
-the mean of the first 0.25 s, that is, a recording is taken to start in free air unless another stretch is named. A
-stall (`demonstration.stalls`) is neither: it ends a contact, and what follows it shows no onset. All of this is our
-choice.
+averaged force has left below that bound is measured, since vibration averages less than white noise does. The free-air
+level is the mean of the first 0.25 s, that is, a recording is taken to start in free air unless another stretch is
+named. A stall (`demonstration.stalls`) is neither: it ends a contact, and what follows it shows no onset. All of
+this is our choice.
 """
 
 from __future__ import annotations
