@@ -90,6 +90,14 @@ def test_beside_the_port_a_low_tip_is_not_inside():
     assert insertion.points(trace) < 1.0 + 25.0 * near + 24.0
 
 
-def test_a_world_without_a_depth_has_no_points():
-    assert np.isnan(insertion.points(ran(progress=None)))
-    assert np.isnan(insertion.points(ran(bodies=[])))
+def test_without_a_port_a_success_earns_all_and_a_failure_only_that_it_ran():
+    """A straight way of 5 s, smooth: 1 + 75 + 6 + 12 + 6."""
+    for none in ({"progress": None}, {"bodies": []}):
+        assert insertion.points(ran(**none)) == pytest.approx(100.0)
+        assert insertion.points(ran(success=False, **none)) == 1.0
+
+
+def test_a_trial_that_diverged_has_no_jerk():
+    trace = ran()
+    trace.twist[-1] = np.inf
+    assert np.isnan(insertion.jerk(trace))

@@ -30,12 +30,12 @@ ASIDE_M = 0.005
 
 
 def jerk(trace: Trace) -> float:
-    """Mean magnitude of the jerk while the tool moves [m/s^3], by samples of the trace. NaN if it is too short."""
+    """Mean magnitude of the jerk while the tool moves [m/s^3], by samples. NaN if it is too short or diverged."""
     from scipy.signal import savgol_filter
 
     velocity = trace.twist[:, :3]
     moves = norm(velocity) > MOVING_M_S
-    if len(velocity) < WINDOW or not moves.any():
+    if len(velocity) < WINDOW or not moves.any() or not np.isfinite(velocity).all():
         return math.nan
     step = float(np.median(np.diff(trace.time)))
     return float(norm(savgol_filter(velocity, WINDOW, ORDER, deriv=2, delta=step, axis=0))[moves].mean())
@@ -62,15 +62,18 @@ def path(trace: Trace) -> float:
 
 
 def points(trace: Trace) -> float:
-    """Points of a trial. NaN in a world without a fixture or a depth."""
+    """Points of a trial. In a world without a port (fixture and depth) nothing is earned short of success."""
     meta = trace.meta
     deep = (meta.get("progress") or {}).get("of_m")
     names = [each["name"] for each in meta.get("bodies", ())]
-    if not deep or "fixture" not in names:
-        return math.nan
-    tip = _from_port(trace, _tip(trace), names.index("fixture"))
-    start = float(np.linalg.norm(tip[0]))
-    third = 75.0 if meta["success"] else _short_of_success(tip[-1], float(deep), 0.5 * start)
+    tip = _tip(trace)
+    if deep and "fixture" in names:
+        tip = _from_port(trace, tip, names.index("fixture"))
+        start = float(np.linalg.norm(tip[0]))
+        short = _short_of_success(tip[-1], float(deep), 0.5 * start)
+    else:
+        start, short = float(np.linalg.norm(tip[-1] - tip[0])), 0.0
+    third = 75.0 if meta["success"] else short
     penalty = 12.0 * (force_time(trace) > FORCE_S) + 24.0 * bool(meta.get("touched"))
     return 1.0 + third - penalty + (_motion(trace, start) if third > 0.0 else 0.0)
 
