@@ -45,7 +45,9 @@ for package in {PACKAGES!r}:
 assert count > 250, count
 """
 WORK = """
+import os
 from pathlib import Path
+os.environ["CC"] = "/nonexistent"  # building starts a process, as below; so this is a machine without a compiler
 from skillframe.cli.main import run
 from skillframe.reports import opengl
 opengl.backend = lambda: None  # it starts a process, for which Python itself needs on Linux what is hidden here
