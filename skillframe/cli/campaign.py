@@ -10,6 +10,7 @@ import click
 
 from skillframe.cli.claims import certify, check
 from skillframe.cli.endings import TRACE
+from skillframe.cli.enter import enter
 from skillframe.cli.interrupts import terminable
 from skillframe.cli.numbers import COUNT, NATURAL, WithUnit
 from skillframe.cli.output import note, quiet_option
@@ -164,7 +165,7 @@ def replay(folder: Path, trial: int, skill: str | None, out: Path | None) -> int
 
 command.add_command(certify)
 command.add_command(check)
-for each in (map_, break_, matter):
+for each in (map_, break_, matter, enter):
     command.add_command(each)
 
 

@@ -52,6 +52,7 @@ def certify(
     from skillframe.campaign.claims.certificate import CERTIFICATE, write_certificate
 
     folder = source if out is None else out
+    _refuse_real(source)
     with terminable() as code:
         try:
             if out is not None:
@@ -71,6 +72,18 @@ def certify(
         _show(found, content["predicate"])
         click.echo(f"certificate  {folder / CERTIFICATE}; to check it: skillframe campaign check {folder}")
     return 0 if content["predicate"]["certified"] else 1
+
+
+def _refuse_real(source: Path) -> None:
+    """Real trials that are there already carry no claim: which ones there are was known when it would be written."""
+    from skillframe.campaign.claims.real import is_real
+    from skillframe.errors import InputError
+
+    if is_real(source):
+        raise InputError(
+            source, "holds real trials, and a claim has to be written before the trials that test it",
+            f"look at their interval, valid at every look: skillframe report {source} --out page.html",
+        )  # fmt: skip
 
 
 def start(

@@ -29,8 +29,8 @@ def command(file: Path, alpha: float, draws: str | None, score: str | None, lowe
     """Say which policies in FILE are better than others, and which are not told apart.
 
     FILE is a table with the columns trial, policy (or skill) and success, in the order in which the trials were run:
-    yours from real trials, or a campaign's results.csv. The same trial number means the same draw. You may look after
-    every trial and stop when the answer is there.
+    yours from real trials, or a campaign's results.csv, or the folder that holds it. The same trial number means the
+    same draw. You may look after every trial and stop when the answer is there.
 
     \b
     Examples:
@@ -45,10 +45,15 @@ def command(file: Path, alpha: float, draws: str | None, score: str | None, lowe
     if lower and score is None:
         raise InputError("--lower", "says how a score is better, and there is none", "give --score COLUMN, too")
     drawn = [name.strip() for name in draws.split(",")] if draws else []
-    found = compare(read_trials(file, drawn, score), alpha, 0 if score is None else -1 if lower else 1)
+    from skillframe.campaign.claims.real import table_path
+
+    trials = read_trials(table_path(file) if file.is_dir() else file, drawn, score)
+    found = compare(trials, alpha, 0 if score is None else -1 if lower else 1)
     if as_json:
-        emit_json(_plain(found))
+        emit_json(_plain(found) | {"real": trials.real})
         return
+    if trials.real:
+        click.echo("real trials")
     _tell(found, score)
 
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
+from skillframe.campaign.claims.trials import SOURCE, is_torn, real_or_simulated
 from skillframe.campaign.rows import JUDGED, OUTCOME, SCORE, TRUTH
 from skillframe.campaign.statistics import Interval, correction, holm
 from skillframe.campaign.validity import Basis, Plan, Validity, unbroken, validity_of
@@ -25,7 +26,7 @@ from skillframe.execution.tracemeta import SHARE_JOINTS
 from skillframe.reports.markup import percent
 
 REQUIRED = ("trial", "skill", "success")
-FIXED = (*REQUIRED, "seed", "reason", "stream", *OUTCOME, *JUDGED)
+FIXED = (*REQUIRED, "seed", "reason", "stream", SOURCE, *OUTCOME, *JUDGED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,6 +89,7 @@ class Results:
         complete: all planned trials are in the table, as far as the plan is known.
         assumed: nothing is known of the plan; the trials are taken for independent, their number for fixed.
         notes: what was odd about the file.
+        real: every row is a trial of a real robot. Such a table grows, so its intervals hold at every look.
     """
 
     rows: tuple[ResultRow, ...]
@@ -97,6 +99,7 @@ class Results:
     complete: bool = True
     assumed: bool = False
     notes: tuple[str, ...] = ()
+    real: bool = False
 
     def of(self, skill: str) -> list[ResultRow]:
         """A skill's rows."""
@@ -122,7 +125,8 @@ class Results:
     @property
     def condition(self) -> str:
         """What the intervals assume and nobody has shown, or "" if there is nothing."""
-        assumed = " if the trials are independent and their number was fixed beforehand" if self.assumed else ""
+        fixed = "" if self.real else " and their number was fixed beforehand"
+        assumed = f" if the trials are independent{fixed}" if self.assumed else ""
         return assumed + (" as of independent draws" if self.validity.note else "")
 
     def said(self, rate: Rate) -> str:
@@ -193,10 +197,11 @@ def results_of(text: str, path: Path, declared: Sequence[str] = (), plan: Plan |
         raise InputError(
             path, f"has no column {', '.join(missing)}", "give a results.csv written by skillframe campaign"
         )
-    body, notes = _whole_rows(path, table[1:], len(head), text)
+    body, notes = _whole_rows(path, table[1:], head, text)
     rows = tuple(_row(path, number, dict(zip(head, cells, strict=True))) for number, cells in body)
     skills = tuple(dict.fromkeys(row.skill for row in rows))
-    varied, validity = _varied(head, rows, declared), Validity(basis=Basis.FIXED)
+    real = real_or_simulated(path, head, body)
+    varied, validity = _varied(head, rows, declared), Validity(basis=Basis.EVERY_LOOK if real else Basis.FIXED)
     complete = plan is None or len(rows) == plan.trials * plan.skills
     if plan is not None:
         validity = validity_of(plan, complete=complete)
@@ -204,7 +209,7 @@ def results_of(text: str, path: Path, declared: Sequence[str] = (), plan: Plan |
         rows, notes = counted, notes + _left_out(len(rows) - len(counted))
     return Results(
         rows=rows, skills=skills, varied=varied, validity=validity, complete=complete, assumed=plan is None,
-        notes=tuple(notes),
+        notes=tuple(notes), real=real,
     )  # fmt: skip
 
 
@@ -220,12 +225,13 @@ def _left_out(count: int) -> list[str]:
 
 
 def _whole_rows(
-    path: Path, table: list[list[str]], width: int, text: str
+    path: Path, table: list[list[str]], head: list[str], text: str
 ) -> tuple[list[tuple[int, list[str]]], list[str]]:
     """Numbered rows of full width. A last line that a kill cut short is left out and said."""
     body = [(number, cells) for number, cells in enumerate(table, start=2) if cells]
-    torn = bool(body) and (len(body[-1][1]) < width or not text.endswith("\n"))
-    notes = ["The last row of results.csv was cut short and is left out."] if torn and len(body[-1][1]) < width else []
+    width = len(head)
+    torn = bool(body) and (len(body[-1][1]) < width or is_torn(head, body[-1][1], text))
+    notes = ["The last row of results.csv was cut short and is left out."] if torn else []
     body = body[:-1] if notes else body
     for number, cells in body:
         if len(cells) != width:

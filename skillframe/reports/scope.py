@@ -18,6 +18,12 @@ from skillframe.reports.who import hydraulic, ideal, setup_of, table_of
 
 MOVED = ("start", "fixture", "grasp")
 AXES = "xyz"
+REAL_BLIND = (
+    "Anything beyond the ranges above, and other days, parts and robots than those of these trials.",
+    "Whether every trial was written down as it ended: the table holds what somebody entered.",
+    "Safety of people: no force was measured on a person.",
+)
+"""What a table of real trials leaves open."""
 
 
 def scope_cards(chapter: Chapter, results: Results, simulated: bool) -> Markup:
@@ -31,7 +37,9 @@ def scope_cards(chapter: Chapter, results: Results, simulated: bool) -> Markup:
     lists = (
         ("What was varied", varied(chapter, results)),
         ("What was not varied", standing(chapter)),
-        ("What this simulation cannot show", blind_spots(chapter, results, simulated)),
+        ("What these trials do not show", list(REAL_BLIND))
+        if results.real
+        else ("What this simulation cannot show", blind_spots(chapter, results, simulated)),
     )
     cards = [
         tag("div", tag("h3", title), tag("ul", *(tag("li", line) for line in lines)), class_="card")
@@ -54,6 +62,8 @@ def varied(chapter: Chapter, results: Results) -> list[str]:
     declared = _table(chapter, "vary")
     lines = [f"{quantity(name).label}: {_range(name, value)}" for name, value in declared.items()]
     lines = lines or ranges(results)
+    if results.real:
+        return lines or ["nothing that the table names"]
     noise = "in every trial the sensors' noise, and the bias that was drawn for it"
     return [*lines, noise if not hydraulic(chapter) else "in every trial the sensors' noise"]
 
@@ -91,6 +101,8 @@ def _figure(name: str, value: object) -> str:
 
 def standing(chapter: Chapter) -> list[str]:
     """What stood at one value: poses, sensors, robot, and the world's parameters, a line each group."""
+    if chapter.results is not None and chapter.results.real:
+        return ["whatever the table does not name: these are trials of a real robot"]
     declared, fixed = _table(chapter, "vary"), _table(chapter, "set")
     moved = [line for group in MOVED if (line := _pose_line(group, declared, fixed))]
     nominal = table_of(setup_of(chapter), "nominal")

@@ -143,7 +143,8 @@ def _failures(results: Results, folder: str) -> Markup:
         tag("code", f"skillframe campaign replay {folder} TRIAL"),
         class_="caption",
     )
-    return join([tag("h3", "What went wrong"), tag("div", *blocks, class_="grid"), replay])
+    again = "" if results.real else replay
+    return join([tag("h3", "What went wrong"), tag("div", *blocks, class_="grid"), again])
 
 
 def _named(trials: Sequence[int]) -> str:

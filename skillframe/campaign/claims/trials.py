@@ -27,6 +27,8 @@ STREAM = "stream"
 """Column that says how a row's draws were chosen."""
 SAMPLED = ("", "fresh", "explore")
 """Streams that are a sample. Rows that a search picked are none."""
+SOURCE, REAL = "source", "real"
+"""Column that says where a row comes from, and what it says of a real robot's. Without it, nothing is said."""
 LISTED = 5  # numbers of trials that a sentence names
 
 
@@ -54,11 +56,13 @@ class Trials:
         rows: in the table's order.
         policies: in the order in which they first come.
         doubts: sentences about what the table lacks.
+        real: every row is marked as a trial of a real robot.
     """
 
     rows: tuple[Trial, ...]
     policies: tuple[str, ...]
     doubts: tuple[str, ...] = ()
+    real: bool = False
 
 
 def read_trials(path: Path, draws: Sequence[str] = (), score: str | None = None) -> Trials:
@@ -72,17 +76,18 @@ def read_trials(path: Path, draws: Sequence[str] = (), score: str | None = None)
 
     Raises:
         InputError: no such table, a policy that ran the same trial twice, draws that differ, rows that a search picked,
-            a trial without its score.
+            real trials among simulated ones, a trial without its score.
     """
-    head, body = _cells(path)
+    head, body, torn = cells_of(path)
     columns = {name: _place(path, head, name) for name in ("trial", "success", *draws, *([score] if score else []))}
     policy = next((head.index(name) for name in POLICY if name in head), None)
     if policy is None:
         raise InputError(path, "has no column policy", f"call one of its columns {', '.join(POLICY)}")
     _check_sampled(path, head, body)
+    real = real_or_simulated(path, head, body)
     rows = tuple(
         Trial(
-            cells[columns["trial"]], cells[policy], _success(path, n, cells[columns["success"]]),
+            cells[columns["trial"]], cells[policy], success_of(path, n, cells[columns["success"]]),
             _score(path, n, score, cells[columns[score]]) if score else math.nan,
         )
         for n, cells in body
@@ -93,11 +98,16 @@ def read_trials(path: Path, draws: Sequence[str] = (), score: str | None = None)
     policies = tuple(dict.fromkeys(row.policy for row in rows))
     if len(policies) < 2:
         raise InputError(path, f"holds {len(policies)} policy", "compare needs two or more")
-    return Trials(rows=rows, policies=policies, doubts=tuple(_doubts(rows, policies)))
+    doubts = [*(["the last row was cut short and is left out"] if torn else []), *_doubts(rows, policies)]
+    return Trials(rows=rows, policies=policies, doubts=tuple(doubts), real=real)
 
 
-def _cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """The header, and the rows with their numbers in the file."""
+def cells_of(path: Path) -> tuple[list[str], list[tuple[int, list[str]]], bool]:
+    """The header, the rows with their numbers in the file, and whether a torn last row was left out.
+
+    Raises:
+        InputError: the file is no table.
+    """
     text = read_text(path)
     first = text.splitlines()[0]
     parted = max(",;\t", key=first.count)
@@ -106,13 +116,22 @@ def _cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
     except csv.Error as error:
         raise InputError(path, f"cannot be read as a table ({error})", "give CSV with a header") from None
     head, body = table[0], [(n, cells) for n, cells in enumerate(table[1:], start=2) if any(cells)]
+    torn = bool(body) and is_torn(head, body[-1][1], text)
+    body = body[:-1] if torn else body
     twice = next((name for name in head if name and head.count(name) > 1), None)
     if twice is not None:
         raise InputError(path, f"has two columns {twice}", "rename one of them")
     for n, cells in body:
         if len(cells) != len(head):
             raise InputError(f"{path}: row {n}", f"has {len(cells)} cells, the header {len(head)}", "fix that row")
-    return head, body
+    return head, body, torn
+
+
+def is_torn(head: Sequence[str], last: Sequence[str], text: str) -> bool:
+    """Whether a table's last row was cut short: no line end, and not the whole mark that rows of real trials end in."""
+    if head[-1] != SOURCE or text.endswith(("\n", "\r")):
+        return False
+    return len(last) < len(head) or (last[-1] != REAL and REAL.startswith(last[-1]))
 
 
 def _place(path: Path, head: list[str], name: str) -> int:
@@ -121,7 +140,12 @@ def _place(path: Path, head: list[str], name: str) -> int:
     return head.index(name)
 
 
-def _success(path: Path, number: int, cell: str) -> bool:
+def success_of(path: Path, number: int, cell: str) -> bool:
+    """How a trial ended.
+
+    Raises:
+        InputError: the cell does not say.
+    """
     found = TRUTH.get(cell.lower())
     if found is None:
         raise InputError(f"{path}: row {number}", f"success is {cell!r}", "write 1 or 0, true or false")
@@ -151,6 +175,26 @@ def _check_sampled(path: Path, head: list[str], body: list[tuple[int, list[str]]
                 f"{path}: row {n}", f"is of the stream {cells[at]!r}, whose trials were picked by how others ended",
                 "such rows are no sample: leave them out",
             )  # fmt: skip
+
+
+def real_or_simulated(path: Path, head: Sequence[str], body: Sequence[tuple[int, Sequence[str]]]) -> bool:
+    """Whether all rows are marked as trials of a real robot. A table without such marks has none.
+
+    Raises:
+        InputError: real trials among others: no claim holds for a mixture of the two.
+    """
+    if SOURCE not in head or not body:
+        return False
+    at = head.index(SOURCE)
+    marks = [cells[at].lower() == REAL for _, cells in body]
+    for (n, cells), mark in zip(body, marks, strict=True):
+        if mark != marks[0]:
+            before = f"{body[0][1][at]!r}, and row {n} {cells[at]!r}"
+            raise InputError(
+                f"{path}: row {n}", f"mixes real and simulated trials (row {body[0][0]} is {before})",
+                "no claim holds for both: keep them in two tables",
+            )  # fmt: skip
+    return marks[0]
 
 
 def _check_once(path: Path, rows: Sequence[Trial], numbers: Sequence[int]) -> None:
