@@ -1,6 +1,7 @@
 """Real trials: what is refused, what a torn table holds, and that no claim mixes them with simulated ones."""
 
 import csv
+import io
 import os
 import signal
 import subprocess
@@ -172,3 +173,25 @@ def test_kill_9_while_entering_leaves_a_table_that_reads_and_goes_on(tmp_path):
         process.wait()
         rows = open_real(tmp_path).rows
         assert [row.trial for row in rows] == list(range(len(rows))) and len(rows) > before
+
+
+class Terminal(io.StringIO):
+    """Somebody who types."""
+
+    def isatty(self):
+        return True
+
+
+def test_a_terminal_asks_for_trial_after_trial_and_for_one_again_that_cannot_be_taken(tmp_path, capsys, monkeypatch):
+    two_skills(tmp_path)
+    typed = ["n", "jammed", "3.5", "perhaps", "y", "four", "y", "4.5", ""]  # one trial, then a slip, then another
+    monkeypatch.setattr("sys.stdin", Terminal("\n".join(typed) + "\n"))
+    assert enter(tmp_path, "--skill", "peg") == 0
+    assert [(r.trial, r.success, r.failure, r.draws["off"]) for r in open_real(tmp_path).rows[-2:]] == [
+        (3, False, "jammed", 3.5),
+        (4, True, "", 4.5),
+    ]
+    assert "type this trial again" in capsys.readouterr().err
+    monkeypatch.setattr("sys.stdin", io.StringIO("y\n"))  # no terminal: nobody is asked
+    assert enter(tmp_path, "--skill", "peg") == 2
+    assert "give --success or --failure" in capsys.readouterr().err
