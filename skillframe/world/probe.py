@@ -48,6 +48,8 @@ class Probe:
     Attributes:
         free: indices of the parts that move, in the order of the rows that `overlaps` takes.
         posed: indices of those that stand where each trial puts them.
+        reach: (F + P,) of these, how far their shapes reach from their origins at most [m].
+        bounded: whether `distance` knows all shapes, and those of `reach` end somewhere.
     """
 
     def __init__(self, parts: Sequence[Solid], skip: Collection[Pair]) -> None:
@@ -73,6 +75,15 @@ class Probe:
         self._pairs = np.array([*self._convex_pairs(parts, skip)], dtype=np.int64).reshape(-1, 2)
         planes = self._model.geom_type[self._pairs] == mujoco.mjtGeom.mjGEOM_PLANE
         self._reach = np.where(planes.any(axis=1), np.inf, self._model.geom_rbound[self._pairs].sum(axis=1))
+        self.reach = np.array([self._furthest(i) for i in (*self.free, *self.posed)])
+        self.bounded = not self._surface and bool(np.isfinite(self.reach).all())
+
+    def _furthest(self, index: int) -> float:
+        """How far a part's shapes reach from its origin at most [m], infinite if one is a plane."""
+        geoms, model = np.flatnonzero(self._part == index), self._model
+        far = np.sqrt(np.square(model.geom_pos[geoms]).sum(axis=-1)) + model.geom_rbound[geoms]
+        plane = model.geom_type[geoms] == mujoco.mjtGeom.mjGEOM_PLANE
+        return float(np.where(plane, np.inf, far).max(initial=0.0))
 
     def _convex_pairs(self, parts: Sequence[Solid], skip: Collection[Pair]) -> Iterator[tuple[int, int]]:
         """Pairs of geoms that are looked at and both convex."""
