@@ -112,7 +112,7 @@ def test_a_row_is_computed_from_the_wheels_and_held_against_the_verdict_that_shi
     where, count = subprocess.run(
         [installed, "-c", said], cwd=tmp_path, capture_output=True, text=True, check=True
     ).stdout.split()
-    assert Path(where).is_relative_to(installed.parents[1]) and count == "28"
+    assert Path(where).is_relative_to(installed.parents[1]) and count == "31"
     command = [installed, "-m", "skillframe.cli.main", "reproduce", "21", "--quick", "--json", "--out", tmp_path]
     pinocchio = find_spec("pinocchio")  # found through a .pth of its own
     environment = {**os.environ, "PYTHONPATH": str(Path(pinocchio.origin).parents[1])}

@@ -7,7 +7,7 @@ from math import atan, degrees, radians
 import numpy as np
 import pytest
 from skillframe_papers import bars, committed, document, refresh, store
-from skillframe_papers.rows import crane, followed, lmc, nulls, phases, plain_cuts, skills, two_arms
+from skillframe_papers.rows import crane, followed, lmc, nulls, one_arm, phases, plain_cuts, skills, two_arms
 from skillframe_papers.rows.insertion import Row, link_weights, raised, sticking
 from skillframe_papers.rows.phases import Taught
 from skillframe_papers.rows.sweep import HEIGHTS_M, NAMES, Sweep
@@ -274,6 +274,14 @@ def test_the_coupler_s_row_fails_if_a_pair_tips_over_or_a_stiff_one_aligns_as_we
     assert lmc.hose(RowRun(settings={"world.friction": 0.2})).verdict == expected
 
 
+@pytest.mark.parametrize(("pushed", "expected"), [(False, "pass"), (True, "fail")])
+def test_the_levering_s_row_fails_if_the_same_is_said_of_somebody_who_pushes(pushed, expected, monkeypatch):
+    monkeypatch.setattr(lmc, "_taught", lambda job, world, params, pairs, each=2: ([world] * pairs, "0"))
+    monkeypatch.setattr(lmc, "_documents", lambda worlds: [fake_document(w, w == "edge" or pushed) for w in worlds])
+    monkeypatch.setattr(lmc, "pictures", lambda document: [])
+    assert lmc.levering(RowRun(settings={"world.friction": 0.2})).verdict == expected
+
+
 def test_pushes_are_told_by_how_far_they_are_off_where_they_align_and_where_not():
     pushes = [{"desired_direction": [np.sin(t), 0.0, -np.cos(t)]} for t in np.radians([1.0, -2.0, 4.0])]
     told = lmc._lever(pushes, [True, True, False])
@@ -286,6 +294,23 @@ def test_pushes_are_told_by_how_far_they_are_off_where_they_align_and_where_not(
 def test_an_executed_skill_is_judged_by_its_count_and_by_its_lead_over_the_null(ours, null, expected):
     found = {name: skills.Ran(np.arange(20)[None] < hits) for name, hits in (("learned", ours), ("stiff", null))}
     assert skills._judged(RowRun(settings={}), found, "stiff", "runs", "").verdict == expected
+
+
+@pytest.mark.parametrize(("part", "change", "fact"), [
+    ("translation", {"desired_direction": [np.sin(0.2), 0.0, np.cos(0.2)]}, 0),  # 11 degrees off
+    ("rotation", {"desired_direction": [0.0, 1.0, 0.0]}, 1),
+    ("translation", {"compliant_axes": [[0.0, 1.0, 0.0]]}, 2),
+    ("rotation", {"compliant_axes": []}, 3),
+])  # fmt: skip
+def test_a_set_teaches_what_the_paper_learned_only_if_each_of_the_four_facts_is_said(part, change, fact):
+    free = {"fully_compliant": False}
+    phase = {
+        "translation": {"desired_direction": [0.0, 0.0, 1.0], "compliant_axes": [[1.0, 0.0, 0.0]], **free},
+        "rotation": {"desired_direction": None, "compliant_axes": [[0.0, 1.0, 0.0]], **free},
+    }  # fmt: skip
+    assert one_arm.told({"phases": [phase]}) == (True,) * 4
+    phase[part] |= change
+    assert one_arm.told({"phases": [phase]}) == tuple(i != fact for i in range(4))
 
 
 def test_a_tool_that_is_late_is_off_by_the_path_s_largest_speed():

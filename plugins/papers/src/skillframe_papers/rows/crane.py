@@ -133,16 +133,20 @@ def holding(job: RowRun) -> RowResult:
     bore, rod, payload = (float(job.settings[k]) for k in ("cylinder.bore", "cylinder.rod", "robot.payload"))
     area_a = math.pi / 4.0 * bore**2
     area_b = area_a - math.pi / 4.0 * rod**2
-    robot = load_model(with_payload(load_robot("hiab_xs031"), payload))
-    mine = ClosedChain(robot).at(np.array(START), np.zeros(3)).holding_force()
-    rows, off = [], []
-    for ours, (name, (a, b)) in zip(mine, PRESSURES.items(), strict=False):
+    mine, empty = (
+        ClosedChain(load_model(with_payload(load_robot("hiab_xs031"), mass))).at(np.array(START), np.zeros(3))
+        for mass in (payload, 0.0)
+    )
+    rows, off, light = [], list[float](), list[float]()
+    for ours, null, (name, (a, b)) in zip(mine.holding_force(), empty.holding_force(), PRESSURES.items(), strict=False):
         theirs = a * area_a - b * area_b
         off.append(float(ours) / theirs - 1.0)
+        light.append(float(null) / theirs - 1.0)
         rows.append((name, f"{theirs / 1e3:.2f} kN", f"{ours / 1e3:.2f} kN", f"{100.0 * off[-1]:+.1f} %"))
     worst = max(abs(x) for x in off)
     return RowResult(
         ours=", ".join(f"{row[0]} {row[2]} ({row[3]})" for row in rows), verdict="pass" if worst <= 0.02 else "fail",
-        difference="The published pressures are start values of a simulation, not an equilibrium.",
+        difference="The published pressures are start values of a simulation, not an equilibrium. Null: the crane "
+        f"without its payload is off by {', '.join(f'{100.0 * each:+.0f} %' for each in light)}.",
         values={"lift_off": off[0], "tilt_off": off[1]}, head=("cylinder", "published", "ours", "off"), rows=rows,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Rows 1, 2 and 4 to 6 of the papers' results: what LMC learns from demonstrations in simulated contact, and does.
+"""Rows 1, 2, 4 and 6 of the papers' results: what LMC learns in simulated contact, and what it does.
 
 Demonstrations come from the simulated teacher, `free_tool` holds the part, and each group of demonstrations has a seed
 of its own. The aim noise, the friction and the geometry are ours; the papers print none of them.
@@ -209,29 +209,6 @@ def _align(job: RowRun, params: dict[str, Any], document: Document, coc: str | N
     return [bool(good) for good in simulate(skill, setup, draws, rngs, duration_s=15.0).success]
 
 
-def peg(job: RowRun) -> RowResult:
-    """Row 5: what is learned for the peg."""
-    pairs = job.count(20, 4)
-    groups, failed = _taught(job, "peg_in_hole", {"friction": job.settings["world.friction"]}, pairs)
-    documents = _documents(groups)
-    pushes, turns = _parts(documents, "translation"), _parts(documents, "rotation")
-    errors = [_angle(part["desired_direction"], DOWN) for part in pushes]
-    facts = [
-        ("push within 10 degrees of z", [e <= 10.0 for e in errors]),
-        ("no direction of turning", [t["desired_direction"] is None and not t["fully_compliant"] for t in turns]),
-        ("one axis, along x", [_along(p, X) for p in pushes]),
-        ("one axis of turning, about y", [_along(t, Y) for t in turns]),
-    ]
-    together = sum(all(each) for each in zip(*(values for _, values in facts), strict=True))
-    return RowResult(
-        ours=f"identical in {together} of {pairs} pairs; push {np.median(errors):.1f} degrees from z (median)",
-        verdict="pass" if reached(together, pairs, SHARE, quick=job.quick) else "fail",
-        pictures=pictures(documents[0]), head=("", "ours"),
-        rows=[*((text, f"{sum(values)} of {pairs}") for text, values in facts), (REDRAWN, failed)],
-        values={"identical_share": together / pairs, "median_error_deg": float(np.median(errors))},
-    )  # fmt: skip
-
-
 def levering(job: RowRun) -> RowResult:
     """Row 6: who does the work in levering."""
     count = job.count(20, 4)
@@ -239,10 +216,14 @@ def levering(job: RowRun) -> RowResult:
     documents = _documents(groups)
     pushes, turns = _parts(documents, "translation"), _parts(documents, "rotation")
     good = sum(p["fully_compliant"] and not t["fully_compliant"] for p, t in zip(pushes, turns, strict=True))
+    pushed, _ = _taught(job, "valley", {"friction": job.settings["world.friction"]}, count, each=1)
+    null = sum(part["fully_compliant"] for part in _parts(_documents(pushed), "translation"))
     work = [[_mean(parts, key) for key in ("work_environment_j", "work_teacher_j")] for parts in (pushes, turns)]
     return RowResult(
-        ours=f"translation fully compliant and rotation not in {good} of {count}",
-        verdict="pass" if good == count else "fail", values={"share": good / count},
+        ours=f"translation fully compliant and rotation not in {counted(good, count)}; where the person pushes, in "
+        f"{counted(null, count)}",
+        verdict="pass" if good == count and null == 0 else "fail", values={"share": good / count},
+        difference="Null: to say so of every demonstration. The person pushes in the valley.",
         head=("", "by the environment [J]", "by the teacher [J]"),
         rows=[(name, *(f"{w:.2f}" for w in each)) for name, each in zip(("translation", "rotation"), work, strict=True)]
         + [(REDRAWN, failed, "")], pictures=pictures(documents[0]),

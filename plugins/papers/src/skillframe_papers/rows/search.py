@@ -17,7 +17,7 @@ from skillframe.extend.records import Document, Illustration, RowResult, RowRun
 from skillframe.frames import Float
 from skillframe_papers.bars import reached
 
-GOALS, QUICK_GOALS = 60, 10
+GOALS, QUICK_GOALS = 60, 5
 GIVEN = 5  # demonstrations
 BUDGETS = (3.0, 7.0, 13.4, 20.0)
 EARLY_S = 7.0

@@ -1,14 +1,15 @@
-r"""Row 3 of the papers' results: what LMC learns from uneven demonstrations by somebody who aims wrong.
+r"""Rows 3 and 5 of the papers' results: what LMC learns from uneven demonstrations by somebody who aims wrong.
 
-A valley of two slopes a (steep) and b (flat) with friction angles phi_a and phi_b. A push in the valley's plane
+Row 3: a valley of two slopes a (steep) and b (flat) with friction angles phi_a and phi_b. A push in the valley's plane
 tilted by t from its -z towards the steep side slides down both slopes iff
 
     phi_b - b < t < a - phi_a
 
-(statics of Coulomb friction; row 2 runs it), and b < phi_b, so that the valley's own -z is no such push. The
-whole fixture is turned at random in space, two of three demonstrations come from one side and from farther away, and
-the person aims off the middle by the same angle in all three, and wavers. All of this is our choice. Theory says that
-in a valley minus the mean force always lies between the limits, so that this null cannot fail but by noise.
+(statics of Coulomb friction; row 2 runs it), and b < phi_b, so that the valley's own -z is no such push. Row 5: a peg.
+The whole fixture is turned at random in space, two of three demonstrations come from one side (in the valley from
+farther away, too), and the person aims off the middle by the same angle in all three, and wavers. All of this is our
+choice. Of a valley theory says that minus the mean force always lies between the limits, so that this null cannot fail
+but by noise.
 """
 
 from __future__ import annotations
@@ -203,3 +204,50 @@ def _short(others: Mapping[str, int]) -> str:
 
 def _redrawn(sets: Sequence[Set]) -> tuple[str, str]:
     return REDRAWN, str(sum(each.redrawn for each in sets))
+
+
+def _peg_set(job: RowRun, index: int) -> Set:
+    rng = np.random.default_rng([PEG_SEED + job.seed, index])
+    robot, turn = _turned(rng)
+    off = _off(job, rng)
+    most = float(rng.choice([-1.0, 1.0]))
+    tilts = np.radians([*rng.uniform(5.0, 8.0, 2), -rng.uniform(3.0, 8.0)]) * most
+    starts = tuple({"start.tilt_y": float(tilt)} for tilt in tilts)
+    world = load_world("peg_in_hole", {"friction": job.settings["world.friction"]})
+    scene = _aimed(world, np.array([np.sin(off), 0.0, -np.cos(off)]), starts)
+    shown = record(robot, scene, _person(job), count=3, seed=PEG_SEED + 1000 * job.seed + index, duration_s=20.0)
+    return Set(shown.demonstrations, turn, len(shown.rejected), _learn(shown.demonstrations))
+
+
+def _near_the_hole(push: Float) -> bool:
+    return bool(np.dot(push, DOWN) > np.cos(radians(WITHIN_DEG)))
+
+
+def peg(job: RowRun) -> RowResult:
+    """Row 5: what is learned for the peg."""
+    sets = [_peg_set(job, i) for i in range(job.count(SETS, QUICK_SETS // 2))]
+    facts = [
+        (f"push within {WITHIN_DEG:g} degrees of the hole's axis", [_right(s, _near_the_hole) for s in sets]),
+        ("no direction of turning", [_never_turns(s.parts[1]) for s in sets]),
+        ("one axis, along x", [_one_axis(s, 0, X) for s in sets]),
+        ("one axis of turning, about y", [_one_axis(s, 1, Y) for s in sets]),
+    ]
+    identical = sum(all(each) for each in zip(*(values for _, values in facts), strict=True))
+    others = _nulls([(each, _near_the_hole) for each in sets])
+    behind, told = nulls.judged_beside(sum(facts[0][1]), others, len(sets), quick=job.quick)
+    share, beside = judged(identical, len(sets), SHARE, quick=job.quick), nulls.BY_HAND in behind
+    return RowResult(
+        ours=f"identical in {counted(identical, len(sets))} sets of three, the push alone right in {sum(facts[0][1])}. "
+        + _short(others),
+        verdict=together([share], beside), pictures=pictures(sets[0].document), head=("", "ours"),
+        rows=[*((text, counted(sum(values), len(sets))) for text, values in facts),
+              *((f"push of the null: {name}", counted(hits, len(sets))) for name, hits in others.items()),
+              _redrawn(sets)],
+        difference=f"{told} Nulls have a push and no axes. Whoever knows the hole's axis needs no demonstration for "
+        "the push.",
+        values={"identical_share": identical / len(sets)},
+    )  # fmt: skip
+
+
+def _never_turns(rotation: Mapping[str, Any]) -> bool:
+    return rotation["desired_direction"] is None and not rotation["fully_compliant"]
