@@ -180,3 +180,50 @@ def test_the_levels_are_those_that_are_told_and_the_widest_is_the_published_nois
 
 def test_an_assembly_that_is_not_done_has_no_entry(tmp_path):
     assert counts.read(tmp_path, ()) is None
+
+
+def test_a_method_that_learns_nothing_leaves_the_others_their_skills_and_says_why_without_a_path(tmp_path, monkeypatch):
+    from skillframe_benchmarks import assembly
+    from skillframe_benchmarks.assets import Pair
+
+    def refuses(shown):
+        raise InputError(tmp_path / "00007" / "demonstration2.npz", "touches nothing", "record it again")
+
+    made = SimpleNamespace(save=lambda path: path.write_text("{}"))
+    monkeypatch.setattr(assembly, "METHODS", {"push": lambda shown: made, "lmc": refuses, "replay": lambda shown: made})
+    monkeypatch.setattr(assembly, "_world", lambda pair, folder: folder / "fixture.toml")
+    monkeypatch.setattr(assembly, "_shown", lambda fixture, folder, plan: [])
+    ran = []
+    monkeypatch.setattr(assembly, "_campaign", lambda level, fixture, skills, out, plan: ran.append([*skills]) or {})
+    pair = Pair(name="00007", plug=tmp_path / "p.obj", socket=tmp_path / "s.obj", way_out=None)
+    plan, told = assembly.Plan(methods=("push", "lmc", "replay"), levels=("1mm-2deg-0.2",)), []
+    assembly.run(assembly.AssemblyJob(pair=pair, folder=tmp_path / "00007", plan=plan), told.append)
+    assert ran == [["push", "replay"]] and (tmp_path / "00007/replay.skill.json").exists()
+    why = "00007/demonstration2.npz: touches nothing"
+    unlearned = json.loads((tmp_path / "00007/unlearned.json").read_text())
+    assert list(unlearned) == ["lmc"] and unlearned["lmc"].startswith(why) and why in told[0]
+    assert not (tmp_path / "00007/refused.json").exists()
+
+
+def test_all_trials_of_a_method_that_learned_nothing_count_as_failed_at_every_level(tmp_path):
+    from skillframe_benchmarks import page
+    from skillframe_benchmarks.assembly import LEVELS, Plan
+
+    whole = {
+        "done": {"trials": 20},
+        "unlearned": {"lmc": "touches nothing"},
+        "parts": {"way_out_m": 0.01, "depth_m": 0.02, "clearance_m": 1e-4},
+    }
+    for name, value in whole.items():
+        (tmp_path / f"{name}.json").write_text(json.dumps(value))
+    found = counts.read(tmp_path, LEVELS)
+    assert set(found.cells) == {(level.name, "lmc") for level in LEVELS}
+    for each in found.cells.values():
+        assert (each.trials, each.seated, each.checked, each.causes) == (20, 0, 0, {"not learned": 20})
+    given = page.totals([found], LEVELS, ("push", "lmc"))
+    assert [(total.method, total.seated.rate) for total in given] == [("lmc", 0.0)] * len(LEVELS)
+    drawn = page.render([found], given, Plan(), 1)
+    assert "lmc: touches nothing" in drawn and "Of 1 a method learned nothing" in drawn
+    assert json.loads(json.dumps(page.plain([found], given), allow_nan=False))["assemblies"][0]["unlearned"] == {
+        "lmc": "touches nothing"
+    }

@@ -56,7 +56,7 @@ tilt = "90deg"             # a loose part may lean in its socket
 SCORES = ("automate_height", "automate_distance")
 UPRIGHT = "2deg"
 """How far a part may lean at the end of a demonstration; nobody shows a part that lies slanting in its hole."""
-DONE, REFUSED = "done.json", "refused.json"
+DONE, REFUSED, UNLEARNED = "done.json", "refused.json", "unlearned.json"
 
 
 class Level(NamedTuple):
@@ -132,7 +132,11 @@ class Refused(Exception):
 
 
 def run(job: AssemblyJob, tell: Callable[[str], None]) -> None:
-    """Everything that is missing of one assembly. What refuses it stands in refused.json, with the step."""
+    """Everything that is missing of one assembly.
+
+    What refuses it stands in refused.json, with the step; methods that learn nothing from what was shown stand in
+    unlearned.json, and the others run.
+    """
     job.folder.mkdir(parents=True, exist_ok=True)
     cost = _Cost(job.folder / "cost.json")
     try:
@@ -145,29 +149,43 @@ def run(job: AssemblyJob, tell: Callable[[str], None]) -> None:
 
 def _run(job: AssemblyJob, cost: _Cost, tell: Callable[[str], None]) -> None:
     folder, plan = job.folder, job.plan
-    with cost.of("parts"), _refusing("parts"):
+    with cost.of("parts"), _refusing(job, "parts"):
         fixture = _world(job.pair, folder)
-    with cost.of("demonstrations"), _refusing("demonstrations"):
+    with cost.of("demonstrations"), _refusing(job, "demonstrations"):
         shown = _shown(fixture, folder, plan)
-    skills = {}
-    with cost.of("learning"), _refusing("learning"):
-        for name in plan.methods:
-            skills[name] = _learned(name, shown, folder)
+    with cost.of("learning"):
+        skills, unlearned = _taught(job, shown)
+    _keep(folder / UNLEARNED, unlearned)
+    for name, why in unlearned.items():
+        tell(f"{job.pair.name}: {name} learned nothing and counts as failed: {why}")
     for level in LEVELS:
-        if level.name in plan.levels:
+        if level.name in plan.levels and skills:
             with cost.of(level.name):
                 found = _campaign(level, fixture, skills, folder / level.name, plan)
             tell(f"{job.pair.name}, {level.name}: " + ", ".join(f"{k} {v} of {plan.trials}" for k, v in found.items()))
 
 
+def _taught(job: AssemblyJob, shown: list[Demonstration]) -> tuple[dict[str, Path], dict[str, str]]:
+    """The skill's file of each method, and why the others have none."""
+    skills, unlearned = {}, {}
+    for name in job.plan.methods:
+        try:
+            with _refusing(job, name):
+                skills[name] = _learned(name, shown, job.folder)
+        except Refused as error:
+            unlearned[error.step] = error.why
+    return skills, unlearned
+
+
 @contextmanager
-def _refusing(step: str) -> Any:
+def _refusing(job: AssemblyJob, step: str) -> Any:
+    """Refuses the step with the sentence of an error in it. Files in it are named from the assembly on."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SkillframeWarning)  # of the recordings: the page counts what fails
             yield
     except SkillframeError as error:
-        raise Refused(step, str(error)) from None
+        raise Refused(step, str(error).replace(str(job.folder), job.pair.name)) from None
 
 
 def _world(pair: Pair, folder: Path) -> Path:

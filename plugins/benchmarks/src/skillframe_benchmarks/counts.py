@@ -15,12 +15,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from skillframe import CampaignResults
-from skillframe_benchmarks.assembly import DONE, REFUSED, Level
+from skillframe_benchmarks.assembly import DONE, REFUSED, UNLEARNED, Level
 from skillframe_benchmarks.scores import passes
 
 DRAWS, OFTEN, FEWEST = 4000, 0.8, 5
 """Bootstrap samples; share of trials from which an assembly counts as done (published: success of 80 %); assemblies
 below which no interval is given, for drawing a few again says nothing (our choice)."""
+NOT_LEARNED = "not learned"
 RIM_M = 0.001
 """Who ends within this of the mouth has not entered [m]; our choice."""
 
@@ -32,7 +33,7 @@ class Cell(NamedTuple):
         trials, seated: counts; seated is within 1 mm of the assembled height and 2 mm sideways.
         checked: trials that pass the published check; None where its height is not known.
         causes: of the trials that are not seated, how many by cause.
-        force: median peak force [N]; seconds: median duration of seated trials, NaN without one.
+        force: median peak force, NaN if none ran [N]; seconds: median duration of seated trials, NaN without one.
     """
 
     trials: int
@@ -49,6 +50,7 @@ class Found(NamedTuple):
     Attributes:
         name: of the assembly.
         refused: "step: why", or "" if it ran.
+        unlearned: by method that learned nothing from the demonstrations, why; its trials count as failed.
         parts: what was found in its meshes; {} where they were refused.
         cost: processor time of each step [s].
         cells: by (level, method).
@@ -57,6 +59,7 @@ class Found(NamedTuple):
 
     name: str
     refused: str
+    unlearned: Mapping[str, str]
     parts: Mapping[str, Any]
     cost: Mapping[str, float]
     cells: Mapping[tuple[str, str], Cell]
@@ -83,8 +86,18 @@ def read(folder: Path, levels: Iterable[Level]) -> Found | None:
     for level in levels:
         if (folder / level.name / "summary.json").exists():
             cells |= {(level.name, method): cell for method, cell in _cells(folder / level.name, parts).items()}
+    unlearned = _json(folder / UNLEARNED)
+    if unlearned:
+        none = _failed(_json(folder / DONE)["trials"], parts)
+        cells |= {(level.name, method): none for level in levels for method in unlearned}
     text = f"{refused['step']}: {refused['why']}" if refused else ""
-    return Found(folder.name, text, parts, _json(folder / "cost.json"), cells, folder / "parts.png")
+    return Found(folder.name, text, unlearned, parts, _json(folder / "cost.json"), cells, folder / "parts.png")
+
+
+def _failed(trials: int, parts: Mapping[str, Any]) -> Cell:
+    """Of a method that learned nothing: all trials failed."""
+    checked = None if parts.get("way_out_m") is None else 0
+    return Cell(trials, 0, checked, {NOT_LEARNED: trials}, float("nan"), float("nan"))
 
 
 def _json(path: Path) -> dict[str, Any]:

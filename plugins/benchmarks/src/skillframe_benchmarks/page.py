@@ -73,7 +73,7 @@ def plain(found: Sequence[Found], given: Sequence[Total]) -> dict[str, Any]:
             for t in given
         ],
         "assemblies": [
-            {"name": each.name, "refused": each.refused, "cost_s": dict(each.cost),
+            {"name": each.name, "refused": each.refused, "unlearned": dict(each.unlearned), "cost_s": dict(each.cost),
              "parts": {k: v for k, v in each.parts.items() if k != "sha256"},
              "cells": [{"level": level, "method": method, **_cell(cell)}
                        for (level, method), cell in each.cells.items()]}
@@ -101,15 +101,21 @@ def render(found: Sequence[Found], given: Sequence[Total], plan: Plan, count: in
     )  # fmt: skip
     refused = [each for each in found if each.refused]
     said = (
-        f"{len(found)} of {count} assemblies done, {len(refused)} of them refused. {plan.robot}, {plan.trials} trials "
-        f"a level and method, two demonstrations each (seed {plan.seed}). Seated: within 1 mm of the assembled height "
-        f"and 2 mm sideways, and the skill ended by itself. Intervals draw assemblies again. "
+        f"{len(found)} of {count} assemblies done, {len(refused)} of them refused. {_unlearned(found)}"
+        f"{plan.robot}, {plan.trials} trials a level and method, two demonstrations each (seed {plan.seed}). "
+        f"Seated: within 1 mm of the assembled height and 2 mm sideways, and the skill ended by itself. "
+        f"Intervals draw assemblies again. "
         f"The column >= 80 % counts assemblies of which {OFTEN:.0%} of the trials and more are seated."
     )
     each = tag("div", *map(_figure, found), class_="parts")
     main = tag("main", tag("h1", "AutoMate's assemblies"), note(said), _totals(given), tag("h2", "One by one"), each)
     body = tag("body", main)
     return "<!DOCTYPE html>\n" + tag("html", head, body, lang="en")
+
+
+def _unlearned(found: Sequence[Found]) -> str:
+    count = sum(bool(each.unlearned) for each in found)
+    return f"Of {count} a method learned nothing, and its trials count as failed. " if count else ""
 
 
 def _totals(given: Sequence[Total]) -> Markup:
@@ -125,7 +131,8 @@ def _figure(found: Found) -> Markup:
         for (level, method), cell in found.cells.items()
     ]  # fmt: skip
     shown = table(("level", "method", "seated", "not seated"), rows, numeric=9) if rows else ""
-    below = tag("figcaption", said, tag("br"), found.refused)
+    none = [join([tag("br"), f"{method}: {why}"]) for method, why in found.unlearned.items()]
+    below = tag("figcaption", said, tag("br"), found.refused, *none)
     return tag("figure", tag("h4", found.name), _picture(found.picture), below, shown)
 
 
