@@ -14,10 +14,10 @@ from skillframe.world.plant import Plant
 from skillframe.world.scene import Geom, Sprung
 from tests.laws.pushing import Hold, Push, impedance
 from tests.laws.runs import run, setup
+from tests.unit.world.conftest import INERTIAL
 
 STIFF = np.diag([1000.0] * 3 + [20.0] * 3)
 WALL = Geom(kind="box", size=(0.01, 0.6, 0.5), position=(-0.25, 0.0, 0.3))  # between the panda's base and its tool
-INERTIAL = '<inertial><mass value="2"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
 
 
 def walled(name="panda", world="free", *geoms, **options):
@@ -31,27 +31,6 @@ def causes(plant, rows=None):
 
     touches = Collisions(plant).touches(plant, np.arange(plant.count) if rows is None else np.asarray(rows))
     return [(touch.row, touch.cause) for touch in touches]
-
-
-@pytest.fixture
-def slide(tmp_path, scene):
-    """A plant whose robot is a link on a slide along x, with its flange 1 m above, at positions q (N,)."""
-
-    def make(shapes, q, *fixture, toml="", more="", sprung=()):
-        text = f"""<robot name="slide"><link name="base"/><link name="carriage">{INERTIAL}{shapes}</link>
-        <link name="flange"/>{more}<joint name="x" type="prismatic"><parent link="base"/><child link="carriage"/>
-        <axis xyz="1 0 0"/><limit lower="-2" upper="2" effort="100" velocity="1"/></joint><joint name="up" type="fixed">
-        <parent link="carriage"/><child link="flange"/><origin xyz="0 0 1"/></joint></robot>"""
-        (tmp_path / "slide.urdf").write_text(text)
-        arm = '[[arm]]\nname = "arm"\ntool_frame = "flange"\n'
-        (tmp_path / "robot.toml").write_text(f'urdf = "slide.urdf"\n{arm}{toml}')
-        model = load_model(load_robot(tmp_path / "robot.toml"))
-        now = dataclasses.replace(scene("free"), fixture=fixture, sprung=sprung)
-        plant = Plant(model, now, len(q), fixture_poses(model, {}, len(q)), {})
-        plant.reset(np.array(q, dtype=float)[:, None])
-        return plant
-
-    return make
 
 
 def shape(inside, tag="visual", xyz="0 0 0"):
@@ -354,72 +333,3 @@ def test_a_boom_in_the_fixture_is_found_and_the_load_on_it_is_not(robot, scene):
     ((_, words),) = bar_at(0.34, 1.45)  # half way from the lift joint (-0.19, 0.85) to the tilt joint (0.87, 2.05)
     assert "link 'lift_boom'" in words
     assert bar_at(2.65, 0.5) == []
-
-
-# --- what is not looked at, since it cannot have come so far ---
-
-
-def both_ways(plant, postures):
-    """Touches over a path, by one that measured where it began and every fifth posture after, and by one that never
-    did and so looks at everything; and at how many postures the first did look."""
-    from skillframe.world.collisions import Collisions
-
-    rows, told, asked, looks = np.arange(plant.count), Collisions(plant), [], []
-    look = told._probe.overlaps
-    told._probe.overlaps = lambda *posture: (looks.append(1), look(*posture))[1]
-    for k, q in enumerate(postures):
-        plant.reset(q)
-        if k % 5 == 0:
-            told.measure(plant, rows)
-        asked.append((told.touches(plant, rows), Collisions(plant).touches(plant, rows)))
-    return asked, len(looks)
-
-
-def test_bodies_that_came_not_so_far_are_not_looked_at_and_nothing_that_touches_is_missed(robot, scene):
-    """A Panda above the valley, its joints moved at random by small and by large steps."""
-    now, rng, count = setup("panda", "valley"), np.random.default_rng(0), 8
-    plant = Plant(now.robot, now.scene, count, fixture_poses(now.robot, {}, count), {})
-    steps = rng.normal(size=(30, count, now.robot.model.nq)) * rng.choice([1e-3, 0.2], size=(30, 1, 1))
-    asked, looks = both_ways(plant, now.robot.home + np.cumsum(steps, axis=0))
-    assert all(told == fresh for told, fresh in asked)
-    assert sum(len(fresh) for _, fresh in asked) > 10  # the walk does run into things
-    assert looks < 0.9 * 30 * count
-
-
-def test_a_body_that_only_turns_is_looked_at_before_its_end_touches(tmp_path, scene):
-    """A ball 0.5 m from its joint's axis, its origin on the axis. The wall's face is 0.15 m from the ball; turned by
-    0.4 rad the ball stands 0.5 sin 0.4 + 0.05 - 0.2 = 45 mm behind it; turned by 0.1 rad it is 0.1 m away."""
-    inside = shape('<sphere radius="0.05"/>', xyz="0.5 0 0")
-    (tmp_path / "arm.urdf").write_text(
-        f"""<robot name="arm"><link name="base"/><link name="bar">{INERTIAL}{inside}</link><link name="flange"/>
-        <joint name="z" type="revolute"><parent link="base"/><child link="bar"/><axis xyz="0 0 1"/>
-        <limit lower="-3" upper="3" effort="9" velocity="9"/></joint><joint name="up" type="fixed">
-        <parent link="bar"/><child link="flange"/><origin xyz="0 0 1"/></joint></robot>"""
-    )
-    (tmp_path / "robot.toml").write_text('urdf = "arm.urdf"\n[[arm]]\nname = "arm"\ntool_frame = "flange"\n')
-    model = load_model(load_robot(tmp_path / "robot.toml"))
-    wall = Geom(kind="box", size=(1.0, 0.1, 1.0), position=(0.5, 0.3, 0.0))  # half sizes: its face is at y = 0.2
-    plant = Plant(model, dataclasses.replace(scene("free"), fixture=(wall,)), 1, fixture_poses(model, {}, 1), {})
-    asked, looks = both_ways(plant, [np.array([[q]]) for q in (0.0, 0.01, 0.1, 0.4)])
-    depth = 0.5 * np.sin(0.4) + 0.05 - 0.2
-    assert [[touch.depth for touch in told] for told, _ in asked] == [[], [], [], [pytest.approx(depth, abs=1e-6)]]
-    assert looks <= 2  # 2 (0.55 m) 0.01 is less than 0.15 m; at 0.1 rad it may look
-
-
-def test_a_body_that_slides_is_looked_at_once_it_came_half_as_far_as_it_was_away(slide):
-    """0.35 m lay between them; two bodies could have come that far, so 0.17 m are clear and 0.18 m are not."""
-    asked, looks = both_ways(slide(SPHERE, [0.5], BOX), [np.array([[q]]) for q in (0.5, 0.33)])
-    assert (looks, [told for told, _ in asked]) == (0, [[], []])
-    asked, looks = both_ways(slide(SPHERE, [0.5], BOX), [np.array([[q]]) for q in (0.5, 0.32, 0.14)])
-    assert (looks, [len(told) for told, _ in asked]) == (2, [0, 0, 1])
-
-
-def test_a_shape_that_is_not_convex_is_looked_at_although_its_distance_is_not_known(slide, tmp_path):
-    """A ball 1 m beside the ring is all that is measured, and it is far from the post."""
-    shapes = ring_of_the_carriage(tmp_path) + shape('<sphere radius="0.01"/>', "collision", xyz="0 1 0")
-    plant = slide(shapes, [0.0], Geom(kind="box", size=(0.04, 0.04, 0.2)))
-    asked, _ = both_ways(plant, [np.array([[q]]) for q in (0.0, 0.08)])
-    assert [[touch.cause for touch in told] for told, _ in asked] == [
-        [],
-        ["link 'carriage' is 20 mm inside the fixture"],
-    ]
