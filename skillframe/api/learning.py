@@ -70,6 +70,15 @@ class LearnedSkill:
         return kind.describe(self.document) if kind.describe is not None else [kind.summary]
 
     @property
+    def summary(self) -> list[str]:
+        """What it does, how sure that is ("sure: ..."), and what to do next ("next: ..."), or all of its words."""
+        kind = self._kind()
+        if kind.advice is None:
+            return self.words
+        sure, then = kind.advice(self.document)
+        return [self.words[0], f"sure: {sure}", f"next: {then}"]
+
+    @property
     def pictures(self) -> list[Illustration]:
         """Pictures that say why it is as it is, each with a title, a caption and SVG text."""
         kind = self._kind()

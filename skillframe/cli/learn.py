@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 OF_ONE_PHASE = "lmc"
 """The kind of skill that is one motion; those that play a motion back can hold a whole task."""
+CUT = "next: cut the demonstrations into phases, as the note says"
 
 
 @click.command()
@@ -49,13 +50,14 @@ OF_ONE_PHASE = "lmc"
     help="A recorded blind search, to learn that of --exception from (repeatable).",
 )  # fmt: skip
 @click.option("--leave-one-out", is_flag=True, help="Say what each demonstration contributes, and which contradicts.")
+@click.option("--verbose", is_flag=True, help="Tell the evidence as well, as skill show does.")
 @click.option("--json", "as_json", is_flag=True, help="Print the skill document as JSON on stdout as well.")
 def command(
     files: tuple[Path, ...], out: Path, skill: str, at: str | None, hand: str | None, axes: str,
     settings: tuple[str, ...], exception: str | None, blind: tuple[Path, ...], leave_one_out: bool,
-    as_json: bool,
+    verbose: bool, as_json: bool,
 ) -> int:  # fmt: skip
-    """Learn a skill from FILES, demonstrations of one phase, and say in words what was learned.
+    """Learn a skill from FILES, demonstrations of one phase, and say what was learned, how sure, and what to do next.
 
     Two demonstrations from different sides tell more than one: if they leave the direction open, this says so.
 
@@ -89,24 +91,29 @@ def command(
 
         told = left_out(learned, demonstrations, registry().behaviour(kind), options)
     learned.save(out)
-    if kind == OF_ONE_PHASE:
-        _point_to_segment(demonstrations)
-    made = f"{out}: {learned.type} from {len(files)} demonstration{'s' * (len(files) != 1)}"
-    tell([made, *learned.words, *told], err=as_json)
+    what, *more = learned.summary
+    if kind == OF_ONE_PHASE and _point_to_segment(demonstrations):
+        more = [CUT if line.startswith("next: ") else line for line in more]
+    evidence = learned.words[1:] if verbose and learned.words != learned.summary else []
+    tell([f"{out}: {what}", *more, *evidence, *told], err=as_json)
     if as_json:
         emit_json(learned.document)
     return 0
 
 
-def _point_to_segment(demonstrations: Sequence[Demonstration]) -> None:
-    """One note where most demonstrations look like several phases: one motion would have to explain all of them."""
+def _point_to_segment(demonstrations: Sequence[Demonstration]) -> bool:
+    """One note where most demonstrations look like several phases: one motion would have to explain all of them.
+
+    Gives whether there is one.
+    """
     from skillframe.conditioning.audit import audit
     from skillframe.conditioning.contact import Contact
     from skillframe.conditioning.phases import several_phases
 
     said = [several_phases(d, [Contact(*c) for c in audit(d).contacts]) for d in demonstrations]
     odd = [(d.source, text) for d, text in zip(demonstrations, said, strict=True) if text]
-    if 2 * len(odd) > len(said):
+    several = 2 * len(odd) > len(said)
+    if several:
         files = shlex.join(d.source for d in demonstrations)
         others = f" (and {len(odd) - 1} more)" if len(odd) > 1 else ""
         click.echo(
@@ -114,3 +121,4 @@ def _point_to_segment(demonstrations: Sequence[Demonstration]) -> None:
             f"skillframe segment {files} --out NAME.policy.json",
             err=True,
         )
+    return several

@@ -204,10 +204,13 @@ def survives_json(skill: SkillType, document: Document) -> Iterator[str]:
 
 
 def says_what_it_does(skill: SkillType, document: Document) -> Iterator[str]:
-    """`describe` gives lines of text, and `explain` gives drawings that are SVG."""
+    """`describe` gives lines of text, `advice` two sentences, and `explain` gives drawings that are SVG."""
     lines = [] if skill.describe is None else skill.describe(document)
     if not lines or not all(isinstance(line, str) and line for line in lines):
         yield f"describe gave {lines!r}; give a few lines of words, for `skillframe skill show`"
+    given = ("none", "none") if skill.advice is None else skill.advice(document)
+    if len(given) != 2 or not all(text and "\n" not in text for text in given):
+        yield f"advice gave {given!r}; give two sentences, how sure what was learned is, and what to do next"
     for picture in [] if skill.explain is None else skill.explain(document):
         if ElementTree.fromstring(picture.svg).tag.rpartition("}")[2] != "svg":
             yield f"explain's picture {picture.title!r} is not SVG"

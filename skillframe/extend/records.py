@@ -91,6 +91,7 @@ class SkillType:
         learn: a skill document's body (`frame`, `phases`, ...) from demonstrations; None if it is not learned.
         settings: gives the dataclass whose fields `--set` changes when it is learned, for listings; None: not known.
         describe: the document in words, a line each.
+        advice: how sure what was learned is, and what to do next, a sentence each; None: `learn` tells all its words.
         explain: pictures for the report, drawn from the document alone; None if there are none.
         area: (2, 3) corners of the box that a run may reach, relative to its start and in the axes of the document's
             `frame` [m]; a box that leaves the robot's workspace is refused before the run. None: not known.
@@ -111,6 +112,7 @@ class SkillType:
     learn: Callable[[Sequence[Demonstration], LearnOptions], Document] | None = None
     settings: Callable[[], type] | None = None
     describe: Callable[[Document], list[str]] | None = None
+    advice: Callable[[Document], tuple[str, str]] | None = None
     explain: Callable[[Document], list[Illustration]] | None = None
     area: Callable[[Document], Float] | None = None
     speed: Callable[[Document], float | None] | None = None

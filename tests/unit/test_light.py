@@ -107,8 +107,8 @@ def test_completing_a_word_loads_no_heavy_library(typed):
 
 
 ARGUMENTS = {
-    "build": 1, "check": 1, "learn": 2, "describe": 1, "explain": 1, "area": 1, "example": 0, "centers": 1, "fit": 3,
-    "run": 1, "write": 2, "compute": 1, "speed": 1, "exception": 1,
+    "build": 1, "check": 1, "learn": 2, "describe": 1, "advice": 1, "explain": 1, "area": 1, "example": 0, "centers": 1,
+    "fit": 3, "run": 1, "write": 2, "compute": 1, "speed": 1, "exception": 1,
 }  # fmt: skip
 
 

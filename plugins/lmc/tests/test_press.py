@@ -169,8 +169,12 @@ def test_a_direction_that_no_motion_took_gets_a_doubt_in_words(
     paths = [str(tmp_path / f"{seed}.npz") for seed in range(5)]
     for seed, path in enumerate(paths):
         write_demonstration(slanted(seed), Path(path))
-    assert run(["learn", *paths, "--out", str(tmp_path / "a.skill.json")]) == 0
+    assert run(["learn", *paths, "--out", str(tmp_path / "a.skill.json"), "--verbose"]) == 0
     document = learn([slanted(seed) for seed in range(5)], LearnOptions())
     assert off(translation(document), (0.0, 0.0, -1.0)) > 20.0
-    assert "note: translation: doubtful: all demonstrations went one way" in " ".join(capsys.readouterr().out.split())
+    assert "note: translation: doubtful: all demonstrations went one way" in (
+        said := " ".join(capsys.readouterr().out.split())
+    )
+    assert "sure: doubtful: all demonstrations went one way" in said
+    assert "next: add a demonstration from the other side" in said
     assert "doubtful" not in translation(learn(valley(45.0, 0.2), LearnOptions()))["evidence"]["message"]

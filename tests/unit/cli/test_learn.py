@@ -1,4 +1,5 @@
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -56,10 +57,35 @@ def test_learning_twice_gives_the_same_bytes(demos: list[str], tmp_path: Path) -
 def test_ambiguity_is_a_sentence_and_no_exit_code(
     demos: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(["learn", demos[0], "--out", str(tmp_path / "one.json")]) == 0
+    assert run(["learn", demos[0], "--out", str(tmp_path / "one.json"), "--verbose"]) == 0
     said = capsys.readouterr().out
     assert "record another demonstration from the other side" in said
     assert " sr" in said
+
+
+def test_what_was_learned_is_told_in_three_lines_and_the_evidence_when_asked(
+    demos: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "a.json"
+    assert run(["learn", *demos, "--out", str(out)]) == 0
+    what, sure, then = capsys.readouterr().out.splitlines()
+    assert what == f"{out}: push along -z at 20 mm/s; free along x; holds its attitude"
+    assert re.fullmatch(r"sure: the push is known to about \d+ degrees; from 2 demonstrations", sure)
+    assert then.startswith("next: good; try it")
+    assert run(["learn", *demos, "--out", str(out), "--verbose"]) == 0
+    assert "compliant axis" in capsys.readouterr().out
+    assert run(["learn", demos[0], "--out", str(out)]) == 0
+    _, sure, then = capsys.readouterr().out.splitlines()
+    assert sure.startswith("sure: the push is open: up to ") and sure.endswith("; from 1 demonstration")
+    assert then == "next: add a demonstration from the other side"
+
+
+def test_a_kind_that_gives_no_advice_tells_all_of_its_words(
+    demos: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["learn", demos[0], "--skill", "replay", "--out", str(tmp_path / "r.json")]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith(f"{tmp_path / 'r.json'}: ") and "sure: " not in said
 
 
 def test_points_axes_and_settings_reach_the_file(demos: list[str], tmp_path: Path) -> None:
@@ -188,7 +214,9 @@ def test_a_demonstration_of_several_phases_is_told_with_the_command_that_cuts_it
 ) -> None:
     files = [two_phases(tmp_path / "a b.npz"), two_phases(tmp_path / "c.npz")]
     assert run(["learn", *files, "--out", str(tmp_path / "s.json"), "--json"]) == 0
-    (said,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("note: ") and "phases" in line]
+    lines = capsys.readouterr().err.splitlines()
+    (said,) = [line for line in lines if line.startswith("note: ") and "phases" in line]
+    assert lines[-1] == "next: cut the demonstrations into phases, as the note says"
     assert said.startswith(f"note: {files[0]} (and 1 more) looks like several phases: in contact it moves by ")
     assert said.endswith(f"type: skillframe segment '{files[0]}' {files[1]} --out NAME.policy.json")
 

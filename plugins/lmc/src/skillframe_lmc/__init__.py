@@ -26,6 +26,7 @@ def skillframe_skills() -> Iterable[SkillType]:
         learn=Lazy("skillframe_lmc.learner:learn"),
         settings=Lazy("skillframe_lmc.settings:Settings").load,
         describe=Lazy("skillframe_lmc.describe:describe"),
+        advice=Lazy("skillframe_lmc.advice:advice"),
         explain=Lazy("skillframe_lmc.explain:explain"),
         speed=Lazy("skillframe_lmc.phase:speed"),
     )

@@ -69,14 +69,19 @@ def _direction(part: Part) -> str:
     if part.desired_direction is None:
         return "held" if part.evidence.get("held") else "no desired direction"
     text = f"desired direction {exact_words(part.desired_direction)}"
-    angle, area = part.evidence.get("pyramid_angle_rad"), part.evidence.get("feasible_solid_angle_sr")
-    if angle is None or area is None:
+    angle, known = part.evidence.get("pyramid_angle_rad"), known_rad(part)
+    if angle is None or known is None:
         return text
-    known = degrees(acos(max(1.0 - area / (2.0 * pi), -1.0)))  # half the opening of a cone of that solid angle
     return (
         f"{text} (consistent if the hand was off by up to {degrees(angle):.0f} degrees; "
-        f"the direction is known to about {known:.0f} degrees)"
+        f"the direction is known to about {degrees(known):.0f} degrees)"
     )
+
+
+def known_rad(part: Part) -> float | None:
+    """Half the opening of a cone with the solid angle of the directions that explain as much [rad], None if unknown."""
+    area = part.evidence.get("feasible_solid_angle_sr")
+    return None if area is None else acos(max(1.0 - area / (2.0 * pi), -1.0))
 
 
 def _free(part: Part) -> list[str]:

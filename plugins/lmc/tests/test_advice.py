@@ -1,0 +1,62 @@
+"""What `learn` says last: how sure what was learned is, and what to do next. Each rule by itself, on one document."""
+
+import copy
+
+import numpy as np
+import pytest
+from skillframe_lmc.advice import CUT, GOOD, OTHER_SIDE, advice
+from skillframe_lmc.learner import learn
+
+from skillframe.conformance.examples import example_demonstrations
+from skillframe.document.source import learned
+from skillframe.extend.records import LearnOptions
+from skillframe.extend.registry import registry
+
+pytestmark = pytest.mark.needs_plugins
+
+
+@pytest.fixture(scope="module")
+def known():
+    """A phase whose push is known, from two demonstrations, and which only holds its attitude."""
+    return learned(registry().skill("lmc"), list(example_demonstrations()), LearnOptions())
+
+
+def with_push(document, files=2, **evidence):
+    changed = copy.deepcopy(document)
+    changed["learned_from"] = changed["learned_from"][:1] * files
+    changed["phases"][0]["translation"]["evidence"] |= evidence
+    return changed
+
+
+def test_the_angle_is_the_half_opening_of_a_cone_of_that_solid_angle(known):
+    """2 pi (1 - cos 10 degrees)."""
+    area = 2.0 * np.pi * (1.0 - np.cos(np.radians(10.0)))
+    sure, then = advice(with_push(known, feasible_solid_angle_sr=area))
+    assert (sure, then) == ("the push is known to about 10 degrees; from 2 demonstrations", GOOD)
+
+
+def test_an_open_or_a_doubtful_direction_and_one_demonstration_ask_for_the_other_side(known):
+    sure, then = advice(with_push(known, ambiguous=True, feasible_half_width_rad=np.radians(30.0)))
+    assert sure.startswith("the push is open: up to 30 degrees to either side") and then == OTHER_SIDE
+    sure, then = advice(with_push(known, message="doubtful: all went one way; look"))
+    assert sure == "doubtful: all went one way; from 2 demonstrations" and then == OTHER_SIDE
+    sure, then = advice(with_push(known, files=1))
+    assert sure.endswith("from 1 demonstration") and then == f"{OTHER_SIDE}; one contradicts nothing"
+
+
+def test_without_a_direction_several_phases_are_cut_and_what_only_gives_way_is_good(known):
+    limp = with_push(known, message="no one push explains what was seen")
+    limp["phases"][0]["translation"] |= {"desired_direction": None, "fully_compliant": True, "compliant_axes": []}
+    assert advice(limp) == (
+        "no direction was found: what is free and what is held is all that was learned; from 2 demonstrations",
+        GOOD,
+    )
+    several = with_push(
+        limp, message="not even one demonstration alone is a single linear motion, so cut it into phases"
+    )
+    assert advice(several)[1] == CUT
+
+
+def test_a_phase_that_the_learner_gives_has_advice(known):
+    document = {"learned_from": [{}], **learn(list(example_demonstrations()[:1]), LearnOptions())}
+    assert advice(document)[1] == OTHER_SIDE  # one slope leaves the direction open
