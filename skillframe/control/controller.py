@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from skillframe.control.impedance import critical_damping, impedance_wrench, null_space_damping, task_inertia
+from skillframe.control.ticks import compiled_impedance
 from skillframe.frames import Float, Pose
 from skillframe.skill import Command, Impedance
 
@@ -44,7 +45,7 @@ class ImpedanceController:
     """The control law of N trials. Rows are independent of each other."""
 
     def __init__(self, count: int) -> None:
-        self._count = count
+        self._count, self._compiled = count, compiled_impedance(count)
         self._designed_for: Float | None = None
         self._damping: Float = np.zeros((count, 6, 6))
         self._projector: Float = np.zeros(0)
@@ -58,14 +59,24 @@ class ImpedanceController:
             reading: what the robots do.
             ramp: 0 ... 1 fades desired twist and feed-forward in, so that a start is bumpless.
         """
-        law = impedance_wrench(
-            command.pose, reading.pose, ramp * command.twist - reading.twist, command.impedance.stiffness,
-            self._damping_for(command.impedance, reading), ramp * command.feedforward,
-        )  # fmt: skip
-        torque: Float = (np.swapaxes(reading.jacobian, -1, -2) @ law[..., None])[..., 0] + reading.bias
+        law = self._wrench(command, reading, ramp)
+        torque: Float = (reading.jacobian.mT @ law[..., None])[..., 0]
+        torque += reading.bias
         if reading.velocity.shape[-1] > 6:
             torque += self._null_space(reading)
         return torque, law
+
+    def _wrench(self, command: Command, reading: Reading, ramp: float) -> Float:
+        """Equation (1)."""
+        damping = self._damping_for(command.impedance, reading)
+        if (law := self._compiled) is not None:
+            wrench = law.wrench(command, reading.pose, reading.twist, damping, ramp)
+            if wrench is not None:
+                return wrench
+        return impedance_wrench(
+            command.pose, reading.pose, ramp * command.twist - reading.twist, command.impedance.stiffness, damping,
+            ramp * command.feedforward,
+        )  # fmt: skip
 
     def _damping_for(self, impedance: Impedance, reading: Reading) -> Float:
         """The skill's damping, or critical damping designed again for the rows whose stiffness has changed."""
@@ -74,7 +85,7 @@ class ImpedanceController:
         stiffness = impedance.stiffness
         last = np.full((6, 6), np.nan) if self._designed_for is None else self._designed_for
         differs = stiffness != last
-        if not differs.any():
+        if not np.count_nonzero(differs):
             return self._damping
         shape = (self._count, 6, 6)
         changed = np.broadcast_to(differs, shape).any(axis=(-1, -2))

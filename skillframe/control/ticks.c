@@ -93,41 +93,72 @@ OUT int64_t inner(const Inner *n, int64_t heard_at)
 }
 
 typedef struct {
-    const double *turn, *desired, *at, *angle, *twist;
-    double *sine, *cosine, *axis, *error;
-    const double *wanted, *forward, *spring, *braked, *wrench, *squares, *felt, *push, *quiet;
-    double *drive, *force;
-    double step;
+    const double *turn, *desired, *at, *angle, *sine;
+    double *cosine, *axis, *error;
     int64_t count;
-} Law;
+} Apart;
 
 /* Sine times axis (N, 3) and cosine of the turn between two attitudes. */
-OUT int64_t turned(const Law *l)
+OUT int64_t turned(const Apart *p)
 {
-    for (int64_t i = 0; i < l->count; i++) {
-        const double *r = l->turn + 9 * i;
-        double *w = l->axis + 3 * i;
+    for (int64_t i = 0; i < p->count; i++) {
+        const double *r = p->turn + 9 * i;
+        double *w = p->axis + 3 * i;
         w[0] = 0.5 * (r[7] - r[5]);
         w[1] = 0.5 * (r[2] - r[6]);
         w[2] = 0.5 * (r[3] - r[1]);
-        l->cosine[i] = 0.5 * (r[0] + r[4] + r[8] - 1.0);
+        p->cosine[i] = 0.5 * (r[0] + r[4] + r[8] - 1.0);
     }
     return 0;
 }
 
-/* The error of a pose a step on. Returns whether a turn is near pi, where this is not how to find its axis. */
-OUT int64_t strayed(const Law *l)
+/* The error of a pose. Returns whether a turn is near pi, where this is not how to find its axis. */
+OUT int64_t apart(const Apart *p)
 {
     int64_t near_pi = 0;
-    for (int64_t i = 0; i < l->count; i++) {
-        double sine = l->sine[i], factor = sine > 1e-9 ? l->angle[i] / larger(sine, 1e-9) : 1.0;
-        near_pi |= sine < 1e-4 && l->cosine[i] < 0.0;
+    for (int64_t i = 0; i < p->count; i++) {
+        double sine = p->sine[i], factor = sine > 1e-9 ? p->angle[i] / larger(sine, 1e-9) : 1.0;
+        near_pi |= sine < 1e-4 && p->cosine[i] < 0.0;
         for (int64_t d = 0; d < 3; d++) {
-            l->error[6 * i + d] = l->desired[3 * i + d] - l->at[3 * i + d] - l->step * l->twist[6 * i + d];
-            l->error[6 * i + 3 + d] = l->axis[3 * i + d] * factor - l->step * l->twist[6 * i + 3 + d];
+            p->error[6 * i + d] = p->desired[3 * i + d] - p->at[3 * i + d];
+            p->error[6 * i + 3 + d] = p->axis[3 * i + d] * factor;
         }
     }
     return near_pi;
+}
+
+typedef struct {
+    const double *wanted, *twist, *forward, *spring, *braked;
+    double *off, *law;
+    int64_t numbers;
+} Spring;
+
+/* Desired less measured twist. */
+OUT int64_t off(const Spring *s, double ramp)
+{
+    for (int64_t k = 0; k < s->numbers; k++) s->off[k] = ramp * s->wanted[k] - s->twist[k];
+    return 0;
+}
+
+/* Spring, damper and feed-forward together. */
+OUT int64_t sprung(const Spring *s, double ramp)
+{
+    for (int64_t k = 0; k < s->numbers; k++) s->law[k] = s->spring[k] + s->braked[k] + ramp * s->forward[k];
+    return 0;
+}
+
+typedef struct {
+    const double *twist, *wanted, *forward, *spring, *braked, *wrench, *squares, *felt, *push, *quiet;
+    double *error, *drive, *force;
+    double step;
+    int64_t count;
+} Law;
+
+/* The error of a pose, a step on. */
+OUT int64_t ahead(const Law *l)
+{
+    for (int64_t k = 0; k < 6 * l->count; k++) l->error[k] -= l->step * l->twist[k];
+    return 0;
 }
 
 /* Spring and ramp times what is wanted besides. */

@@ -43,6 +43,80 @@ class LawSettings(NamedTuple):
     quiet: Float
 
 
+class _Apart:
+    """Desired less measured poses of N trials, as `skillframe.control.impedance.pose_error`.
+
+    Args:
+        count: N.
+        built: ticks.c.
+    """
+
+    def __init__(self, count: int, built: ctypes.CDLL) -> None:
+        self.error: Float = np.zeros((count, 6, 1))
+        """(N, 6, 1) metres, then rotation vectors."""
+        self._turn, (self._desired, self._at, self._axis) = np.zeros((count, 3, 3)), np.zeros((3, count, 3))
+        self._sine, self._cosine, self._angle = np.zeros((3, count))
+        record = Record({
+            "turn": self._turn, "desired": self._desired, "at": self._at, "angle": self._angle, "sine": self._sine,
+            "cosine": self._cosine, "axis": self._axis, "error": self.error, "count": count,
+        })  # fmt: skip
+        self._turned, self._apart = record.bound(built, "turned"), record.bound(built, "apart")
+
+    def found(self, desired: Pose, measured: Pose) -> bool:
+        """Find the error. False where a turn is near pi and it is not found."""
+        self._desired[:], self._at[:] = desired.position, measured.position
+        np.matmul(desired.rotation, measured.rotation.mT, out=self._turn)
+        self._turned()
+        np.vecdot(self._axis, self._axis, out=self._sine)
+        np.sqrt(self._sine, out=self._sine)
+        np.arctan2(self._sine, self._cosine, out=self._angle)
+        return not self._apart()
+
+
+class CompiledImpedance:
+    """Wrenches of N trials by equation (1) of `skillframe.control.impedance`.
+
+    Args:
+        count: N.
+        built: ticks.c.
+    """
+
+    def __init__(self, count: int, built: ctypes.CDLL) -> None:
+        self._apart = _Apart(count, built)
+        self._wanted, self._twist, self._forward, self._law = np.zeros((4, count, 6))
+        self._off, self._spring, self._braked = np.zeros((3, count, 6, 1))
+        record = Record({
+            "wanted": self._wanted, "twist": self._twist, "forward": self._forward, "spring": self._spring,
+            "braked": self._braked, "off": self._off, "law": self._law, "numbers": 6 * count,
+        })  # fmt: skip
+        self._find_off, self._find_law = (record.bound(built, name, ctypes.c_double) for name in ("off", "sprung"))
+
+    def wrench(self, command: Command, pose: Pose, twist: Float, damping: Float, ramp: float) -> Float | None:
+        """Wrenches (N, 6), an array of their own. None where a turn is near pi.
+
+        Args:
+            command: what the skill wants.
+            pose: measured.
+            twist: measured.
+            damping: (6, 6) or (N, 6, 6).
+            ramp: of desired twist and feed-forward.
+        """
+        if not self._apart.found(command.pose, pose):
+            return None
+        self._wanted[:], self._twist[:], self._forward[:] = command.twist, twist, command.feedforward
+        self._find_off(ramp)
+        np.matmul(command.impedance.stiffness, self._apart.error, out=self._spring)
+        np.matmul(damping, self._off, out=self._braked)
+        self._find_law(ramp)
+        return self._law.copy()
+
+
+def compiled_impedance(count: int) -> CompiledImpedance | None:
+    """A `CompiledImpedance`, or None without a compiler."""
+    built = library(SOURCE)
+    return None if built is None else CompiledImpedance(count, built)
+
+
 class CompiledAdmittance:
     """Drive and force of an admittance law of N trials: equation (2) of `skillframe.control.admittance` up to its gain.
 
@@ -55,33 +129,27 @@ class CompiledAdmittance:
     def __init__(self, count: int, settings: LawSettings, built: ctypes.CDLL) -> None:
         self.drive, self.force = np.zeros((2, count, 6))
         """(N, 6) drive, held to the push, and with damping and what is felt."""
-        self._turn = np.zeros((count, 3, 3))
-        self._desired, self._at, self._axis = np.zeros((3, count, 3))
-        self._sine, self._cosine, self._angle = np.zeros((3, count))
+        self._apart = _Apart(count, built)
         self._twist, self._forward, self._wrench = np.zeros((3, count, 6))
-        self._error, self._wanted, self._spring, self._braked = np.zeros((4, count, 6, 1))
+        self._wanted, self._spring, self._braked = np.zeros((3, count, 6, 1))
         self._squares, self._felt = np.zeros((2, count, 2))
         self._halves = self.drive.reshape(-1, 2, 3), self._wrench.reshape(-1, 2, 3)
         record = Record({
-            "turn": self._turn, "desired": self._desired, "at": self._at, "angle": self._angle, "twist": self._twist,
-            "sine": self._sine, "cosine": self._cosine, "axis": self._axis, "error": self._error,
-            "wanted": self._wanted, "forward": self._forward, "spring": self._spring, "braked": self._braked,
-            "wrench": self._wrench, "squares": self._squares, "felt": self._felt,
-            "push": np.array(settings.push, dtype=float), "quiet": settings.quiet, "drive": self.drive,
-            "force": self.force, "step": settings.step, "count": count,
+            "twist": self._twist, "wanted": self._wanted, "forward": self._forward, "spring": self._spring,
+            "braked": self._braked, "wrench": self._wrench, "squares": self._squares, "felt": self._felt,
+            "push": np.array(settings.push, dtype=float), "quiet": settings.quiet, "error": self._apart.error,
+            "drive": self.drive, "force": self.force, "step": settings.step, "count": count,
         })  # fmt: skip
-        self._turned, self._strayed = record.bound(built, "turned"), record.bound(built, "strayed")
-        self._driven, self._pushed = record.bound(built, "driven", ctypes.c_double), record.bound(built, "pushed")
+        self._ahead, self._pushed = record.bound(built, "ahead"), record.bound(built, "pushed")
+        self._driven = record.bound(built, "driven", ctypes.c_double)
 
     def strayed(self, desired: Pose, pose: Pose, twist: Float) -> bool:
         """Find the error that a step on at a twist (N, 6) leaves. False where a turn is near pi and it is not found."""
-        self._desired[:], self._at[:], self._twist[:] = desired.position, pose.position, twist
-        np.matmul(desired.rotation, pose.rotation.mT, out=self._turn)
-        self._turned()
-        np.vecdot(self._axis, self._axis, out=self._sine)
-        np.sqrt(self._sine, out=self._sine)
-        np.arctan2(self._sine, self._cosine, out=self._angle)
-        return not self._strayed()
+        if not self._apart.found(desired, pose):
+            return False
+        self._twist[:] = twist
+        self._ahead()
+        return True
 
     def find(self, command: Command, wrench: Float, ramp: float, gains: tuple[Float, Float, Float]) -> None:
         """Find drive and force, after the error.
@@ -95,7 +163,7 @@ class CompiledAdmittance:
         stiffness, wanted, damping = gains
         self._forward[:], self._wrench[:] = command.feedforward, wrench
         np.matmul(wanted, command.twist[..., None], out=self._wanted)
-        np.matmul(stiffness, self._error, out=self._spring)
+        np.matmul(stiffness, self._apart.error, out=self._spring)
         np.matmul(damping, self._twist[..., None], out=self._braked)
         self._driven(ramp)
         drive, felt = self._halves

@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.execution.trace import COLUMNS, MACHINE, Trace
-from skillframe.frames import Float, quaternion_from_matrix
+from skillframe.frames import Float
 from skillframe.skill import Command, Observation
 from skillframe.world.drawing import drawn_bodies
 from skillframe.world.plant import Plant
+from skillframe.world.reading import Quaternions
 
 CAPACITY, FIRST = 20_000, 1000  # samples per trial: at most, and before the arrays first grow
 
@@ -33,6 +34,7 @@ class Recorder:
     ) -> None:  # fmt: skip
         self._plant, self._every, self._point, self._capacity = plant, every, point, capacity
         count = plant.count
+        self._quaternions = Quaternions(count)
         positions, _ = plant.body_poses()
         shapes: dict[str, tuple[int, ...]] = {
             **COLUMNS, "q": (plant.configuration.shape[1],), "body_position": positions.shape[1:],
@@ -63,7 +65,7 @@ class Recorder:
         if self._length == len(self._data["time"]):
             self._make_room()
         positions, quaternions = self._plant.body_poses()
-        seen, desired = quaternion_from_matrix(np.stack([observation.pose.rotation, command.pose.rotation]))
+        seen, desired = self._quaternions.of(observation.pose.rotation, command.pose.rotation)
         sample: dict[str, Any] = {
             "time": observation.time, "position": observation.pose.position, "twist": observation.twist,
             "quaternion": seen, "wrench": observation.wrench,

@@ -18,7 +18,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from skillframe.errors import SkillframeError
-from skillframe.frames import Float, quaternion_from_matrix
+from skillframe.frames import Float, norm, quaternion_from_matrix
 from skillframe.robot.chain import ClosedChain
 from skillframe.robot.model import RobotModel
 from skillframe.robot.surroundings import collisions_note
@@ -146,10 +146,12 @@ class Collisions:
 
     def measure(self, plant: Plant, rows: NDArray[np.int64]) -> None:
         """Bring `distance` of some trials up to date with where their bodies are now."""
-        for row, posture in self._postures(plant, rows) if self.enabled else ():
-            self.distance[row] = self._probe.distance(*posture, float(np.nanmin([self.distance[row], FAR])))
-        if self.enabled:
-            self._at[rows], self._turn[rows] = self._coordinates(plant, rows, self._moved)
+        if not self.enabled:
+            return
+        known = np.fmin(self.distance, FAR).tolist()
+        for row, posture in self._postures(plant, rows):
+            self.distance[row] = self._probe.distance(*posture, known[row])
+        self._at[rows], self._turn[rows] = self._coordinates(plant, rows, self._moved)
 
     def _clear(self, plant: Plant, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Which of some trials cannot touch, since no body came so far from where it was last measured.
@@ -159,9 +161,9 @@ class Collisions:
         was. Where shapes are left out of it, or it is NaN, nothing is clear.
         """
         at, turn = self._coordinates(plant, rows, self._moved)
-        shift = np.sqrt(np.square(at - self._at[rows]).sum(axis=-1))
-        cosine = (turn * self._turn[rows]).sum(axis=-1)
-        chord = 2.0 * np.sqrt(np.clip(1.0 - np.square(cosine), 0.0, None))
+        before, turned = (self._at, self._turn) if len(rows) == len(self._at) else (self._at[rows], self._turn[rows])
+        shift = norm(at - before)
+        chord = 2.0 * np.sqrt(np.maximum(1.0 - np.square(np.vecdot(turn, turned)), 0.0))
         furthest = (shift + self._probe.reach * chord).max(axis=-1, initial=0.0)
         return np.asarray(self._probe.bounded & (self.distance[rows] > 2.0 * furthest))
 

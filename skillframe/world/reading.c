@@ -76,3 +76,30 @@ OUT int64_t weightless(const Wrist *wrist)
     }
     return 0;
 }
+
+typedef struct {
+    const double *rotation;
+    double *row;
+    int64_t count;
+} Turns;
+
+/* Of each rotation the best conditioned row of 4 q q^T. Returns how many rotations are not finite and have none. */
+OUT int64_t quaternions(const Turns *turns)
+{
+    int64_t unknown = 0;
+    for (int64_t i = 0; i < turns->count; i++) {
+        const double *r = turns->rotation + 9 * i;
+        double *q = turns->row + 4 * i, xx = r[0], yy = r[4], zz = r[8], trace = xx + yy + zz;
+        unknown += trace - trace != 0.0;
+        if (xx >= yy && xx >= zz && xx >= trace) {
+            q[0] = 1.0 + 2.0 * xx - trace, q[1] = r[1] + r[3], q[2] = r[2] + r[6], q[3] = r[7] - r[5];
+        } else if (yy >= zz && yy >= trace) {
+            q[0] = r[3] + r[1], q[1] = 1.0 + 2.0 * yy - trace, q[2] = r[5] + r[7], q[3] = r[2] - r[6];
+        } else if (zz >= trace) {
+            q[0] = r[6] + r[2], q[1] = r[7] + r[5], q[2] = 1.0 + 2.0 * zz - trace, q[3] = r[3] - r[1];
+        } else {
+            q[0] = r[7] - r[5], q[1] = r[2] - r[6], q[2] = r[3] - r[1], q[3] = 1.0 + trace;
+        }
+    }
+    return unknown;
+}

@@ -92,7 +92,11 @@ class Sensors:
 def _small_rotation(vector: Float) -> Float:
     """1 + K + K^2 / 2 of rotation vectors (..., 3): exact to 1e-10 for the milliradians of sensor noise."""
     k = skew(vector)
-    return np.eye(3) + k + 0.5 * (k @ k)
+    square = k @ k
+    square *= 0.5
+    k += np.eye(3)
+    k += square
+    return k
 
 
 def at_point(wrench: Float, rotation: Float, offset: Float) -> Float:

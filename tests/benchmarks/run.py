@@ -22,6 +22,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
+from skillframe.campaign.runner import CHUNK  # noqa: E402
 from skillframe.world.sensors import SensorSettings  # noqa: E402
 from tests.benchmarks import crane, interfaces, segmenter  # noqa: E402
 from tests.benchmarks.timing import Recorded, one_trial_loop, replay, timed_run  # noqa: E402
@@ -35,7 +36,7 @@ CASES = {
     "arm with the peg": ("panda", "peg_in_hole", impedance("x", "y"), 0.02, 1.5),
     "free tool with the peg": ("free_tool", "peg_in_hole", impedance("x", "y"), 0.02, 1.5),
 }
-COUNT, REPLAYED, REPEATS = 256, 24, 3  # the round with the median ratio is shown, and the median law of all rounds
+COUNT, REPLAYED, REPEATS = 256, 24, 5  # the round with the median ratio is shown, and the median law of all rounds
 
 
 def show(what, value, unit, bound=None, below=True):
@@ -47,35 +48,46 @@ def show(what, value, unit, bound=None, below=True):
     print(f"{what:<66} {value:9.3g} {unit}{verdict}", flush=True)
 
 
-def case(name):
+def case(name, count=COUNT):
     robot, world, stiffness, speed, duration = CASES[name]
     setting = replace(setup(robot, world), sensors=SensorSettings())
     if world == "valley":
-        draws = {"start.offset_x": np.linspace(-0.03, 0.03, COUNT)}
+        draws = {"start.offset_x": np.linspace(-0.03, 0.03, count)}
     else:
-        draws = {"start.tilt_y": np.linspace(-0.12, 0.12, COUNT)}
+        draws = {"start.tilt_y": np.linspace(-0.12, 0.12, count)}
     return setting, draws, stiffness, speed, duration
 
 
 def batch(name):
-    """Batch of 256 against the floor and against one trial at a time."""
-    setting, draws, stiffness, speed, duration = case(name)
-    rounds = []
-    for _ in range(REPEATS):
-        with Recorded(keep=REPLAYED) as recorded:
-            cpu, _, _ = timed_run(Push(DOWN, stiffness, speed=speed, stall=False), setting, draws, COUNT, duration)
-        alone = one_trial_loop(setting, np.array(DOWN), stiffness, speed, draws, 4, round(1000 * duration))
-        rounds.append((replay(setting, recorded), cpu, alone, recorded.seconds / COUNT / duration))
-    floor, cpu, alone, _ = sorted(rounds, key=lambda r: r[1] / r[0])[len(rounds) // 2]
+    """A chunk of a campaign, which keeps no traces, against the floor; the same of 256 with a trace; one at a time."""
+    chunk, large = (rounds(name, count, trace) for count, trace in ((CHUNK, None), (COUNT, 100.0)))
+    floor, cpu, _ = chunk
     show(f"{name}: bare mj_step", 1e3 * floor, "us/ms")
-    show(f"{name}: batch of {COUNT}", 1e3 * cpu, "us/ms")
+    show(f"{name}: chunk of {CHUNK} without traces", 1e3 * cpu, "us/ms")
+    show(f"{name}: chunk of {CHUNK} over bare mj_step", cpu / floor, "x", 1.3)
+    floor, cpu, law = large
+    show(f"{name}: batch of {COUNT} with a trace at 100 Hz over bare mj_step", cpu / floor, "x")
+    setting, draws, stiffness, speed, duration = case(name)
+    alone = one_trial_loop(setting, np.array(DOWN), stiffness, speed, draws, 4, round(1000 * duration))
     show(f"{name}: one-trial loop", 1e3 * alone, "us/ms")
-    show(f"{name}: batch over bare mj_step", cpu / floor, "x", 1.3)
-    show(f"{name}: one-trial loop over batch", alone / cpu, "x", 4.0 if "valley" in name else 1.3, below=False)
+    bound = 4.0 if "valley" in name else 1.3
+    show(f"{name}: one-trial loop over batch of {COUNT}", alone / cpu, "x", bound, below=False)
     # the same operations as in the valley, on arrays that the contacts of 256 trials have pushed out of the caches:
     # emptied by 64 MB of other writes after each step, the valley's figure rises to the peg's
-    law = float(np.median([r[1] - r[3] for r in rounds]))
     show(f"{name}: skill, law, filter, trace", 1e3 * law, "us/ms", 3.0)
+
+
+def rounds(name, count, trace_hz):
+    """Of a batch: CPU seconds per trial and simulated second of bare mj_step and of all, and the median without it."""
+    setting, draws, stiffness, speed, duration = case(name, count)
+    taken = []
+    for _ in range(REPEATS):
+        skill = Push(DOWN, stiffness, speed=speed, stall=False)
+        with Recorded(keep=REPLAYED) as recorded:
+            cpu, _, _ = timed_run(skill, setting, draws, count, duration, trace_hz)
+        taken.append((replay(setting, recorded), cpu, cpu - recorded.seconds / count / duration))
+    floor, cpu, _ = sorted(taken, key=lambda r: r[1] / r[0])[len(taken) // 2]
+    return floor, cpu, float(np.median([r[2] for r in taken]))
 
 
 def single(name, bound):

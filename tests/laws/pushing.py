@@ -42,7 +42,7 @@ class Push(Skill):
 
     def step(self, observation):
         self.position = self.position + (self.speed * observation.dt) * self.direction
-        lead = ((self.position - observation.pose.position) * self.direction).sum(-1)
+        lead = np.vecdot(self.position - observation.pose.position, self.direction)
         self.position = self.position - np.maximum(lead - self.lead, 0.0)[:, None] * self.direction
         status, reason = self._stalled(observation) if self.stall else (self.running, self.none)
         return Command(Pose(self.position, self.rotation), self.twist, self.impedance, self.zero, status, reason)

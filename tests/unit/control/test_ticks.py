@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from skillframe.control.admittance import AdmittanceLaw, Bounds
+from skillframe.control.controller import ImpedanceController, Reading
 from skillframe.control.inner_loop import InnerLoop
 from skillframe.control.joint_steps import JointRange, JointSteps
 from skillframe.control.limits import LimitGuard
@@ -96,6 +97,30 @@ def test_a_law_moves_by_the_same_twists_with_contact_that_rings_and_turns_of_hal
 
     with np.errstate(invalid="ignore"):
         agree(both(monkeypatch, make, run))
+
+
+@pytest.mark.parametrize("turn", [0.3, np.pi])
+@pytest.mark.parametrize("damped", [True, False])
+def test_an_impedance_law_gives_the_same_torques_for_turns_of_half_a_circle_too(turn, damped, monkeypatch):
+    jacobian, mass = np.random.default_rng(4).normal(size=(COUNT, 6, JOINTS)), np.eye(JOINTS)
+
+    def run(controller, rng):
+        rows = []
+        for tick in range(TICKS):
+            vectors = rng.normal(size=(2, COUNT, 3))
+            vectors[1] *= turn / np.linalg.norm(vectors[1], axis=-1)[:, None]
+            here = Pose(rng.normal(size=(COUNT, 3)), rotation_matrix(rng.normal(size=(COUNT, 3))))
+            pose = Pose(here.position + 0.01 * vectors[0], rotation_matrix(vectors[1]) @ here.rotation)
+            twist, wanted, push = rng.normal(size=(3, COUNT, 6))
+            bias, velocity = rng.normal(size=(2, COUNT, JOINTS))
+            reading = Reading(here, upset(twist, tick), jacobian, bias, velocity, lambda: np.tile(mass, (COUNT, 1, 1)))
+            spring = Impedance(np.diag([900.0, 900, 0, 20, 20, 20]), 30.0 * np.eye(6) if damped else None)
+            command = Command(pose, wanted, spring, push, np.zeros(COUNT, int), no_reasons(COUNT))
+            rows.append(np.concatenate(controller.torque(command, reading, tick / TICKS), axis=1))
+        return rows
+
+    with np.errstate(invalid="ignore"):
+        agree(both(monkeypatch, lambda: ImpedanceController(COUNT), run))
 
 
 @pytest.mark.parametrize("joints", [6, 7])

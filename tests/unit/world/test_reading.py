@@ -1,10 +1,12 @@
-"""Jacobian and wrist sensor in C are those of numpy beside them, to the last bit."""
+"""Jacobian, wrist sensor and quaternions in C are those of numpy beside them, to the last bit."""
 
 import numpy as np
 import pytest
 
+from skillframe.frames import quaternion_from_matrix, rotation_matrix
 from skillframe.world.placement import fixture_poses
 from skillframe.world.plant import Plant
+from skillframe.world.reading import Quaternions
 from skillframe.world.sensors import BLOCK, Sensors, SensorSettings
 from tests import fmu_cache
 from tests.laws.crane_plants import crane, empty_scene
@@ -66,3 +68,15 @@ def test_readings_of_the_wrist_agree_before_and_after_a_tare_and_over_blocks_of_
     np.testing.assert_array_equal(*seen)
     # the mean of 20 samples of 0.3 N is 0 within 0.07 N; without the tare there are biases of 1 N and the arm's fall
     assert np.abs(seen[0][-20:].mean(axis=0)).max() < 0.5 < np.abs(seen[0][:BLOCK].mean(axis=0)).max()
+
+
+@pytest.mark.parametrize("lost", [False, True])
+def test_quaternions_agree_near_every_half_circle_and_where_a_trial_is_lost(lost, compiler):
+    axes = np.concatenate([np.eye(3), -np.eye(3), np.ones((1, 3)) / np.sqrt(3.0), np.zeros((1, 3))])
+    near = 1e-3 * np.random.default_rng(6).normal(size=(len(axes), 3))
+    first, second = (rotation_matrix(angle * axes + near) for angle in (np.pi, 2.0))
+    if lost:
+        first[3, 1, 2] = second[2, 0, 0] = np.nan
+    now = Quaternions(len(axes))
+    assert now._rows is not None
+    np.testing.assert_array_equal(now.of(first, second), quaternion_from_matrix(np.stack([first, second])))
