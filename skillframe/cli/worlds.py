@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -116,15 +117,19 @@ def new(plug: Path, socket: Path, units: str | None, out: Path, friction: float,
       skillframe worlds new plug.stl socket.stl --units mm
     """
     from skillframe.files import write_whole
-    from skillframe.parts.found import lines, new_text, relative
+    from skillframe.parts.found import lines, needs_units, new_text, relative
     from skillframe.parts.load import load
 
     if out.suffix != ".toml":
         raise InputError(out, "is to be named .toml, as --world knows such files by", "choose another --out")
     if out.exists():
         raise InputError(out, "exists", "choose another --out, or edit it")
-    said = '"auto"' if axis == "auto" else axis
-    text = new_text(out.name, relative(plug, out), relative(socket, out), units, friction, said)
+    if not out.parent.is_dir():
+        raise InputError(out, f"cannot be written: there is no folder {out.parent}", "make it first")
+    names_of_both = relative(plug, out), relative(socket, out)
+    if units is None and needs_units(*names_of_both):
+        raise InputError("--units", f"is missing: {plug.name} and {socket.name} do not say it", "give --units mm")
+    text = new_text(out.name, *names_of_both, units, friction, _axis(axis))
     write_whole(out, text.encode())
     try:
         found = lines(load(out))
@@ -132,6 +137,19 @@ def new(plug: Path, socket: Path, units: str | None, out: Path, friction: float,
         out.unlink(missing_ok=True)  # nobody wants a file of parts that are refused
         raise
     click.echo("\n".join([f"{out} written", *found]))
+
+
+def _axis(said: str) -> str:
+    """`--axis` as TOML: three numbers, or "auto"."""
+    import json
+
+    try:
+        found = said if said == "auto" else [float(each) for each in json.loads(said)]
+    except (ValueError, TypeError):
+        found = []
+    if said != "auto" and (len(found) != 3 or not any(found) or not all(math.isfinite(float(x)) for x in found)):
+        raise InputError(f"--axis {said!r}", "is no direction", 'give three numbers as "[0, 0, -1]", or auto')
+    return json.dumps(found)
 
 
 @command.command()

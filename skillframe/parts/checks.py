@@ -26,6 +26,25 @@ _ROUND = np.radians(30.0)
 _BESIDE = 1e-3
 
 
+def check_two(plug: MeshPart, socket: MeshPart) -> None:
+    """Refuse one mesh in both places.
+
+    Raises:
+        InputError: says so.
+    """
+    if plug.sha256 == socket.sha256:
+        what = f"{plug.name} and {socket.name} are one and the same mesh"
+        raise InputError("the two parts", what, "give the held part, then the one that stands")
+
+
+def around(fit: PartsFit, plug: MeshPart, socket: MeshPart) -> tuple[str, ...]:
+    """What is said of a held part that is the outer one half way in: a cap on a post is, and so are swapped files."""
+    held, standing = (solid.slice(-0.5 * fit.depth) for solid in (fit.plug, fit.socket))
+    if held.is_empty() or standing.is_empty() or not (standing - held.hull()).is_empty():
+        return ()
+    return (f"{plug.name}, which is held, reaches around {socket.name}, which stands; were the two swapped?",)
+
+
 def check_clearance(fit: PartsFit) -> None:
     """Refuse parts without play.
 

@@ -6,6 +6,8 @@ PLY and OFF carry no unit, and none is guessed.
 
 from __future__ import annotations
 
+import os
+import stat
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -162,6 +164,7 @@ def read_fixture(path: Path) -> FixtureFile:
     Raises:
         InputError: a key or value that cannot be used, a mesh without units, or a mesh that is not there.
     """
+    check_file(path, path, "check the path")
     file = build(FixtureFile, read_toml(path), str(path))
     for key, part in (("fixture", file.fixture), ("tool", file.tool)):
         _check_mesh(part, path, key)
@@ -172,10 +175,35 @@ def read_fixture(path: Path) -> FixtureFile:
     return file
 
 
+def check_file(path: Path, where: object, fix: str, *, name: str = "") -> None:
+    """Refuse what is not there, and what would never end: a folder, a pipe, a device, a link to itself.
+
+    Args:
+        path: the file.
+        where: for the message.
+        fix: what to do if it is not there.
+        name: it as its user wrote it, if that is not `where`.
+
+    Raises:
+        InputError: says what is there in its place.
+    """
+    named = f": {name}" if name else ""
+    try:
+        kind = path.stat().st_mode
+    except FileNotFoundError:
+        link = path.is_symlink()
+        what = f"is a link to {os.readlink(path)!r}, which is not there" if link else "no such file"
+        raise InputError(where, what + named, fix) from None
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+        raise InputError(where, f"cannot be opened ({getattr(error, 'strerror', None) or error}){named}", fix) from None
+    if not stat.S_ISREG(kind):
+        what = "is a folder" if stat.S_ISDIR(kind) else "is a pipe or a device, not a file"
+        raise InputError(where, what + named, "name a file")
+
+
 def _check_mesh(part: FixturePart | HeldPart, path: Path, key: str) -> None:
     file = path.parent / part.mesh
-    if not file.is_file():
-        raise InputError(f"{path}: {key}.mesh", f"no such file: {part.mesh!r}", "it is relative to the fixture file")
+    check_file(file, f"{path}: {key}.mesh", "it is relative to the fixture file", name=repr(part.mesh))
     if not file.resolve().is_relative_to(path.parent.resolve()):
         what = f"{part.mesh} lies outside the fixture file's folder"
         raise InputError(f"{path}: {key}.mesh", what, "put meshes and fixture file into one folder")

@@ -23,6 +23,7 @@ NEAR = 8e-4
 _STEP, _MOST_STEPS = 5e-4, 160
 _GAPS, _FAR = 24, (5e-4, 5e-3)  # looked for near by first, which is faster
 _RATIO = 50.0
+_BESIDE = 0.1  # of the part's size, how far its tip may lie outside it
 Axis = tuple[float, float, float]
 _AXES = ((0, 0, -1), (0, 0, 1), (-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0))
 
@@ -71,7 +72,7 @@ def fit(plug: MeshPart, socket: MeshPart, file: FixtureFile) -> PartsFit:
     depth = float(mouth - tip[2])
     if depth <= 0.0:
         what = f"{plug.name} does not go into {socket.name}: nothing of it lies below a mouth"
-        raise InputError("the assembled pose", what, "move [tool] assembled, or give task.axis")
+        raise InputError("the assembled pose", what, "move [tool] assembled, give task.axis, or check the units")
     lifts: Float = depth * np.arange(1.0, _GAPS + 1.0) / (_GAPS + 1.0)
     gaps: Float = np.array([_gap(_lifted(one, lift), two) for lift in lifts])
     inside = np.reshape(one.trim_by_plane([0.0, 0.0, -1.0], 0.0).bounding_box(), (2, 3))
@@ -190,11 +191,20 @@ def _mouth(plug: Any, socket: Any) -> float:
 def _tip(plug: Any, mouth: float, turn: Float, file: FixtureFile) -> Float:
     """The tip (3,) of the assembled part, after the turn."""
     if file.tool.tip != "auto":
-        return np.asarray(turn @ np.array(file.tool.tip), dtype=float)
+        return _given_tip(plug, turn @ np.array(file.tool.tip))
     low = float(plug.bounding_box()[2])
     inside = plug.trim_by_plane([0.0, 0.0, -1.0], -mouth) if low < mouth else plug
     middle = np.reshape(inside.bounding_box(), (2, 3)).mean(axis=0)
     return np.array([middle[0], middle[1], low])
+
+
+def _given_tip(plug: Any, tip: Float) -> Float:
+    low, high = np.reshape(plug.bounding_box(), (2, 3))
+    away = float(np.linalg.norm(np.maximum(0.0, np.maximum(low - tip, tip - high))))
+    if away > _BESIDE * float(np.linalg.norm(high - low)):
+        what = f"lies {1000.0 * away:.3g} mm outside the assembled part"
+        raise InputError("tool.tip", what, 'give it in metres in the frame of assembled, or "auto"')
+    return np.asarray(tip, dtype=float)
 
 
 def tilted(fit: PartsFit, tilt: Float, tip: Float) -> Any:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
 from skillframe.errors import InputError
 from skillframe.parts.checks import SHARE
+from skillframe.parts.declared import check_file
 from skillframe.parts.load import LoadedParts, PreparedPart
 
 FILE = """\
@@ -26,19 +28,30 @@ axis = {axis}            # of insertion; "auto" takes the first of -z, z, -x, x,
 
 def new_text(name: str, plug: str, socket: str, units: str | None, friction: float, axis: str) -> str:
     """The text of a fixture file for two meshes, named relative to it."""
-    lines = [f"units = {_quoted(units)}\n" if units and not m.lower().endswith(".glb") else "" for m in (socket, plug)]
+    stated = [needs_units(mesh) or not needs_units(plug, socket) for mesh in (socket, plug)]
+    lines = [f"units = {_quoted(units)}\n" if units and said else "" for said in stated]
     return FILE.format(
         name=name, socket=_quoted(socket), plug=_quoted(plug), socket_units=lines[0], plug_units=lines[1],
         friction=friction, axis=axis,
     )  # fmt: skip
 
 
+def needs_units(*meshes: str) -> bool:
+    """Does any of these files not say what its numbers are? GLB has metres."""
+    return any(not mesh.lower().endswith(".glb") for mesh in meshes)
+
+
 def relative(mesh: Path, file: Path) -> str:
     """A mesh's path as the fixture file is to say it.
 
     Raises:
-        InputError: it lies outside the file's folder.
+        InputError: it is no file, lies outside the fixture file's folder, or its name is no text.
     """
+    check_file(mesh, mesh, "check the path")
+    try:
+        str(mesh).encode()
+    except UnicodeEncodeError:
+        raise InputError(ascii(str(mesh)), "has a name that is no text in UTF-8", "rename it") from None
     try:
         return mesh.resolve().relative_to(file.resolve().parent).as_posix()
     except ValueError:
@@ -47,7 +60,8 @@ def relative(mesh: Path, file: Path) -> str:
 
 
 def _quoted(text: str | None) -> str:
-    return '"' + str(text).replace("\\", "\\\\").replace('"', '\\"') + '"'
+    """Text as TOML's basic string, in which escapes are those of JSON."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def values(loaded: LoadedParts) -> dict[str, Any]:

@@ -14,9 +14,11 @@ from skillframe.frames import Float
 from skillframe.parts.checks import (
     HEAVY,
     SHARE,
+    around,
     check_clearance,
     check_error,
     check_facets,
+    check_two,
     check_walls,
     unfit_pieces,
 )
@@ -123,6 +125,7 @@ def _digest(path: Path) -> str:
 def _load(path: Path, hashes: Mapping[str, str]) -> LoadedParts:
     file = read_fixture(path)
     plug, socket = (read_part(path.parent / each.mesh, each.units) for each in (file.tool, file.fixture))
+    check_two(plug, socket)
     found = fit(plug, socket, file)
     check_clearance(found)
     check_facets(found, plug, socket)
@@ -131,7 +134,7 @@ def _load(path: Path, hashes: Mapping[str, str]) -> LoadedParts:
     mass, center, inertia, notes = _inertia(found, plug, file)
     return LoadedParts(
         name_of(path), file, found, held, standing, mass, center, inertia, _starts(found, file),
-        (*plug.notes, *socket.notes, *notes), hashes,
+        (*plug.notes, *socket.notes, *notes, *around(found, plug, socket)), hashes,
     )  # fmt: skip
 
 

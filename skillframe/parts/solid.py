@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from skillframe.errors import InputError, need
 from skillframe.frames import Float, cross
+from skillframe.parts.contents import check_contents, no_number
 from skillframe.parts.declared import SCALES
 from skillframe.robot.meshes import LARGEST_FILE
 
@@ -64,12 +65,14 @@ def read_part(path: Path, units: str | None) -> MeshPart:
     need("trimesh")
     need("manifold3d")
     raw = _content(path)
+    left_out = check_contents(raw, path)
     vertices, faces = _triangles(raw, path)
     _check_numbers(vertices, faces, path)
     _check_size(vertices, units or "m", path)
     vertices, faces = _merged(vertices * SCALES[units or "m"], faces)
     _check_closed(vertices, faces, path)
     solid, notes = _united(vertices, faces, path)
+    notes = (*left_out, *notes)
     if solid.num_tri() > MOST_TRIANGLES:
         before, solid = solid.num_tri(), solid.simplify(THINNED_BY)
         kept = f"{path.name} has {before:,} triangles; {solid.num_tri():,} are kept within {THINNED_BY * 1e6:g} um"
@@ -124,7 +127,7 @@ def _triangles(raw: bytes, path: Path) -> tuple[Float, Faces]:
         mesh = trimesh.load(io.BytesIO(raw), file_type=kind, force="mesh", process=False)
         vertices, faces = np.array(mesh.vertices, dtype=float), np.array(mesh.faces, dtype=np.int64)
     except Exception as error:  # its readers raise whatever they stumble on
-        said = f" ({' '.join(str(error).split())[:120]})" if str(error) else ""
+        said = no_number(raw, path) or f" ({' '.join(str(error).split())[:120]})"
         raise InputError(path, f"cannot be read as {kind.upper()}{said}", "export it again") from None
     return vertices.reshape(-1, 3), faces.reshape(-1, 3)
 
@@ -135,7 +138,8 @@ def _check_numbers(vertices: Float, faces: Faces, path: Path) -> None:
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise InputError(path, "has triangles of vertices that it does not have", "export it again")
     if bad := int(np.sum(~np.isfinite(vertices).all(axis=1))):
-        raise InputError(path, f"holds {bad} vertices that are not finite numbers", "export it again")
+        what = f"has {bad} of {len(vertices)} vertices that are not finite numbers (NaN or infinite)"
+        raise InputError(path, what, "export it again")
 
 
 def _check_size(vertices: Float, units: str, path: Path) -> None:
