@@ -23,7 +23,7 @@ from skillframe.api.tasks import Robot
 from skillframe.campaign import evaluate
 from skillframe.campaign.folder import campaign_hash, load, prepare
 from skillframe.campaign.replay import pick_label
-from skillframe.campaign.rows import columns
+from skillframe.campaign.rows import absent, columns
 from skillframe.campaign.runner import Options, Progress, run_campaign, trace_path
 from skillframe.campaign.spec import CampaignSpec, place_of
 from skillframe.campaign.store import ordered, read_content
@@ -103,7 +103,7 @@ class CampaignResults:
         """
         label = pick_label(self.spec.labels, skill)
         mine = [row for row in self.rows if row["skill"] == label]
-        return {name: np.array([row.get(name, "") for row in mine]) for name in columns(self.spec)}
+        return {name: np.array([row.get(name, absent(name)) for row in mine]) for name in columns(self.spec, self.rows)}
 
     def run_of(self, trial: int, skill: str | None = None) -> SingleRun:
         """A trial that left a trace: of each skill the first two, the typical success and the first failures.

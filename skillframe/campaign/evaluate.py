@@ -18,7 +18,7 @@ import numpy as np
 from skillframe.campaign.axes import Value
 from skillframe.campaign.chunk_progress import report_progress
 from skillframe.campaign.noted import setup_notes
-from skillframe.campaign.rows import EXTRA, JUDGED, OUTCOME, SCORE, TRACE, ChunkJob, Row, plain_value, rows_of
+from skillframe.campaign.rows import EXTRA, JUDGED, OUTCOME, SCORE, SECOND, TRACE, ChunkJob, Row, plain_value, rows_of
 from skillframe.campaign.sampling import draws, trial_rngs
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.trouble import needed
@@ -179,7 +179,9 @@ def _simulate(
     )  # fmt: skip
     if result.interrupted:  # rows that a Ctrl-C cut short are no outcome
         raise KeyboardInterrupt
-    rows = rows_of(spec, job.skill, trials, {name: getattr(result, name) for name in (*OUTCOME, *JUDGED, *EXTRA)})
+    outcomes = {name: getattr(result, name) for name in (*OUTCOME, *JUDGED, *EXTRA)}
+    outcomes |= {SECOND + name: moved for name, moved in result.second.items()}
+    rows = rows_of(spec, job.skill, trials, outcomes)
     for row, trace in zip(rows, result.traces or [], strict=job.traces or bool(spec.scores)):
         drawn = {name: row[name] for name in spec.vary}
         trace.meta.update({"seed": row["seed"], "trial": row["trial"], "skill": row["skill"], "draws": drawn})

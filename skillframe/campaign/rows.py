@@ -1,14 +1,15 @@
 """One row a trial and skill: its columns, its text form, and what two of them have to have in common.
 
 A row is a flat dict: `trial`, `skill`, `seed`, every varied quantity, then `OUTCOME` and `JUDGED`, then the scores that
-the campaign asks for; a stored row also keeps `status` and `reason`. A row of version 0.1 has no `JUDGED`: those cells
-stay empty. Numbers that JSON does not know (NaN, infinities) are stored as text and read back as numbers.
+the campaign asks for, then how far second parts of the fixture moved; a stored row also keeps `status` and `reason`. A
+row of version 0.1 has no `JUDGED`: those cells stay empty. Numbers that JSON does not know (NaN, infinities) are stored
+as text and read back as numbers.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -37,6 +38,8 @@ TRUTH = {"1": True, "true": True, "1.0": True, "0": False, "false": False, "0.0"
 """How a table may say whether a trial succeeded."""
 SCORE = "score."
 """Begins the columns of scores."""
+SECOND = "second."
+"""Begins the columns of second parts: how far each had moved at the end."""
 TRACE = "trace"
 """Key of a row's trace as the bytes of a trace file, taken out before the row is stored."""
 
@@ -72,13 +75,14 @@ def trials_of(job: ChunkJob, spec: CampaignSpec) -> str:
     return f"{numbers} of {spec.labels[job.skill]}"
 
 
-def columns(spec: CampaignSpec) -> list[str]:
-    """The columns of results.csv."""
-    return ["trial", "skill", "seed", *spec.vary, *OUTCOME, *JUDGED, *score_columns(spec)]
+def columns(spec: CampaignSpec, rows: Iterable[Row] = ()) -> list[str]:
+    """The columns of results.csv. Those of second parts are the world's, so they are known from its rows alone."""
+    second = sorted({name for row in rows for name in row if name.startswith(SECOND)})
+    return ["trial", "skill", "seed", *spec.vary, *OUTCOME, *JUDGED, *score_columns(spec), *second]
 
 
 def score_columns(spec: CampaignSpec) -> list[str]:
-    """The columns of the scores that a campaign asks for, which come last."""
+    """The columns of the scores that a campaign asks for."""
     return [SCORE + name for name in spec.scores]
 
 
@@ -89,10 +93,11 @@ def rows_of(spec: CampaignSpec, skill: int, trials: tuple[int, ...], outcomes: M
         spec: the campaign.
         skill: index of the skill.
         trials: n trial numbers.
-        outcomes: `OUTCOME` and, where there are, `JUDGED`, `EXTRA` and columns of scores, each (n,).
+        outcomes: `OUTCOME` and, where there are, `JUDGED`, `EXTRA`, columns of scores and of second parts, each (n,).
     """
     drawn = draws(spec, trials)
-    given = {name: outcomes[name] for name in _outcome_names(spec) if name in outcomes}
+    second = [name for name in outcomes if name.startswith(SECOND)]
+    given = {name: outcomes[name] for name in (*_outcome_names(spec), *second) if name in outcomes}
     return [
         {"trial": trial, "skill": spec.labels[skill], "seed": spec.seed}
         | {name: plain_value(values[i]) for name, values in {**drawn, **given}.items()}
@@ -128,9 +133,14 @@ def decode(row: Row) -> Row:
     measures = (*MEASURES, *JUDGED_MEASURES)
 
     def is_number(key: str) -> bool:
-        return key in measures or key.startswith(SCORE)
+        return key in measures or key.startswith((SCORE, SECOND))
 
     return {key: float(v) if is_number(key) and isinstance(v, str) else v for key, v in row.items()}
+
+
+def absent(name: str) -> Any:
+    """What a table says in a column that a row does not have."""
+    return math.nan if name.startswith(SECOND) else ""
 
 
 def cell(value: Any) -> str:

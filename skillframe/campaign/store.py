@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from skillframe.campaign.rows import Row, cell, columns, decode, encode
+from skillframe.campaign.rows import Row, absent, cell, columns, decode, encode
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.verify import FIX, KEYS, KINDS, Line, check_rows, check_shape
 from skillframe.errors import InputError
@@ -282,7 +282,7 @@ def write_results(folder: Path, spec: CampaignSpec, rows: Sequence[Row]) -> None
     """Write results.csv from ordered rows."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    names = columns(spec)
+    names = columns(spec, rows)
     writer.writerow(names)
-    writer.writerows([cell(row.get(name, "")) for name in names] for row in rows)
+    writer.writerows([cell(row.get(name, absent(name))) for name in names] for row in rows)
     write_whole(folder / RESULTS, text.getvalue().encode())

@@ -135,6 +135,7 @@ def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) ->
     from skillframe.execution.tracemeta import SHARE_JOINTS, SHARES
     from skillframe.reports.motors import said_of_motors
     from skillframe.reports.peaks import said
+    from skillframe.reports.second import told_of_second
 
     keys = ["success", "failure", "reason", "duration_s", "peak_force_n", "final_error_m", "final_error_rad"]
     outcome = {key: _known(meta[key]) for key in keys}
@@ -150,6 +151,7 @@ def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) ->
         named = {what: str(path) if path else None for what, path in files.items()}
         where = {name: meta[name] for name in ("robot", "interface", "world", "progress")}
         where |= {"scores": meta.get("scores") or {}, "touched": meta.get("touched"), "notes": notes}
+        where |= {"second": meta["second"]} if meta.get("second") else {}
         click.echo(json.dumps({**outcome, **judged, **where, **named}, sort_keys=True))
         return
     click.echo(f"success: {_scene(meta)}" if meta["success"] else f"failure: {meta['failure']}\n  {_scene(meta)}")
@@ -159,6 +161,8 @@ def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) ->
         forces = ", ".join(said(meta, "{:.1f}".format))
         ended += f"; {forces}; {missed} mm and {turned} degrees from the goal"
     click.echo(ended)
+    if meta.get("second"):
+        click.echo(f"  second parts: {', '.join(told_of_second(meta['second']))}")
     if motors := said_of_motors(meta):
         click.echo(f"  motors: {', '.join(motors)}")
     for name, score in (meta.get("scores") or {}).items():

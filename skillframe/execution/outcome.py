@@ -20,6 +20,7 @@ from skillframe.execution.drive import Drive, TrialRecorder
 from skillframe.execution.result import Result
 from skillframe.execution.setup import Setup
 from skillframe.execution.tracemeta import SHARE_JOINTS, SHARES
+from skillframe.frames import Float
 from skillframe.skill import Status, no_reasons
 from skillframe.world.collisions import Collisions
 
@@ -49,6 +50,7 @@ class Outcomes:
         self.filtered, self.way = np.full(count, np.nan), np.full(count, np.nan)
         self.shares = np.full((3, count), np.nan)
         self.joints = np.full((3, count), "", dtype=object)  # of torque, speed and range, as the shares
+        self.second: dict[str, Float] = {}
         self.goal, self.errors, self.energy = np.zeros(count, dtype=bool), np.zeros((count, 2)), np.zeros(count)
 
     def close(self, rows: NDArray[np.int64], time: float, reason: str, code: Ended, limit: bool) -> None:
@@ -64,6 +66,8 @@ class Outcomes:
         state = self.drive.plant.tip_state()
         self.goal[rows] = self.setup.scene.goal(state)[rows]
         self.errors[rows] = np.stack(self.setup.scene.goal_error(state), axis=-1)[rows]
+        for name, value in state.second.items():
+            self.second.setdefault(name, np.full(self.count, np.nan))[rows] = value[rows]
         if self.setup.scene.way is not None:
             self.way[rows] = self.setup.scene.way.reached(state)[rows]
         self.duration[rows], self.limited[rows] = time, limit
@@ -108,7 +112,7 @@ class Outcomes:
             **dict(zip(SHARE_JOINTS, self.joints, strict=True)),
             goal_reached=self.goal, ended_itself=self.ended_by == Ended.SKILL.value,
             distance_to_collision_m=collisions.distance,
-            traces=traces, interrupted=interrupted,
+            second=self.second, traces=traces, interrupted=interrupted,
         )  # fmt: skip
 
     def _failure(self, i: int) -> str:
@@ -142,6 +146,7 @@ class Outcomes:
             "final_error_rad": float(self.errors[i, 1]), "analytic": scene.analytic,
             "progress": None if scene.way is None else scene.way.told(_known(self.way[i])),
             "events": [[time, text] for time, text in journal(i)],
+            **({"second": {key: _known(value[i]) for key, value in self.second.items()}} if self.second else {}),
             "limits": asdict(self.setup.limits), **({"touched": [*self.touched[i]]} if i in self.touched else {}),
             **({"actuators": actuators} if actuators else {}),
         }  # fmt: skip

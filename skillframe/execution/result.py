@@ -44,6 +44,7 @@ class Result:
         goal_reached: the scene's goal held when the trial ended, whatever ended it.
         ended_itself: the skill itself ended the trial, not the clock, a limit or a fault.
         distance_to_collision_m: smallest distance of bodies that may not touch, as `Collisions.distance` says.
+        second: by name how far second parts of the fixture had moved when the trial ended, as `State.second`.
         traces: one per trial if asked for.
         interrupted: Ctrl-C came before the end; what was running is closed as it stood.
     """
@@ -69,6 +70,7 @@ class Result:
     goal_reached: NDArray[np.bool_] = field(default_factory=_never)
     ended_itself: NDArray[np.bool_] = field(default_factory=_never)
     distance_to_collision_m: Float = field(default_factory=_none)
+    second: dict[str, Float] = field(default_factory=dict)
     traces: list[Trace] | None = None
     interrupted: bool = False
 

@@ -17,7 +17,9 @@ SHARE_JOINTS = ("peak_torque_joint", "peak_speed_joint", "peak_range_joint")
 """Names of what joints used of their limits at most, and of the joints."""
 LARGEST = 1e100  # beyond it squares overflow
 KINDS: dict[str, type | tuple[type, ...]] = {
-    **dict.fromkeys(("analytic", "draws", "frames", "interface", "limits", "params", "progress", "scores"), dict),
+    **dict.fromkeys(
+        ("analytic", "draws", "frames", "interface", "limits", "params", "progress", "scores", "second"), dict
+    ),
     **dict.fromkeys(("actuators", "bodies", "center_of_compliance", "events", "notes", "touched"), list),
     **dict.fromkeys(("duration_s", "peak_force_n", "final_error_m", "final_error_rad"), (int, float)),
     **dict.fromkeys(("peak_force_filtered_n", "peak_force_10ms_n", "distance_to_collision_m"), (int, float)),

@@ -7,6 +7,7 @@ PLY and OFF carry no unit, and none is guessed.
 from __future__ import annotations
 
 import os
+import re
 import stat
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -144,10 +145,85 @@ class TaskKeys:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class BoxShape:
+    """A box of a second part.
+
+    Attributes:
+        size: its three edges [m, 1um to 2m].
+        xyz: of its middle [m, -100m to 100m].
+        rpy: roll, pitch and yaw about fixed x, y, z [rad, -360deg to 360deg].
+    """
+
+    size: _Vector
+    xyz: _Vector = (0.0, 0.0, 0.0)
+    rpy: _Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CylinderShape:
+    """A cylinder of a second part, along its z.
+
+    Attributes:
+        radius: [m, 1um to 1m].
+        length: [m, 1um to 2m].
+        xyz: of its middle [m, -100m to 100m].
+        rpy: roll, pitch and yaw about fixed x, y, z [rad, -360deg to 360deg].
+    """
+
+    radius: float
+    length: float
+    xyz: _Vector = (0.0, 0.0, 0.0)
+    rpy: _Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SecondPart:
+    """`[[second]]`, a further part of the fixture, drawn as it stands at the start, in the frame of `pose`.
+
+    Attributes:
+        name: one of its own.
+        joint: "fixed", "hinge" (turns about an axis), "slide" (moves along it) or "free" (lies there).
+        mesh: its file, or boxes and cylinders.
+        units: of the file; GLB has metres.
+        pose: of the mesh.
+        boxes, cylinders: of which it consists, in the frame of `pose`.
+        density: in kg/m3 [1 to 30000].
+        mass: in place of its density [kg, 0.01g to 100kg].
+        anchor: a point of the hinge's axis [m, -100m to 100m].
+        axis: of the hinge or slide, of any length but 0.
+        range: least and largest travel from the start, in rad of a hinge and m of a slide.
+        stiffness: of a spring, in Nm/rad of a hinge and N/m of a slide [0 to 1e6].
+        rest: where the spring is slack, in rad or m.
+        damping: in Nms/rad or Ns/m [0 to 1e5].
+        friction: of the joint, in Nm or N [0 to 1e4].
+        goal: least and largest travel at the end, in rad or m (of a free part how far its centre went).
+    """
+
+    name: str
+    joint: Literal["fixed", "hinge", "slide", "free"]
+    mesh: str = ""
+    units: Units | None = None
+    pose: MeshPlace = field(default_factory=MeshPlace)
+    boxes: tuple[BoxShape, ...] = ()
+    cylinders: tuple[CylinderShape, ...] = ()
+    density: float | None = None
+    mass: float | None = None
+    anchor: _Vector = (0.0, 0.0, 0.0)
+    axis: _Vector = (0.0, 0.0, 1.0)
+    range: tuple[float, float] | None = None
+    stiffness: float = 0.0
+    rest: float = 0.0
+    damping: float = 0.0
+    friction: float = 0.0
+    goal: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FixtureFile:
     """A whole `fixture.toml`.
 
     Attributes:
+        second: further parts of the fixture.
         summary: what it is, for people.
     """
 
@@ -155,6 +231,7 @@ class FixtureFile:
     tool: HeldPart
     contact: ContactKeys = field(default_factory=ContactKeys)
     task: TaskKeys = field(default_factory=TaskKeys)
+    second: tuple[SecondPart, ...] = ()
     summary: str = ""
 
 
@@ -172,6 +249,10 @@ def read_fixture(path: Path) -> FixtureFile:
         raise InputError(f"{path}: tool", "has mass and density", "keep one of the two")
     if not isinstance(file.task.axis, str) and not any(file.task.axis):
         raise InputError(f"{path}: task.axis", "is zero", 'give for example [0, 0, -1], or "auto"')
+    for index, second in enumerate(file.second):
+        _check_second(file, index, path)
+        if second.mesh:
+            _check_mesh(second, path, f"second[{index}]")
     return file
 
 
@@ -201,7 +282,40 @@ def check_file(path: Path, where: object, fix: str, *, name: str = "") -> None:
         raise InputError(where, what + named, "name a file")
 
 
-def _check_mesh(part: FixturePart | HeldPart, path: Path, key: str) -> None:
+def _check_second(file: FixtureFile, index: int, path: Path) -> None:
+    """Refuse a second part whose keys say too much or too little."""
+    part, where = file.second[index], f"{path}: second[{index}]"
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", part.name):
+        raise InputError(f"{where}.name", f"is {part.name!r}", "take letters, digits and _, a letter first")
+    if part.name in [each.name for each in file.second[:index]]:
+        raise InputError(f"{where}.name", f"{part.name!r} is there already", "give each part a name of its own")
+    if bool(part.mesh) == bool(part.boxes or part.cylinders):
+        said = "has a mesh and shapes" if part.mesh else "has no shape"
+        raise InputError(where, said, "give a mesh, or boxes and cylinders")
+    if part.mass is not None and part.density is not None:
+        raise InputError(where, "has mass and density", "keep one of the two")
+    if not any(part.axis):
+        raise InputError(f"{where}.axis", "is zero", "give for example [0, 0, 1]")
+    _check_joint(part, where)
+
+
+def _check_joint(part: SecondPart, where: str) -> None:
+    jointed = ("anchor", "axis", "range", "stiffness", "rest", "damping", "friction")
+    unused = {"fixed": (*jointed, "goal"), "free": jointed, "slide": ("anchor",), "hinge": ()}[part.joint]
+    usual = SecondPart(name="x", joint="hinge")
+    for key in unused:
+        if getattr(part, key) != getattr(usual, key):
+            raise InputError(f"{where}.{key}", f"means nothing for a part that is {part.joint}", "leave it out")
+    for key, pair in (("range", part.range), ("goal", part.goal)):
+        if pair is not None and not pair[0] < pair[1]:
+            raise InputError(f"{where}.{key}", f"is {list(pair)}", "give the least travel, then the largest")
+    if part.range is not None and not part.range[0] <= 0.0 <= part.range[1]:
+        raise InputError(
+            f"{where}.range", f"{list(part.range)} leaves out 0, where it starts", "measure it from the start"
+        )
+
+
+def _check_mesh(part: FixturePart | HeldPart | SecondPart, path: Path, key: str) -> None:
     file = path.parent / part.mesh
     check_file(file, f"{path}: {key}.mesh", "it is relative to the fixture file", name=repr(part.mesh))
     if not file.resolve().is_relative_to(path.parent.resolve()):
@@ -219,4 +333,5 @@ def mesh_files(path: Path) -> dict[str, Path]:
         InputError: as `read_fixture`.
     """
     file = read_fixture(path)
-    return {name: path.parent / name for name in (file.fixture.mesh, file.tool.mesh)}
+    names = (file.fixture.mesh, file.tool.mesh, *(part.mesh for part in file.second))
+    return {name: path.parent / name for name in names if name}

@@ -116,16 +116,16 @@ def _check_places(plug: MeshPart, socket: MeshPart, one: Any, two: Any) -> None:
         raise InputError("the assembled pose", what, "export both from one assembly, or set [tool] assembled")
 
 
-def _thickness(common: Any) -> float:
+def thickness(common: Any) -> float:
     """Mean thickness of a solid [m]."""
     return 0.0 if common.is_empty() else 2.0 * float(common.volume()) / float(common.surface_area())
 
 
 def _check_overlap(plug: MeshPart, socket: MeshPart, one: Any, two: Any) -> None:
     bodies = (one ^ two).decompose()
-    worst = max(bodies, key=_thickness, default=None)
-    if worst is not None and _thickness(worst) > TOUCH:
-        deep, where = 1000.0 * _thickness(worst), np.reshape(worst.bounding_box(), (2, 3)).mean(axis=0)
+    worst = max(bodies, key=thickness, default=None)
+    if worst is not None and thickness(worst) > TOUCH:
+        deep, where = 1000.0 * thickness(worst), np.reshape(worst.bounding_box(), (2, 3)).mean(axis=0)
         point = ", ".join(f"{1000.0 * x:.1f}" for x in where)
         what = f"{plug.name} and {socket.name} overlap by {deep:.2g} mm at ({point}) mm"
         more = f"{deep / (1000.0 * TOUCH):.0f} times what is let pass; move [tool] assembled (press fits are refused)"
@@ -169,7 +169,7 @@ def _in_the_way(plug: Any, socket: Any) -> tuple[float, float] | None:
     count = int(np.clip(np.ceil(whole / _STEP), 8, _MOST_STEPS))
     for lift in whole * (np.arange(count) + 1.0) / count if whole > 0.0 else ():
         here = _lifted(plug, lift)
-        if here.min_gap(socket, TOUCH) < TOUCH and (deep := _thickness(here ^ socket)) > TOUCH:
+        if here.min_gap(socket, TOUCH) < TOUCH and (deep := thickness(here ^ socket)) > TOUCH:
             return deep, float(lift)
     return None
 

@@ -19,6 +19,7 @@ from skillframe.frames import Float, norm
 from skillframe.parts.declared import FixtureFile, read_fixture
 from skillframe.parts.fit import corners, lowest
 from skillframe.parts.load import LoadedParts, PreparedPart, load
+from skillframe.parts.second import in_place, second_parts
 from skillframe.parts.solid import arrays_of
 from skillframe.world.scene import Geom, Scene, State, Task, Tool, Vector
 from skillframe.world.shapes import FIXTURE_COLOUR, TOOL_COLOUR, shaft
@@ -86,13 +87,17 @@ def build_world(path: Path, params: PartsParams) -> Scene:
     def lift(offset: Float, tilt: Float) -> Float:
         return -lowest(points, tilt)
 
+    fixed, movers = second_parts(path, loaded, params.above_mouth)
+
     def seated(state: State) -> NDArray[np.bool_]:
         there: NDArray[np.bool_] = np.abs(state.tip.position[..., 2] + depth) < params.height
-        return there & (norm(state.tip.position[..., :2]) < params.sideways) & (tilt_of(state) < params.tilt)
+        there = there & (norm(state.tip.position[..., :2]) < params.sideways) & (tilt_of(state) < params.tilt)
+        return there & in_place(loaded.file.second, state)
 
     return Scene(
         name=loaded.name,
-        fixture=(*_geoms(loaded.socket, np.eye(3), np.zeros(3), FIXTURE_COLOUR), *_table(loaded)),
+        fixture=(*_geoms(loaded.socket, np.eye(3), np.zeros(3), FIXTURE_COLOUR), *fixed, *_table(loaded)),
+        sprung=movers,
         tool=_tool(loaded),
         friction=params.friction,
         start_tip=(0.0, 0.0, params.above_mouth),

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from skillframe.campaign.claims.trials import SOURCE, is_torn, real_or_simulated
-from skillframe.campaign.rows import JUDGED, OUTCOME, SCORE, TRUTH
+from skillframe.campaign.rows import JUDGED, OUTCOME, SCORE, SECOND, TRUTH
 from skillframe.campaign.statistics import Interval, correction, holm
 from skillframe.campaign.validity import Basis, Plan, Validity, unbroken, validity_of
 from skillframe.errors import InputError
@@ -262,7 +262,7 @@ def _float(cell: str) -> float:
 
 
 def _varied(head: Sequence[str], rows: Sequence[ResultRow], declared: Sequence[str]) -> tuple[str, ...]:
-    head = [name for name in head if not name.startswith(SCORE)]
+    head = [name for name in head if not name.startswith((SCORE, SECOND))]
     known = [name for name in declared if name in head]
     names = known or [name for name in head if name not in FIXED and ("." in name or not declared)]
     return tuple(name for name in names if _differs([row.values.get(name, math.nan) for row in rows]))

@@ -15,6 +15,7 @@ from skillframe.reports.quantities import quantity
 from skillframe.reports.raster import Image, draw, png
 from skillframe.reports.replay import run_data, scene_data, scene_key, viewer
 from skillframe.reports.scores import said_of
+from skillframe.reports.second import told_of_second
 from skillframe.reports.sources import Chapter, Run
 from skillframe.reports.stage import Camera, Stage, stage_of
 
@@ -80,7 +81,7 @@ def _story(meta: Mapping[str, Any]) -> str:
     facts.append(", ".join(peaks.said(meta, _figure)))
     if isinstance(meta.get("final_error_m"), int | float):
         facts.append(f"final error {_figure(1e3 * float(meta['final_error_m']))} mm")
-    facts += [*said_of_motors(meta), *said_of(meta)]
+    facts += [*told_of_second(meta.get("second") or {}), *said_of_motors(meta), *said_of(meta)]
     drawn = [_draw_text(name, value) for name, value in sorted((meta.get("draws") or {}).items())]
     how = "Set for this run" if meta.get("trial") is None else "Drawn for this trial"
     return "; ".join(f for f in facts if f) + "." + (f" {how}: {', '.join(drawn)}." if drawn else "")

@@ -18,7 +18,7 @@ from skillframe.frames import matrix_from_quaternion, quaternion_from_matrix
 from skillframe.robot.model import RobotModel
 from skillframe.robot.mount import Mount
 from skillframe.world.loops import close_loops
-from skillframe.world.scene import Geom, Holder, Scene, Sprung, Tool
+from skillframe.world.scene import Geom, Holder, Mover, Scene, Sprung, Tool
 from skillframe.world.surfaces import number_of
 
 TIMESTEP = 0.001
@@ -29,6 +29,7 @@ FIXTURE, TOOL, SENSOR, SECOND = "fixture", "tool", "sensor", "second_sensor"
 BASE = "robot_base"  # what does not move of the robot; nothing but drawn
 SPRUNG = "sprung_"  # what the names of the bodies and joints of sprung parts begin with
 MOUNT = SPRUNG + "mount_"  # and those of a soft mount's joints, between sensor and tool
+MOVER, MOVER_MEETS = 1 | 4, 2 | 4  # contype and conaffinity of second parts: the tool, and each other
 FASTEST_SWING = 1.2  # rad a time step, of the tool on a soft mount: semi-implicit Euler is stable up to 2
 STICTION_SOLREF, STICTION_SOLIMP = (0.004, 1.0), (0.99, 0.999, 1e-3, 0.5, 2.0)  # joint friction that hardly creeps
 _KINDS = {
@@ -57,8 +58,37 @@ def build_spec(robot: RobotModel, scene: Scene, timestep: float = TIMESTEP) -> m
     for index, geom in enumerate(scene.fixture):
         add_geom(spec, fixture, geom, f"{FIXTURE}_{index}", contype=1, conaffinity=2, friction=scene.friction)
     for part in scene.sprung:
-        _add_sprung(spec, fixture, part, scene.friction)
+        if isinstance(part, Mover):
+            _add_mover(spec, fixture, part, scene.friction)
+        else:
+            _add_sprung(spec, fixture, part, scene.friction)
     return spec
+
+
+def _add_mover(spec: mujoco.MjSpec, fixture: Any, part: Mover, friction: float) -> None:
+    """A second part of the fixture on its joint. A free one is three slides and a ball at its centre of mass."""
+    name = SPRUNG + part.name
+    body = fixture.add_body(name=name)
+    set_inertia(body, pin.Inertia(part.mass, np.array(part.center_of_mass), part.inertia))
+    if part.joint == "free":
+        for letter, axis in zip("xyz", np.eye(3), strict=True):
+            body.add_joint(name=f"{name}_{letter}", axis=axis, type=mujoco.mjtJoint.mjJNT_SLIDE)
+        body.add_joint(name=f"{name}_turn", pos=part.center_of_mass, type=mujoco.mjtJoint.mjJNT_BALL)
+    else:
+        kind = mujoco.mjtJoint.mjJNT_HINGE if part.joint == "hinge" else mujoco.mjtJoint.mjJNT_SLIDE
+        joint = body.add_joint(name=name, axis=part.axis, pos=part.anchor, type=kind)
+        joint.stiffness, joint.springref = [part.stiffness, 0.0, 0.0], part.rest
+        joint.damping, joint.frictionloss = [part.damping, 0.0, 0.0], part.friction
+        joint.solref_friction, joint.solimp_friction = STICTION_SOLREF, STICTION_SOLIMP
+        if part.range is not None:
+            joint.limited, joint.range = True, part.range
+            joint.solref_limit, joint.solimp_limit = STICTION_SOLREF, STICTION_SOLIMP
+    meets = MOVER_MEETS
+    if part.joint == "free":  # rests on the fixture, whose child it is: MuJoCo would leave that pair out
+        meets |= 1
+        spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
+    for index, geom in enumerate(part.geoms):
+        add_geom(spec, body, geom, f"{name}_{index}", contype=MOVER, conaffinity=meets, friction=friction)
 
 
 def _add_sprung(spec: mujoco.MjSpec, fixture: Any, part: Sprung, friction: float) -> None:

@@ -30,8 +30,10 @@ class Layout:
         fixed = {0} | {b for b in range(model.nbody) if _no_link(model.body(b).name)}
         self.links = np.array([b for b in range(model.nbody) if b not in fixed])
         self.free = bool(model.njnt and model.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE)
-        sprung = [j for j in range(model.njnt) if model.joint(j).name.startswith(SPRUNG)]
-        self.sprung = model.jnt_dofadr[sprung].astype(np.int64)
+        named = [model.joint(j).name.startswith(SPRUNG) for j in range(model.njnt)]
+        self.sprung = np.flatnonzero(np.array(named, dtype=bool)[model.dof_jntid])
+        balls = [j for j in range(model.njnt) if named[j] and model.jnt_type[j] == mujoco.mjtJoint.mjJNT_BALL]
+        self.balls = model.jnt_qposadr[balls].astype(np.int64)
         mount = [j for j in range(model.njnt) if model.joint(j).name.startswith(MOUNT)]
         self.mount, self.mount_places = (part[mount].astype(np.int64) for part in (model.jnt_dofadr, model.jnt_qposadr))
         self.places = _places(model)

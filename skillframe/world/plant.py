@@ -22,6 +22,7 @@ from skillframe.robot.carried import loaded_inertias
 from skillframe.robot.model import RobotModel
 from skillframe.world.convert import FIXTURE, SECOND, TIMESTEP, build_spec, held
 from skillframe.world.layout import Layout
+from skillframe.world.movers import Travels
 from skillframe.world.reading import compiled_jacobian
 from skillframe.world.scene import Scene, State
 
@@ -95,6 +96,7 @@ class Plant:
             self.model.dof_armature[self._layout.mount] = IMMOVABLE
         self.batch = mujoco.batch.Batch(self.model, count, nthread=1, persistent=True)
         self._fixture, self._held, self.tool = fixture, held(robot, scene), scene.tool
+        self._travels = Travels(self.model, scene)
         self._apply(draws)
         self._bind()
 
@@ -133,6 +135,7 @@ class Plant:
             friction[:, :, 0] = draws["world.friction"][:, None]
         if "robot.joint_friction" in draws:
             friction_loss = draws["robot.joint_friction"][:, None] * self._layout.friction_share(self.robot)
+            friction_loss[:, self._layout.sprung] = self.model.dof_frictionloss[self._layout.sprung]
             self.batch.expand("dof_frictionloss")[:] = friction_loss
         grasp = grasp_pose(draws, self.count)
         inertial = self._load(draws)
@@ -171,6 +174,7 @@ class Plant:
             self._mocap_pos[:, 0] = self._fixture.position
             self._mocap_quat[:, 0] = quaternion_from_matrix(self._fixture.rotation)[:, [3, 0, 1, 2]]
         self._qpos[:] = self.engine_order(configuration)
+        self._qpos[:, self._layout.balls] = 1.0
         self._qvel[:] = 0.0
         self._applied[:] = 0.0
         self.batch.forward()
@@ -321,7 +325,7 @@ class Plant:
         wrench = self.contact_wrench(offset)
         back = np.swapaxes(fixture.rotation, -1, -2)
         turned = np.concatenate([rotate(back, wrench[:, :3]), rotate(back, wrench[:, 3:])], axis=-1)
-        return State(in_fixture, turned)
+        return State(in_fixture, turned, self._travels(self._qpos))
 
     def body_frames(self) -> tuple[Float, Float]:
         """Positions (N, B, 3) and axes (N, B, 3, 3) of all bodies, the world first. The positions are a live view."""

@@ -7,8 +7,9 @@ robots or engines; the plant compiles it, the teacher reads `Scene.task`, the le
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -106,16 +107,62 @@ class Sprung:
     damping_ratio: float = 0.5
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mover:
+    """A second part in the fixture that is moved by what touches it: it turns, slides, or lies there free.
+
+    One that turns or slides meets the tool and other movers, but not what stands: its range stands for that. A free
+    one has its weight and meets everything.
+
+    Attributes:
+        name: one of its own among the scene's sprung parts and movers.
+        geoms: in the fixture frame, as it stands at the start.
+        joint: "hinge", "slide" or "free".
+        anchor: a point of the hinge's axis in the fixture frame [m].
+        axis: unit vector of the fixture frame.
+        mass: [kg]; center_of_mass: in the fixture frame [m]; inertia: (3, 3) about it [kg m^2].
+        stiffness: of its spring [N/m or Nm/rad]; rest: where the spring is slack [m or rad].
+        damping: [N s/m or Nm s/rad]; friction: that its joint has to be moved against [N or Nm].
+        range: of its travel [m or rad] from the start, or None.
+    """
+
+    name: str
+    geoms: tuple[Geom, ...]
+    joint: str
+    anchor: Vector = (0.0, 0.0, 0.0)
+    axis: Vector = (0.0, 0.0, 1.0)
+    mass: float
+    center_of_mass: Vector
+    inertia: NDArray[np.float64]
+    stiffness: float = 0.0
+    rest: float = 0.0
+    damping: float = 0.0
+    friction: float = 0.0
+    range: tuple[float, float] | None = None
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of what `State.second` says of it."""
+        return tuple(f"{self.name}.{word}" for word in MOVES[self.joint])
+
+
+MOVES = {"hinge": ("angle",), "slide": ("travel",), "free": ("moved", "turned")}
+"""What is told of a mover, by joint: [rad], [m], and of a free one how far its centre went [m] and it turned [rad]."""
+
+
 class State(NamedTuple):
     """Where the tool is, seen from the fixture, for goal predicates, for N trials.
 
     Attributes:
         tip: pose of the tool's "tip" in the true fixture frame: (N, 3), (N, 3, 3), tool axes.
         wrench: (N, 6) true wrench of the environment on the tool at the tip, fixture axes.
+        second: (N,) by name how far movers are from where they stood at the start ("gear.angle", see `MOVES`); one
+            that is not named has not moved.
     """
 
     tip: Pose
     wrench: Float
+    second: Mapping[str, Float] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -171,7 +218,7 @@ class Scene:
 
     Attributes:
         fixture: geoms in the fixture frame.
-        sprung: parts of the fixture that yield.
+        sprung: parts of the fixture that yield, and second parts that are moved.
         friction: Coulomb coefficient of every contact between tool and fixture.
         start_tip: (3,) nominal start of the tip in the fixture frame.
         start_quaternion: nominal attitude of the tool frame in the fixture frame.
@@ -199,7 +246,7 @@ class Scene:
     goal: Callable[[State], NDArray[np.bool_]]
     goal_error: Callable[[State], tuple[Float, Float]]
     task: Task
-    sprung: tuple[Sprung, ...] = ()
+    sprung: tuple[Sprung | Mover, ...] = ()
     start_lift: Callable[[Float, Float], Float] = field(default=lambda offset, tilt: np.zeros(len(offset)))
     holder: Holder | None = None
     way: Way | None = None

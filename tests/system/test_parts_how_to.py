@@ -1,5 +1,6 @@
 """docs/how-to/own-parts.md: its file is read, its plug is what it says, and two meshes become a certified skill."""
 
+import dataclasses
 import re
 from pathlib import Path
 
@@ -9,13 +10,15 @@ from manifold3d import Manifold
 
 from skillframe import Campaign, learn, record, run
 from skillframe.cli.main import run as typed
-from skillframe.parts.declared import DENSITY, read_fixture
+from skillframe.parts.declared import DENSITY, SecondPart, read_fixture
 from skillframe.parts.found import lines
 from skillframe.parts.load import load
 from skillframe.parts.solid import arrays_of
 from tests import part_meshes
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "how-to" / "own-parts.md").read_text(encoding="utf-8")
+UNSAID = ("pose", "density")
+"""Keys of a second part that are told by their name, or as of the main parts."""
 BLOCKS = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 
 
@@ -49,6 +52,16 @@ def test_the_pages_file_is_read_and_says_the_defaults(parts):
     assert (shown.fixture, shown.contact) == (shortest.fixture, shortest.contact)
     assert shown.task.start == shortest.task.start and shown.task.seated == shortest.task.seated
     assert shown.task.demonstration.tilt == pytest.approx(shortest.task.demonstration.tilt)
+
+
+def test_the_pages_second_part_is_read_and_says_the_defaults(parts):
+    block = next(block for block in BLOCKS if block.startswith("[[second]]"))
+    part_meshes.export(part_meshes.box((0, 0, 0), (1, 1, 1)), parts.parent / "latch.stl")
+    parts.write_text(part_meshes.FILE + block, encoding="utf-8")
+    (shown,) = read_fixture(parts).second
+    (usual,) = (field.default for field in dataclasses.fields(SecondPart) if field.name == "anchor")
+    assert (shown.joint, shown.mass, shown.goal, shown.anchor) == ("slide", 0.02, (0.0, 3e-4), usual)
+    assert all(f"{field.name} = " in block for field in dataclasses.fields(SecondPart) if field.name not in UNSAID)
 
 
 def test_the_page_says_what_is_found_in_its_plug(parts):

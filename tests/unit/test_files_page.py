@@ -40,4 +40,4 @@ def test_every_table_of_robot_toml_is_on_the_page_in_detail():
 
 def test_every_column_of_results_is_on_the_page_in_its_order():
     spec = CampaignSpec(name="n", seed=1, trials=1, robot="r", world="w", skills=("a.json",), scores=("NAME",))
-    assert first_cells("results.csv") == columns(spec)
+    assert first_cells("results.csv") == columns(spec, [{"second.NAME": 0.0}])
