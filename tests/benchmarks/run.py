@@ -66,7 +66,7 @@ def batch(name):
     show(f"{name}: chunk of {CHUNK} without traces", 1e3 * cpu, "us/ms")
     show(f"{name}: chunk of {CHUNK} over bare mj_step", cpu / floor, "x", 1.3)
     floor, cpu, law = large
-    show(f"{name}: batch of {COUNT} with a trace at 100 Hz over bare mj_step", cpu / floor, "x")
+    show(f"{name}: batch of {COUNT} with a trace at 100 Hz over bare mj_step", cpu / floor, "x", 1.3)
     setting, draws, stiffness, speed, duration = case(name)
     alone = one_trial_loop(setting, np.array(DOWN), stiffness, speed, draws, 4, round(1000 * duration))
     show(f"{name}: one-trial loop", 1e3 * alone, "us/ms")
