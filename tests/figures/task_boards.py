@@ -4,9 +4,10 @@ Three boards of five places; for each three policies of three demonstrations of 
 that stands elsewhere (50 mm, 34 degrees about its normal, 9 degrees of tilt, each way), and each policy run on six
 boards that stand elsewhere again, from starts up to 10 mm away. Boards are moved by `fixture.*`, so that trials run
 side by side, and policies are told where the places are. A run counts if all five were done, in order, and it ended
-well.
+well. Of the others the first place that was not done is told: what its phases said, the largest force there, and how
+near the pin came to where the place ends.
 
-    python -m tests.figures.task_boards [places|base|pooled ...] [policies=3] [boards=6]
+    python -m tests.figures.task_boards [places|base|pooled ...] [policies=3] [boards=6] [seed=9100]
 
 `base` learns from the same demonstrations with every place's pose written down as if the board had stood still, that
 is, in the base frame, with the same cuts; `pooled` is `segment --set places=false`.
@@ -15,7 +16,7 @@ is, in the base frame, with the same cuts; `pooled` is `segment --set places=fal
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -23,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import binomtest
 from skillframe_segmenter.document import read
-from skillframe_segmenter.placed import Placed, placement_of
+from skillframe_segmenter.placed import WORK, Placed, Placement, placement_of
 from skillframe_segmenter.policy import Policy
 
 from skillframe.demonstration.places import KEY, as_plain
@@ -35,33 +36,34 @@ from skillframe.execution.prepare import load_robot_model, load_world, prepare
 from skillframe.execution.trace import Trace
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.extend.registry import registry
-from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, rotate, rotate_spatial
+from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, norm, rotate, rotate_spatial
 from skillframe.sequence import Part
 from skillframe.skill import Skill
 from skillframe.teaching.sessions import record
 from skillframe.teaching.teacher import TeacherSettings
 from skillframe.world.placement import fixture_poses, places_in_base
 from skillframe.world.scene import Scene
+from skillframe.world.worlds.task_board import PLACES as BOARD
 from skillframe.world.worlds.task_board import done_in_order
 
-LAYOUTS, EACH, SEED = (1, 2, 3), 3, 9100
-COUNTS = {"policies": 3, "boards": 6}  # of a layout, and of a policy
+LAYOUTS, EACH = (1, 2, 3), 3
+COUNTS = {"policies": 3, "boards": 6, "seed": 9100}  # of a layout, of a policy, and what all is drawn from
 MOVES = {"offset_x": 0.05, "offset_y": 0.05, "tilt_x": 0.15, "tilt_z": 0.6}  # m, rad, each way
 AWAY, LONGEST_S, PLACES = 0.01, 80.0, 5
 
 
 class Outcome(NamedTuple):
-    """One run: whether it ended well with all places done, how many were, its largest force [N], and how it ended."""
+    """One run: whether it ended well with all places done, how many were, its largest force [N], what went wrong."""
 
     success: bool
     done: int
     peak: float
-    ended: str
+    wrong: str
 
 
 def moves(layout: int, use: int, count: int) -> dict[str, Float]:
     """Where boards stand: quantities (N,). `use` tells demonstrations from runs."""
-    rng = np.random.default_rng([SEED, layout, use])
+    rng = np.random.default_rng([COUNTS["seed"], layout, use])
     return {f"fixture.{key}": rng.uniform(-by, by, count) for key, by in MOVES.items()}
 
 
@@ -81,7 +83,7 @@ def shown(layout: int) -> list[Demonstration]:
     columns = moves(layout, 0, count)
     starts = tuple({key: float(values[i]) for key, values in columns.items()} for i in range(count))
     there = replace(scene, task=replace(scene.task, starts=starts))
-    recording = record(robot, there, TeacherSettings(), count=count, seed=SEED + layout, duration_s=60.0)
+    recording = record(robot, there, TeacherSettings(), count=count, seed=COUNTS["seed"] + layout, duration_s=60.0)
     places = places_at(scene, fixture_poses(robot, columns, count))
     return [
         replace(d, meta={**d.meta, KEY: as_plain({n: Pose(p.position[i], p.rotation[i]) for n, p in places.items()})})
@@ -98,48 +100,99 @@ def policy(demonstrations: list[Demonstration], how: str, layout: int) -> Docume
     return learned(registry().skill("policy"), demonstrations, options)
 
 
-def told(document: Document, places: Mapping[str, Pose]) -> Skill:
+class Watched(Placed):
+    """A phase at its place, which tells what its work said."""
+
+    def said(self, trial: int) -> list[tuple[float, str]]:
+        """Journal of the work, of its last beginning."""
+        work = self._children[WORK]
+        return [] if work is None else work.journal(trial)
+
+
+class Told(NamedTuple):
+    """A policy that is told where the places are, and its phases as far as they were begun."""
+
+    policy: Skill
+    phases: dict[int, Watched]
+
+
+def told(document: Document, places: Mapping[str, Pose]) -> Told:
     """The policy, told where the places are in each trial: (N, 3), (N, 3, 3)."""
-    known, parts = read(document), []
+    known, phases = read(document), dict[int, Watched]()
+
+    def watched(i: int, placement: Placement, make: Callable[[], Skill]) -> Skill:
+        return phases.setdefault(i, Watched(placement, make))
+
+    parts = []
     for i, sub in enumerate(known.skills):
         placement = placement_of(document, i)
         placement = placement._replace(pose=places.get(placement.name, placement.pose))
         make = partial(registry().skill(sub["type"]).build, sub)
-        parts.append(Part(f"phase {i + 1}", partial(Placed, placement, make)))
-    return Policy(parts, known, None)
+        parts.append(Part(f"phase {i + 1}", partial(watched, i, placement, make)))
+    return Told(Policy(parts, known, None), phases)
 
 
 def runs(document: Document, layout: int, how: str, number: int) -> list[Outcome]:
     """A policy on boards that stand elsewhere again."""
     robot, scene = load_robot_model("free_tool"), load_world("task_board", {"layout": layout})
-    count = COUNTS["boards"]
+    count, seed = COUNTS["boards"], COUNTS["seed"]
     draws = moves(layout, 1 + number, count)
     fixture = fixture_poses(robot, draws, count)
-    rng = np.random.default_rng([SEED, layout, number, 3])
+    rng = np.random.default_rng([seed, layout, number, 3])
     draws |= {f"start.offset_{axis}": rng.uniform(-AWAY, AWAY, count) for axis in "xy"}
     still = places_in_base(robot, scene)
     skill, setup = prepare(robot, scene, document, places=still)
-    skill = told(document, places_at(scene, fixture)) if how == "places" else skill
-    rngs = [np.random.default_rng([SEED, layout, number, 4, i]) for i in range(count)]
-    result = simulate(skill, setup, draws, rngs, duration_s=LONGEST_S, trace_hz=200.0)
+    mine = None if how == "pooled" else told(document, places_at(scene, fixture) if how == "places" else still)
+    rngs = [np.random.default_rng([seed, layout, number, 4, i]) for i in range(count)]
+    result = simulate(skill if mine is None else mine.policy, setup, draws, rngs, duration_s=LONGEST_S, trace_hz=200.0)
     assert result.traces is not None
     outcomes = []
     for i, trace in enumerate(result.traces):
-        done = places_done(trace, scene, Pose(fixture.position[i], fixture.rotation[i]))
+        tip = tip_of(trace, scene, Pose(fixture.position[i], fixture.rotation[i]))
+        done = done_in_order(scene, *tip)
         well = bool(result.success[i]) and done == PLACES
-        outcomes.append(Outcome(well, done, float(result.peak_force_n[i]), str(result.failure[i])))
+        wrong = "" if well else f"policy {number + 1}, board {i + 1}: "
+        if wrong:
+            phase, said = (
+                ("", []) if mine is None or done == PLACES else words(document, mine, i, list(scene.places)[done])
+            )
+            wrong += "all places done" if done == PLACES else missed(scene, done, trace, tip, phase, said)
+            wrong += f"; {result.failure[i] or 'ended well'}"
+        outcomes.append(Outcome(well, done, float(result.peak_force_n[i]), wrong))
     return outcomes
 
 
-def places_done(trace: Trace, scene: Scene, fixture: Pose) -> int:
-    """How many places a run did, in order."""
+def words(document: Document, mine: Told, trial: int, place: str) -> tuple[str, list[tuple[float, str]]]:
+    """The phase that belongs to a place, by name, and its journal: what its work said, or else how far it came."""
+    phase = next((i for i, each in enumerate(document["phases"]) if each["place"] == place), None)
+    if phase is None:
+        return "no phase of its own", []
+    begun = mine.phases.get(phase)
+    return f"phase {phase + 1}", [] if begun is None else begun.said(trial) or begun.journal(trial)
+
+
+def missed(
+    scene: Scene, done: int, trace: Trace, tip: tuple[Pose, Float], phase: str, said: Sequence[tuple[float, str]]
+) -> str:  # fmt: skip
+    """The first place that was not done: its phase's words, the force [N], and how near it came [mm]."""
+    name, (position, quaternion) = list(scene.places.items())[done]
+    end = Pose(np.array(position), matrix_from_quaternion(quaternion)).at(np.array(BOARD[name].end)).position
+    times = [time for time, _ in said] or list(trace.time)
+    there = (trace.time >= min(times)) & (trace.time <= max(times))
+    force, near = norm(trace.wrench[there, :3]).max(), 1e3 * norm(tip[0].position[there] - end).min()
+    text = "; ".join(text for _, text in said)
+    return f"{name}: {phase}: {text or 'was not begun'}; at most {force:.0f} N, {near:.1f} mm from its end"
+
+
+def tip_of(trace: Trace, scene: Scene, fixture: Pose) -> tuple[Pose, Float]:
+    """The pin's tip over a run, (T, 3), (T, 3, 3), and the wrench on it, (T, 6), in the fixture frame."""
     base = fixture.inverse()
     tool = Pose(trace.position, matrix_from_quaternion(trace.quaternion))
     shift = np.array(scene.tool.frames["tip"]) - np.array(trace.meta["center_of_compliance"])
     tip = tool.at(shift)
     there = Pose(rotate(base.rotation, tip.position) + base.position, base.rotation @ tip.rotation)
     wrench = move_wrench(trace.wrench, rotate(tool.rotation, shift))
-    return done_in_order(scene, there, rotate_spatial(base.rotation, wrench))
+    return there, rotate_spatial(base.rotation, wrench)
 
 
 def row(layout: int, how: str, demonstrations: list[Demonstration]) -> list[Outcome]:
@@ -165,8 +218,8 @@ def main(names: list[str]) -> None:
             outcomes = row(layout, how, taught[layout])
             every += outcomes
             print(f"{how:<8} board {layout}: {_told(outcomes)}", flush=True)
-            for text in sorted({o.ended for o in outcomes if not o.success}):
-                print(f"    {sum(o.ended == text for o in outcomes if not o.success)} x {text}", flush=True)
+            for text in [o.wrong for o in outcomes if not o.success]:
+                print(f"    {text}", flush=True)
         low, high = binomtest(sum(o.success for o in every), len(every)).proportion_ci(method="exact")
         print(f"{how:<8} all: {_told(every)}; 95 % {low:.3f} to {high:.3f}", flush=True)
 

@@ -13,7 +13,7 @@ leans on the friction cone explains both. Our choice; the papers join phases by 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby, pairwise
 from math import cos, inf, radians
@@ -27,6 +27,7 @@ from skillframe.extend.records import Document, LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import norm
 from skillframe_segmenter.agreement import check_agreement
+from skillframe_segmenter.air import Learner, learned_in_air
 from skillframe_segmenter.boards import learn_places, names_places
 from skillframe_segmenter.boundaries import Move, moved, parse_move
 from skillframe_segmenter.explained import explained
@@ -69,7 +70,8 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
         found = _joined(found, demonstrations, own["skill"], options, stand_ins=True)
     if moves:
         found = _held(found, demonstrations, moved(found["demonstrations"], moves, names), moves, own, cutting)
-    bodies = [_learn(found, demonstrations, k, own["skill"], options) for k in range(_count(found))]
+    parts = [pieces(found, demonstrations, [k]) for k in range(_count(found))]
+    bodies = [learned_in_air(_learner(own["skill"]), each, options) for each in parts]
     return {
         **{key: value for key, value in bodies[0].items() if key in ("frame", *_alike(bodies))},
         "phases": [_as_phase(body, own["skill"], _alike(bodies)) for body in bodies],
@@ -141,10 +143,14 @@ def pieces(found: Document, demonstrations: Sequence[Demonstration], phases: Seq
 def _learn(
     found: Document, demonstrations: Sequence[Demonstration], phase: int, skill: str, options: LearnOptions
 ) -> Document:
+    return _learner(skill)(pieces(found, demonstrations, [phase]), options)
+
+
+def _learner(skill: str) -> Learner:
     kind = registry().skill(skill)
     if kind.learn is None:
         raise InputError(f"--skill {skill}", "is not learned from demonstrations", "name one that is, such as lmc")
-    return kind.learn(pieces(found, demonstrations, [phase]), options)
+    return kind.learn
 
 
 def _joined(
@@ -179,8 +185,7 @@ def _joined(
 
 
 def _one_direction(
-    learn_phase: Callable[[Sequence[Demonstration], LearnOptions], Document], parts: Sequence[Demonstration],
-    options: LearnOptions,
+    learn_phase: Learner, parts: Sequence[Demonstration], options: LearnOptions
 ) -> bool:  # fmt: skip
     """Whether one direction explains all of them. None does if the learner refuses them together (a press, say)."""
     try:
