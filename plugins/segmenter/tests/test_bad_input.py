@@ -145,6 +145,8 @@ def test_a_policy_whose_phase_model_does_not_match_its_phases_says_how_many_it_k
         (lambda d: d["phase_model"]["gate"].update(covariance=[[[0.0] * 6] * 6] * 2), "positive definite"),
         (lambda d: d["phase_model"].update(type=3), "phase_model"),
         (lambda d: d.update(recoveries=-1), "recoveries"),
+        (lambda d: d["demonstrations"][0].update(labels=[0, 2]), r"demonstrations\[0\]"),
+        (lambda d: d.update(demonstrations="three"), "demonstrations"),
         (lambda d: d["phases"][1].pop("skill"), r"phases\[1\]"),
         (lambda d: d["phases"][1]["translation"].pop("stiffness"), r"phases\[1\]"),
     ],

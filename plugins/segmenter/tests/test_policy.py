@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from skillframe_segmenter.document import skill_of
+from skillframe_segmenter.document import read, skill_of
 from skillframe_segmenter.learning import _alike, _as_phase, pieces
 
 from skillframe.cli import main
@@ -21,6 +21,13 @@ DT = 1e-3
 @pytest.fixture(scope="module")
 def document():
     return learned(registry().skill("policy"), [m.demonstration for m in made.demonstrations("ls", 2)], LearnOptions())
+
+
+def test_a_policy_does_not_go_on_to_what_one_demonstration_did_after_the_others_had_ended(document):
+    rows = [{**document["demonstrations"][0], "labels": labels} for labels in ([0, 1], [0, 1, 0], [0, 1])]
+    model = {**document["phase_model"], "successors": [[0.0, 3.0, 1.0], [1.0, 0.0, 2.0]]}
+    lingered = {**document, "demonstrations": rows, "phase_model": model}
+    np.testing.assert_array_equal(read(lingered).successors, [[0.0, 3.0, 1.0], [0.0, 0.0, 3.0]])
 
 
 def felt(demonstration, shift=0.0, seconds=None):

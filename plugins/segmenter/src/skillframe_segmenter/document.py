@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,7 +27,8 @@ class PolicyDocument:
     Attributes:
         skills: a whole skill document for each phase.
         model: to follow the phases online; None where phases end by themselves only.
-        successors: (P, P + 1) how often each phase was followed by each; the last column is the end.
+        successors: (P, P + 1) how often each phase was followed by each; the last column is the end. What came after
+            the phase in which most demonstrations ended does not count, see `to_the_common_end`.
         recoveries: failures of a phase that are recovered from.
     """
 
@@ -50,6 +52,7 @@ def read(document: Document) -> PolicyDocument:
     followed = from_document(model) if _get(model, "type", str, "phase_model.") in FOLLOWED else None
     successors = np.array(coerce(model.get("successors"), list[list[float]], "phase_model.successors"))
     _match(len(phases), successors)
+    successors = to_the_common_end(successors, _labels(document, len(phases)))
     recoveries = _get(document, "recoveries", int)
     if recoveries < 0:
         raise InputError("recoveries", "should not be negative", "0 takes the first failure")
@@ -60,6 +63,31 @@ def read(document: Document) -> PolicyDocument:
         skills=[skill_of(document, i) for i in range(len(phases))], model=followed, successors=successors,
         recoveries=recoveries,
     )  # fmt: skip
+
+
+def to_the_common_end(successors: Float, labels: Sequence[Sequence[int]]) -> Float:
+    """How often each phase was followed by each, had no demonstration gone on from where most of them ended.
+
+    A hand that lingers, lets go or is already on its way out may add a phase, or come back to one, after the work is
+    done. If more than half of the demonstrations ended in one phase, a run that has ended it has done the work, and
+    must not go on because one demonstration did. Ways before that are all kept, however few took them. Our choice.
+
+    Args:
+        successors: (P, P + 1) counts, the last column the end.
+        labels: phases of each demonstration in order.
+
+    Returns:
+        (P, P + 1) counts.
+    """
+    ends = [each[-1] for each in labels if each]
+    common = next((k for k in ends if 2 * ends.count(k) > len(ends)), None)
+    result = successors.copy()
+    for each in labels:
+        if common is not None and common in each and each[-1] != common:
+            after = each[len(each) - list(reversed(each)).index(common)]
+            result[common, after] = max(result[common, after] - 1.0, 0.0)
+            result[common, -1] += 1.0
+    return result
 
 
 def check(document: Document) -> None:
@@ -84,6 +112,19 @@ def skill_of(document: Document, index: int) -> Document:
     own = {k: v for k, v in phase.items() if k not in ("skill", "beside")}
     return {**shared, **coerce(phase.get("beside", {}), dict[str, Any], f"phases[{index}].beside"), "type": kind,
             "phases": [own]}  # fmt: skip
+
+
+def _labels(document: Document, phases: int) -> list[list[int]]:
+    """Phases of each demonstration in order."""
+    rows = coerce(document.get("demonstrations", []), list[dict[str, Any]], "demonstrations")
+    labels = [coerce(row.get("labels", []), list[int], f"demonstrations[{i}].labels") for i, row in enumerate(rows)]
+    for i, each in enumerate(labels):
+        if any(not 0 <= label < phases for label in each):
+            raise InputError(
+                f"demonstrations[{i}].labels", f"names a phase beyond the {phases} that the file holds",
+                "segment the demonstrations again",
+            )  # fmt: skip
+    return labels
 
 
 def _match(phases: int, successors: Float) -> None:

@@ -7,7 +7,7 @@ A phase gives way to another that followed it in a demonstration
   for a second: a coupler that touches with one edge feels like one that is seated, but it is still turning; or
 - when its own skill has ended well, as an LMC does that comes to rest while pushing: then to what followed most often,
 
-and the policy ends where demonstrations ended. A phase whose skill fails (a limit of force, time or travel) is
+and the policy ends where most demonstrations ended. A phase whose skill fails (a limit of force, time or travel) is
 recovered from: the phase that the wrench asks for starts again, `recoveries` times; then the policy fails with that
 phase's reason. The journal says which phase ran when, and why it was left.
 """
