@@ -12,7 +12,8 @@ import numpy as np
 
 from skillframe.errors import InputError
 from skillframe.frames import Float
-from skillframe.parts.fit import PartsFit
+from skillframe.parts.declared import MeshPlace
+from skillframe.parts.fit import PartsFit, placed
 from skillframe.parts.pieces import MOST_PIECES, ConvexPieces
 from skillframe.parts.solid import MeshPart
 
@@ -43,6 +44,34 @@ def around(fit: PartsFit, plug: MeshPart, socket: MeshPart) -> tuple[str, ...]:
     if held.is_empty() or standing.is_empty() or not (standing - held.hull()).is_empty():
         return ()
     return (f"{plug.name}, which is held, reaches around {socket.name}, which stands; were the two swapped?",)
+
+
+def mend_error(part: MeshPart, place: MeshPlace, fit: PartsFit, reach: Float) -> float:
+    """By how much what was mended of a part may be off where the parts can meet [m].
+
+    Args:
+        part: with its mended places.
+        place: of its mesh.
+        fit: of both parts.
+        reach: (2, 3) corners of the box in which they can meet, in the fixture frame [m].
+
+    Raises:
+        InputError: it is more than the play allows.
+    """
+    worst = 0.0
+    for mend in part.places:
+        points = placed(mend.points, place, fit)
+        if (points.max(axis=0) < reach[0]).any() or (points.min(axis=0) > reach[1]).any():
+            continue
+        if mend.error > SHARE * fit.clearance:
+            middle = ", ".join(f"{1000.0 * x:.1f}" for x in mend.points.mean(axis=0))
+            what = (
+                f"is open, or bounds nothing, near ({middle}) mm: mended, it may be off by {1000.0 * mend.error:.2g} mm"
+            )
+            what += f", more than {1000.0 * SHARE * fit.clearance:.2g} mm, a quarter of the clearance"
+            raise InputError(part.name, what, "close it where it was drawn")
+        worst = max(worst, mend.error)
+    return worst
 
 
 def check_clearance(fit: PartsFit) -> None:

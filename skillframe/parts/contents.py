@@ -112,7 +112,8 @@ def _check_words(text: bytes, path: Path) -> None:
     """An STL in words, in small letters."""
     begun, ended = (len(re.findall(word, text)) for word in (rb"\bfacet\s+normal\b", rb"\bendfacet\b"))
     if begun != ended or b"endsolid" not in text:
-        raise InputError(path, f"is cut off: {begun} facets begin, {ended} end, and the last line is missing", _AGAIN)
+        last = "" if b"endsolid" in text else ", without a last line"
+        raise InputError(path, f"is cut off: {begun} facets begin and {ended} end{last}", _AGAIN)
 
 
 def _check_obj(raw: bytes, path: Path) -> None:

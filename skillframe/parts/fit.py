@@ -88,8 +88,19 @@ def _gap(one: Any, two: Any) -> float:
 
 def moved(solid: Any, place: MeshPlace) -> Any:
     """A solid placed as a fixture file says."""
+    return _turned(solid, _turn_of(place)).translate(list(place.xyz))
+
+
+def _turn_of(place: MeshPlace) -> Float:
     roll, pitch, yaw = (rotation_matrix(angle * np.eye(3)[k]) for k, angle in enumerate(place.rpy))
-    return _turned(solid, yaw @ pitch @ roll).translate(list(place.xyz))
+    found: Float = yaw @ pitch @ roll
+    return found
+
+
+def placed(points: Float, place: MeshPlace, fit: PartsFit) -> Float:
+    """Points (P, 3) of a mesh [m], placed as a fixture file says, in the fixture frame."""
+    found: Float = (points @ _turn_of(place).T + np.array(place.xyz)) @ fit.turn.T + fit.origin
+    return found
 
 
 def _turned(solid: Any, rotation: Float) -> Any:
@@ -129,6 +140,8 @@ def _check_overlap(plug: MeshPart, socket: MeshPart, one: Any, two: Any) -> None
         point = ", ".join(f"{1000.0 * x:.1f}" for x in where)
         what = f"{plug.name} and {socket.name} overlap by {deep:.2g} mm at ({point}) mm"
         more = f"{deep / (1000.0 * TOUCH):.0f} times what is let pass; move [tool] assembled (press fits are refused)"
+        if repaired := " and ".join(part.name for part in (plug, socket) if part.places):
+            more += f", or close {repaired} where it was drawn: its holes were closed, or sheets left out"
         raise InputError("the assembled pose", what, more)
 
 

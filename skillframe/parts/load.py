@@ -20,6 +20,7 @@ from skillframe.parts.checks import (
     check_facets,
     check_two,
     check_walls,
+    mend_error,
     unfit_pieces,
 )
 from skillframe.parts.declared import DENSITY, FixtureFile, mesh_files, read_fixture
@@ -128,9 +129,14 @@ def _load(path: Path, hashes: Mapping[str, str]) -> LoadedParts:
     check_two(plug, socket)
     found = fit(plug, socket, file)
     check_clearance(found)
+    reach = np.reshape(_reach(found).bounding_box(), (2, 3))
+    errors = [mend_error(plug, file.tool.assembled, found, reach), mend_error(socket, file.fixture.pose, found, reach)]
     check_facets(found, plug, socket)
     check_walls(found, plug, socket)
-    held, standing = _prepared(plug, socket, found)
+    held, standing = (
+        side._replace(error=side.error + error)
+        for side, error in zip(_prepared(plug, socket, found), errors, strict=True)
+    )
     mass, center, inertia, notes = _inertia(found, plug, file)
     return LoadedParts(
         name_of(path), file, found, held, standing, mass, center, inertia, _starts(found, file),

@@ -19,6 +19,7 @@ from skillframe.errors import InputError, need
 from skillframe.frames import Float, cross
 from skillframe.parts.contents import check_contents, no_number
 from skillframe.parts.declared import SCALES
+from skillframe.parts.mended import Mend, mended
 from skillframe.robot.meshes import LARGEST_FILE
 
 FORMATS = (".stl", ".obj", ".ply", ".off", ".glb")
@@ -27,6 +28,7 @@ SMALLEST, LARGEST = 1e-3, 2.0
 MOST_TRIANGLES, THINNED_BY = 40_000, 2e-6
 _SAME = 1e-6  # of the size: vertices that are nearer are one
 _CHANGED = 0.01
+_FLAT = 1e-12  # of the size cubed: a body of less volume is flat
 Faces = NDArray[np.int64]
 
 
@@ -38,12 +40,14 @@ class MeshPart(NamedTuple):
         solid: a `manifold3d.Manifold` in the file's frame [m].
         notes: sentences on what was done to it.
         sha256: of the file.
+        places: that were mended, in the file's frame.
     """
 
     name: str
     solid: Any
     notes: tuple[str, ...]
     sha256: str
+    places: tuple[Mend, ...] = ()
 
     @property
     def size(self) -> float:
@@ -69,15 +73,15 @@ def read_part(path: Path, units: str | None) -> MeshPart:
     vertices, faces = _triangles(raw, path)
     _check_numbers(vertices, faces, path)
     _check_size(vertices, units or "m", path)
-    vertices, faces = _merged(vertices * SCALES[units or "m"], faces)
-    _check_closed(vertices, faces, path)
-    solid, notes = _united(vertices, faces, path)
-    notes = (*left_out, *notes)
+    mesh = mended(*_merged(vertices * SCALES[units or "m"], faces))
+    _check_closed(mesh.vertices, mesh.faces, path)
+    solid, notes = _united(mesh.vertices, mesh.faces, path)
+    notes = (*left_out, *(f"{path.name}: {note}" for note in mesh.notes), *notes)
     if solid.num_tri() > MOST_TRIANGLES:
         before, solid = solid.num_tri(), solid.simplify(THINNED_BY)
         kept = f"{path.name} has {before:,} triangles; {solid.num_tri():,} are kept within {THINNED_BY * 1e6:g} um"
         notes = (*notes, kept)
-    return MeshPart(path.name, solid, notes, hashlib.sha256(raw).hexdigest())
+    return MeshPart(path.name, solid, notes, hashlib.sha256(raw).hexdigest(), mesh.places)
 
 
 def arrays_of(solid: Any) -> tuple[Float, Faces]:
@@ -186,8 +190,9 @@ def _united(vertices: Float, faces: Faces, path: Path) -> tuple[Any, tuple[str, 
     if sum(volumes) < 0.0:
         notes.append(f"{path.name} is inside out (volume {sum(volumes) * 1e6:.3g} cm3); its triangles were turned")
         bodies, volumes = [body[:, ::-1] for body in bodies], [-each for each in volumes]
-    full = [_checked(vertices, body, path) for body, volume in zip(bodies, volumes, strict=True) if volume > 0.0]
-    voids = [_checked(vertices, body[:, ::-1], path) for body, v in zip(bodies, volumes, strict=True) if v < 0.0]
+    flat = _FLAT * float(np.ptp(vertices, axis=0).max()) ** 3
+    full = [_checked(vertices, body, path) for body, volume in zip(bodies, volumes, strict=True) if volume > flat]
+    voids = [_checked(vertices, body[:, ::-1], path) for body, v in zip(bodies, volumes, strict=True) if v < -flat]
     if not full:
         raise InputError(path, "has no volume", "export a solid body, not a surface")
     solid = united(full)

@@ -121,6 +121,7 @@ def stated(loaded: LoadedParts) -> dict[str, Any]:
         "depth": loaded.fit.depth, "clearance": loaded.fit.clearance, "backend": loaded.backend,
         "contact_error": loaded.contact_error, "pieces": sum(pieces),
         "origin": [float(x) for x in loaded.fit.origin],
+        **({"notes": " ".join(f"{note}." for note in loaded.notes)} if loaded.notes else {}),
         **{f"sha256 of {name}": value for name, value in loaded.hashes.items()},
     }  # fmt: skip
 

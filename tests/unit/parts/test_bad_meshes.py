@@ -28,6 +28,7 @@ pytestmark = pytest.mark.timeout(60)  # what hangs is a fault, too
 V, F = plug()
 SOCKET = binary_stl(*arrays_of(round_pair()[1]))
 P, Q, T = pin(), quads(), [t for q in quads() for t in ([q[0], q[1], q[2]], [q[0], q[2], q[3]])]
+SPLIT = [*[t for t in T if t != [4, 5, 6]], [4, 8, 6], [8, 5, 6]]
 WORDS = ascii_stl(V, F)
 SHEET = np.array([[0, 0, 0], [10, 0, 0], [10, 10, 0], [0, 10, 0]], dtype=float)
 FLAT = [[0, 1, 2], [0, 2, 3], [2, 1, 0], [3, 2, 0]]
@@ -45,14 +46,17 @@ FILES = {
     "more.stl": (binary_stl(V, F, 5), "says that it holds 5 triangles and has the bytes of 44"),
     "none.stl": (binary_stl(V, F[:0]), "holds no triangle"),
     "short.stl": (b"x" * 50, "cut off: it has 50 bytes"),
-    "cut_words.stl": (WORDS[: len(WORDS) // 2], "cut off: 22 facets begin, 21 end"),
-    "no_end.stl": (WORDS.replace("endsolid part", ""), "44 facets begin, 44 end, and the last line is missing"),
+    "cut_words.stl": (WORDS[: len(WORDS) // 2], "cut off: 22 facets begin and 21 end"),
+    "half_a_facet.stl": (WORDS.replace("endfacet\n", "", 1), "cut off: 44 facets begin and 43 end"),
+    "no_end.stl": (WORDS.replace("endsolid part", ""), "44 facets begin and 44 end, without a last line"),
     "nan.stl": (WORDS.replace("vertex 5 ", "vertex nan ", 1), "1 of 132 vertices that are not finite"),
     "inf.stl": (WORDS.replace("-12", "inf", 1), "not finite"),
     "word.stl": (WORDS.replace("-12", "abc", 1), "has 'abc' in place of a number"),
     "no_facet.stl": ("solid part\nendsolid part\n", "holds no triangle"),
-    "one.stl": (binary_stl(V, F[:1]), "open edges"),
+    "one.stl": (binary_stl(V, F[:1]), "no volume"),
     "sheet.stl": (binary_stl(SHEET, FLAT[:2]), "4 open edges"),
+    "lidless.stl": (binary_stl(P, T[2:]), "4 open edges"),
+    "half_a_skin.stl": (binary_stl(V, F[::2]), "open edges"),
     "flat.stl": (binary_stl(SHEET, FLAT), "no volume"),
     "fin.stl": (binary_stl(np.r_[P, [[0, 0, 20.0]]], [*T, [4, 6, 8]]), "open edges"),
     "zeros.stl": (binary_stl(np.zeros((3, 3)), [[0, 1, 2]] * 1000), "is 0 m long"),
@@ -111,6 +115,11 @@ FILES = {
 TAKEN = {
     # name of the file: its content, and words of the note, "" where there is nothing to be said
     "inside_out.stl": (binary_stl(V, F[:, ::-1]), "is inside out"),
+    "turned.stl": (binary_stl(V, np.r_[F[:9, ::-1], F[9:]]), "triangles turned as their neighbours: 9"),
+    "hole.stl": (binary_stl(V, F[1:]), "closed 1 hole"),
+    "corner_on_edge.stl": (binary_stl(np.r_[P, [[0, -3.5, 8]]], SPLIT), "closed 1 hole"),
+    "twice.stl": (binary_stl(V, np.r_[F, F]), "doubled triangles left out: 44"),
+    "both_sides.stl": (binary_stl(V, np.r_[F, F[:, ::-1]]), "doubled triangles left out: 44"),
     "PART.STL": (binary_stl(V, F), ""),
     "quads.obj": (obj(P, Q), ""),
     "from_the_end.obj": (obj(P, [[i - 9 for i in face] for face in Q]), ""),
