@@ -10,12 +10,14 @@ near the pin came to where the place ends.
     python -m tests.figures.task_boards [places|base|pooled ...] [policies=3] [boards=6] [seed=9100]
 
 `base` learns from the same demonstrations with every place's pose written down as if the board had stood still, that
-is, in the base frame, with the same cuts; `pooled` is `segment --set places=false`.
+is, in the base frame. It is refused, since what was touched then lies at other places in each demonstration. `pooled`
+is `segment --set places=false`.
 """
 
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -50,6 +52,7 @@ LAYOUTS, EACH = (1, 2, 3), 3
 COUNTS = {"policies": 3, "boards": 6, "seed": 9100}  # of a layout, of a policy, and what all is drawn from
 MOVES = {"offset_x": 0.05, "offset_y": 0.05, "tilt_x": 0.15, "tilt_z": 0.6}  # m, rad, each way
 AWAY, LONGEST_S, PLACES = 0.01, 80.0, 5
+LAST = 4  # words of a phase that are told
 
 
 class Outcome(NamedTuple):
@@ -92,7 +95,7 @@ def shown(layout: int) -> list[Demonstration]:
 
 
 def policy(demonstrations: list[Demonstration], how: str, layout: int) -> Document:
-    """A policy that is learned in the frames of places, in base with the same cuts, or in base from the whole."""
+    """A policy that is learned in the frames of places, as if these had stood still, or in base from the whole."""
     if how == "base":
         still = as_plain(places_in_base(load_robot_model("free_tool"), load_world("task_board", {"layout": layout})))
         demonstrations = [replace(d, meta={**d.meta, KEY: still}) for d in demonstrations]
@@ -151,37 +154,41 @@ def runs(document: Document, layout: int, how: str, number: int) -> list[Outcome
         tip = tip_of(trace, scene, Pose(fixture.position[i], fixture.rotation[i]))
         done = done_in_order(scene, *tip)
         well = bool(result.success[i]) and done == PLACES
-        wrong = "" if well else f"policy {number + 1}, board {i + 1}: "
-        if wrong:
-            phase, said = (
-                ("", []) if mine is None or done == PLACES else words(document, mine, i, list(scene.places)[done])
-            )
-            wrong += "all places done" if done == PLACES else missed(scene, done, trace, tip, phase, said)
-            wrong += f"; {result.failure[i] or 'ended well'}"
+        wrong = (
+            "" if well else f"policy {number + 1}, board {i + 1}: {cause(scene, document, mine, i, trace, tip, done)}"
+        )
         outcomes.append(Outcome(well, done, float(result.peak_force_n[i]), wrong))
     return outcomes
 
 
-def words(document: Document, mine: Told, trial: int, place: str) -> tuple[str, list[tuple[float, str]]]:
-    """The phase that belongs to a place, by name, and its journal: what its work said, or else how far it came."""
-    phase = next((i for i, each in enumerate(document["phases"]) if each["place"] == place), None)
-    if phase is None:
-        return "no phase of its own", []
-    begun = mine.phases.get(phase)
-    return f"phase {phase + 1}", [] if begun is None else begun.said(trial) or begun.journal(trial)
-
-
-def missed(
-    scene: Scene, done: int, trace: Trace, tip: tuple[Pose, Float], phase: str, said: Sequence[tuple[float, str]]
+def cause(
+    scene: Scene, document: Document, mine: Told | None, trial: int, trace: Trace, tip: tuple[Pose, Float], done: int
 ) -> str:  # fmt: skip
-    """The first place that was not done: its phase's words, the force [N], and how near it came [mm]."""
-    name, (position, quaternion) = list(scene.places.items())[done]
+    """Why a run does not count: the first place that it did not do, or what it said at the last, and how it ended."""
+    name = list(scene.places)[min(done, PLACES - 1)]
+    said = [] if mine is None else words(document, mine, trial, name)
+    how = f"{name}: {'; '.join(text for _, text in said[-LAST:]) or 'was not begun by a phase of its own'}"
+    where = "was done" if done == PLACES else missed(scene, name, trace, tip, [time for time, _ in said])
+    return f"{how}; {where}; {trace.meta['failure'] or 'ended well'}"
+
+
+def words(document: Document, mine: Told, trial: int, place: str) -> list[tuple[float, str]]:
+    """The journal of the phase that belongs to a place: what its work said, or else how far it came."""
+    phase = next((i for i, each in enumerate(document["phases"]) if each["place"] == place), -1)
+    name = f"phase {phase + 1}"
+    if phase not in mine.phases or not any(text.startswith(f"{name}:") for _, text in mine.policy.journal(trial)):
+        return []
+    return mine.phases[phase].said(trial) or mine.phases[phase].journal(trial)
+
+
+def missed(scene: Scene, name: str, trace: Trace, tip: tuple[Pose, Float], times: Sequence[float]) -> str:
+    """The largest force [N] between times, or in the whole run, and how near the pin came to a place's end [mm]."""
+    position, quaternion = scene.places[name]
     end = Pose(np.array(position), matrix_from_quaternion(quaternion)).at(np.array(BOARD[name].end)).position
-    times = [time for time, _ in said] or list(trace.time)
-    there = (trace.time >= min(times)) & (trace.time <= max(times))
+    first, last = (min(times), max(times)) if times else (0.0, np.inf)
+    there = (trace.time >= first) & (trace.time <= last)
     force, near = norm(trace.wrench[there, :3]).max(), 1e3 * norm(tip[0].position[there] - end).min()
-    text = "; ".join(text for _, text in said)
-    return f"{name}: {phase}: {text or 'was not begun'}; at most {force:.0f} N, {near:.1f} mm from its end"
+    return f"at most {force:.0f} N, {near:.1f} mm from its end"
 
 
 def tip_of(trace: Trace, scene: Scene, fixture: Pose) -> tuple[Pose, Float]:
@@ -218,8 +225,8 @@ def main(names: list[str]) -> None:
             outcomes = row(layout, how, taught[layout])
             every += outcomes
             print(f"{how:<8} board {layout}: {_told(outcomes)}", flush=True)
-            for text in [o.wrong for o in outcomes if not o.success]:
-                print(f"    {text}", flush=True)
+            for text, times in Counter(o.wrong for o in outcomes if not o.success).items():
+                print(f"    {times} x {text}", flush=True)
         low, high = binomtest(sum(o.success for o in every), len(every)).proportion_ci(method="exact")
         print(f"{how:<8} all: {_told(every)}; 95 % {low:.3f} to {high:.3f}", flush=True)
 
