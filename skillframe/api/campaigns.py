@@ -23,7 +23,7 @@ from skillframe.api.tasks import Robot
 from skillframe.campaign import evaluate
 from skillframe.campaign.folder import campaign_hash, load, prepare
 from skillframe.campaign.replay import pick_label
-from skillframe.campaign.rows import absent, columns
+from skillframe.campaign.rows import LEFT_OUT, absent, columns
 from skillframe.campaign.runner import Options, Progress, run_campaign, trace_path
 from skillframe.campaign.spec import CampaignSpec, place_of
 from skillframe.campaign.store import ordered, read_content
@@ -50,6 +50,7 @@ class SkillRate(NamedTuple):
         rate: successes over trials; None without a trial.
         interval_95: bounds of the success probability; None where no interval holds, for the reason in `method`.
         method: of the interval, in words.
+        left_out_after: trials after which a race left the skill out; None where none did.
     """
 
     trials: int
@@ -57,6 +58,7 @@ class SkillRate(NamedTuple):
     rate: float | None
     interval_95: tuple[float, float] | None
     method: str
+    left_out_after: int | None = None
 
 
 class CampaignResults:
@@ -79,7 +81,9 @@ class CampaignResults:
         self.spec = load(self.folder)
         self.summary = read_summary(self.folder)
         done = read_content(self.folder, campaign_hash(self.spec), self.spec).done.values()
-        self.rows = ordered(self.spec, done, self.summary["stopped_after_trial"])
+        told = self.summary["skills"]
+        left = {label: told[label][LEFT_OUT] for label in told if LEFT_OUT in told[label]}
+        self.rows = ordered(self.spec, done, self.summary["stopped_after_trial"], left)
 
     @property
     def skills(self) -> dict[str, SkillRate]:
@@ -126,14 +130,16 @@ class CampaignResults:
 def _rate(found: Mapping[str, Any]) -> SkillRate:
     interval = found["interval_95"]
     bounds = None if interval is None else (float(interval[0]), float(interval[1]))
-    return SkillRate(found["trials"], found["successes"], found["rate"], bounds, found["method"])
+    left = found.get(LEFT_OUT)
+    return SkillRate(found["trials"], found["successes"], found["rate"], bounds, found["method"], left)
 
 
 def _said(rate: SkillRate) -> str:
     if rate.rate is None:
         return "no trial yet"
     text = f"{rate.successes} of {rate.trials}, rate {rate.rate:.3f}"
-    return text if rate.interval_95 is None else f"{text} ({rate.interval_95[0]:.3f} to {rate.interval_95[1]:.3f})"
+    text += "" if rate.interval_95 is None else f" ({rate.interval_95[0]:.3f} to {rate.interval_95[1]:.3f})"
+    return text if rate.left_out_after is None else f"{text}, left out after {rate.left_out_after} trials"
 
 
 class Campaign:
@@ -150,8 +156,8 @@ class Campaign:
         world: a world's name, or its fixture file.
         skills: learned skills, skill files, "TYPE:DEMONSTRATION", or a dict of these by the names they get in results.
         **keys: the other keys of campaign.toml: `robot` ("panda" if nothing says otherwise), `trials` (100), `seed`
-            (0), `vary` {"fixture.tilt_y": {"uniform": [-0.1, 0.1]}}, `set`, `coc`, `duration_s`, `stop`, `expect`,
-            `name`.
+            (0), `vary` {"fixture.tilt_y": {"uniform": [-0.1, 0.1]}}, `set`, `coc`, `duration_s`, `stop`, `race`,
+            `expect`, `name`.
 
     Raises:
         InputError: a key or value that cannot be used; names it.

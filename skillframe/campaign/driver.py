@@ -66,6 +66,7 @@ class Driver:
         keep: what to do with the rows of a chunk that ended.
         lost: the row of a trial that left none, from its job and the reason.
         enough: asked before each chunk; True starts no more.
+        wanted: asked of each chunk before it starts; False leaves it out.
         words: a job in words, for sentences.
         tell: told when a worker was replaced, and why.
         fix: what to type once trouble of the environment is over.
@@ -75,6 +76,7 @@ class Driver:
     keep: Callable[[list[Row]], None]
     lost: Callable[[ChunkJob, str], Row]
     enough: Callable[[], bool]
+    wanted: Callable[[ChunkJob], bool]
     words: Callable[[ChunkJob], str]
     tell: Callable[[str], None]
     fix: str
@@ -90,13 +92,17 @@ class Driver:
         queue, suspects, flying = deque(jobs), list[ChunkJob](), 0
         while flying or (queue and not self.enough()):
             while queue and flying < self.pool.size and not self.enough():
-                self.pool.submit(queue.popleft())
-                flying += 1
+                job = queue.popleft()
+                if self.wanted(job):
+                    self.pool.submit(job)
+                    flying += 1
+            if not flying:
+                break
             job, answer = self.pool.next()
             flying -= 1
             self._handle(job, answer, queue, suspects)
         for job in suspects:
-            if not self.enough():
+            if self.wanted(job) and not self.enough():
                 self.pool.submit(job)
                 self._judge(*self.pool.next())
 

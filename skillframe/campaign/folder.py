@@ -236,6 +236,7 @@ def to_toml(spec: CampaignSpec) -> str:
         "vary": {n: a.plain() for n, a in spec.vary.items()},
         "set": spec.fixed,
         "stop": stop,
+        **({"race": dataclasses.asdict(spec.race)} if spec.race else {}),
         "expect": expect,
     }
     parts = [to_lines(top), *(f"[{name}]\n{to_lines(table)}" for name, table in tables.items() if to_lines(table))]

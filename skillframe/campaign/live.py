@@ -9,9 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from skillframe.campaign.lock import holder
-from skillframe.campaign.rows import EXTRA, Row, cell
+from skillframe.campaign.race import Race
+from skillframe.campaign.rows import EXTRA, LEFT_OUT, Row, cell
+from skillframe.campaign.spec import RaceKeys
 from skillframe.campaign.store import RESULTS, ROWS, read_content
 from skillframe.campaign.summary import SUMMARY, read_summary
+from skillframe.config import build
 from skillframe.document.source import parse_source
 from skillframe.errors import SkillframeError
 
@@ -32,12 +35,13 @@ def has_ended(folder: Path) -> bool:
     return not runs_now(folder) and (folder / SUMMARY).is_file() and read_summary(folder).get("complete") is True
 
 
-def live_table(folder: Path, skills: Sequence[object]) -> str | None:
+def live_table(folder: Path, skills: Sequence[object], spec: Mapping[str, Any] | None = None) -> str | None:
     """The stored rows as the text of a results.csv. None where results.csv itself is to be read.
 
     Args:
         folder: of a campaign.
         skills: as its campaign.toml names them, for their order.
+        spec: content of its campaign.toml, which says whether it is a race.
 
     Raises:
         InputError: damaged rows.
@@ -45,7 +49,20 @@ def live_table(folder: Path, skills: Sequence[object]) -> str | None:
     if not (folder / ROWS).is_file() or ((folder / RESULTS).is_file() and not runs_now(folder)):
         return None
     rows = list(read_content(folder).done.values())
-    return _text(rows, _labels(folder, skills)) if rows else None
+    labels = _labels(folder, skills)
+    return _text(_raced(rows, labels, spec or {}), labels) if rows else None
+
+
+def _raced(rows: list[Row], labels: Sequence[str], spec: Mapping[str, Any]) -> list[Row]:
+    """The rows of a race that its table will keep so far, those of skills that were left out with their mark."""
+    keys, trials = spec.get("race"), spec.get("trials")
+    if not isinstance(keys, dict) or not isinstance(trials, int) or not {row["skill"] for row in rows} <= set(labels):
+        return rows
+    race = Race(labels, trials, build(RaceKeys, keys, "race"))
+    race.add(rows)
+    gone, reach = race.left, race.reach
+    kept = [row for row in rows if row["trial"] < reach[row["skill"]]]
+    return [{**row, LEFT_OUT: gone[row["skill"]].after if row["skill"] in gone else ""} for row in kept]
 
 
 def _labels(folder: Path, skills: Sequence[object]) -> list[str]:

@@ -36,6 +36,8 @@ JUDGED = (
 EXTRA = ("status", "reason")
 TRUTH = {"1": True, "true": True, "1.0": True, "0": False, "false": False, "0.0": False}
 """How a table may say whether a trial succeeded."""
+LEFT_OUT = "left_out_after"
+"""Column of a race's results.csv: how many trials a skill ran that was left out; empty for the others."""
 SCORE = "score."
 """Begins the columns of scores."""
 SECOND = "second."
@@ -78,7 +80,8 @@ def trials_of(job: ChunkJob, spec: CampaignSpec) -> str:
 def columns(spec: CampaignSpec, rows: Iterable[Row] = ()) -> list[str]:
     """The columns of results.csv. Those of second parts are the world's, so they are known from its rows alone."""
     second = sorted({name for row in rows for name in row if name.startswith(SECOND)})
-    return ["trial", "skill", "seed", *spec.vary, *OUTCOME, *JUDGED, *score_columns(spec), *second]
+    left_out = [LEFT_OUT] if spec.race else []
+    return ["trial", "skill", "seed", *spec.vary, *OUTCOME, *JUDGED, *score_columns(spec), *second, *left_out]
 
 
 def score_columns(spec: CampaignSpec) -> list[str]:

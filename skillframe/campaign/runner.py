@@ -131,7 +131,6 @@ class _Session:
         self.spec, self.log, self.options, self.notify = spec, log, options, notify
         self.rule = StopRule(spec)
         self.rule.add(log.done.values())
-        self.total = spec.trials * len(spec.skills)
         self.furthest = 0.0
 
     def run(self, evaluate: Evaluate) -> dict[str, Any]:
@@ -199,15 +198,25 @@ class _Session:
     def _driver(self, pool: Pool[ChunkJob], keep: Callable[[list[Row]], None], traces: bool = False) -> Driver:
         return Driver(
             pool=pool, keep=keep, lost=self._lost, enough=lambda: not traces and self.rule.after is not None,
+            wanted=lambda job: traces or self._wanted(job),
             words=lambda job: trials_of(job, self.spec), tell=self._tell, fix=_resume(self.spec.folder),
         )  # fmt: skip
+
+    @property
+    def total(self) -> int:
+        """How many rows there will be, as far as is known: a race needs fewer than were planned."""
+        return self.rule.total(len(self.log.done))
+
+    def _wanted(self, job: ChunkJob) -> bool:
+        return any(self.rule.wants(self.spec.labels[job.skill], trial) for trial in job.trials)
 
     def _lost(self, job: ChunkJob, reason: str) -> Row:
         return dead_row(self.spec, job.skill, job.trials[0], reason)
 
     def _jobs(self, workers: int) -> Iterator[ChunkJob]:
         """Chunks of what is missing, the skills side by side so that a prefix of the trials is complete early."""
-        size = chunk_size(self.spec.trials, workers, self.options.chunk)
+        largest = self.options.chunk if self.spec.race is None else min(self.options.chunk, self.spec.race.every)
+        size = chunk_size(self.spec.trials, workers, largest)
         for first in range(0, self.spec.trials, size):
             trials = range(first, min(first + size, self.spec.trials))
             for skill, label in enumerate(self.spec.labels):
@@ -263,7 +272,7 @@ class _Session:
                 self._tell(f"trial {row['trial']} of {row['skill']} came out differently when run again: {changed}")
 
     def _rows(self) -> list[Row]:
-        return ordered(self.spec, self.log.done.values(), self.rule.after)
+        return ordered(self.spec, self.log.done.values(), self.rule.after, self.rule.left)
 
     def _environments(self, rows: list[Row]) -> list[dict[str, Any]]:
         """Where rows ran, and how many. Those of skillframe 0.1 do not say."""
@@ -280,7 +289,13 @@ class _Session:
             RESULTS: file_hash(folder / RESULTS),
         }
         summary = summarize(
-            self.spec, rows, self.log.sessions, complete=self._complete(), stop_after=self.rule.after, hashes=hashes
+            self.spec,
+            rows,
+            self.log.sessions,
+            complete=self._complete(),
+            stop_after=self.rule.after,
+            hashes=hashes,
+            race=self.rule.race,
         )
         summary["environments"] = self._environments(rows)
         robot = load_robot(str(folder / self.spec.robot))

@@ -39,6 +39,19 @@ class Stop:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class RaceKeys:
+    """That a skill which is decidedly worse runs no more (`race`).
+
+    Attributes:
+        every: trials between two looks; our choice, because fewer would make the batches of trials slow.
+        alpha: chance that any two skills are told apart that are equally good.
+    """
+
+    every: int = 32
+    alpha: float = 0.05
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Expect:
     """The threshold: exit code 1 when a skill's success rate is below it.
 
@@ -73,6 +86,7 @@ class _File:
     vary: dict[str, Any] = field(default_factory=dict)
     set: dict[str, Any] = field(default_factory=dict)
     stop: Stop = field(default_factory=Stop)
+    race: RaceKeys | None = None
     expect: Expect = field(default_factory=Expect)
     scores: tuple[str, ...] = ()
 
@@ -84,7 +98,7 @@ class CampaignSpec:
     Attributes:
         name: for people; the file's name if it has none.
         seed: of every draw; trial i of a seed is the same whatever else runs.
-        trials: total number per skill.
+        trials: total number per skill; in a race the most that a skill runs.
         robot: a robot's name or a path to a robot.toml or its folder, relative to `folder`.
         world: a world's name, or a path to a fixture.toml, relative to `folder`.
         skills: "FILE.skill.json" or "TYPE:DEMO,..." (see `document.source`), relative to `folder`.
@@ -92,6 +106,7 @@ class CampaignSpec:
         fixed: quantities at one other value than the default, `[set]` in the file.
         coc: centre of compliance, "x,y,z" in the tool frame or a frame's name; None for the skill's own.
         duration_s: simulated time after which a trial has failed.
+        race: how skills that are decidedly worse are left out; None runs all of them to the end.
         scores: names of scores to compute of every trial; each is a column of results.csv.
         folder: where the file lies; relative paths start there.
     """
@@ -107,6 +122,7 @@ class CampaignSpec:
     coc: str | None = None
     duration_s: float = DURATION_S
     stop: Stop = field(default_factory=Stop)
+    race: RaceKeys | None = None
     expect: Expect = field(default_factory=Expect)
     scores: tuple[str, ...] = ()
     folder: Path = Path()
@@ -141,19 +157,20 @@ class CampaignSpec:
     @property
     def plan(self) -> Plan:
         """What is fixed before the first trial."""
-        may_stop = self.stop.interval_width is not None
+        may_stop = self.stop.interval_width is not None or self.race is not None
         return plan_of(self.vary, trials=self.trials, skills=len(self.skills), may_stop=may_stop)
 
     def plain(self) -> dict[str, Any]:
         """The campaign as plain JSON values, as `from_plain` reads them, without its folder.
 
-        Scores are in it where there are some, and `expect.by` where it is not "rate", so that the hashes of campaigns
-        without them stay as they were.
+        Scores and `race` are in it where there are some, and `expect.by` where it is not "rate", so that the hashes of
+        campaigns without them stay as they were.
         """
-        values = {key: value for key, value in asdict(self).items() if key not in ("vary", "folder", "scores")}
+        values = {key: value for key, value in asdict(self).items() if key not in ("vary", "folder", "scores", "race")}
         values["skills"] = list(self.skills)
         values["expect"] = {k: v for k, v in values["expect"].items() if (k, v) != ("by", "rate")}
         values |= {"scores": list(self.scores)} if self.scores else {}
+        values |= {"race": asdict(self.race)} if self.race else {}
         return {**values, "vary": {name: axis.plain() for name, axis in self.vary.items()}}
 
     @classmethod
@@ -161,9 +178,10 @@ class CampaignSpec:
         """The inverse of `plain`, for values that were checked before."""
         axes = {name: parse_axis(value, name) for name, value in values["vary"].items()}
         stop, expect = Stop(**values["stop"]), Expect(**values["expect"])
-        rest = {k: v for k, v in values.items() if k not in ("vary", "stop", "expect", "skills", "scores")}
+        race = RaceKeys(**values["race"]) if "race" in values else None
+        rest = {k: v for k, v in values.items() if k not in ("vary", "stop", "race", "expect", "skills", "scores")}
         skills, scores = tuple(values["skills"]), tuple(values.get("scores", ()))
-        return cls(**rest, skills=skills, scores=scores, vary=axes, stop=stop, expect=expect, folder=folder)
+        return cls(**rest, skills=skills, scores=scores, vary=axes, stop=stop, race=race, expect=expect, folder=folder)
 
     @classmethod
     def from_toml(cls, path: Path, params: type | None = None) -> CampaignSpec:
@@ -204,8 +222,8 @@ class CampaignSpec:
         values = {
             k: getattr(file, k) for k in ("seed", "trials", "robot", "world", "skills", "coc", "duration_s", "scores")
         }
-        spec = cls(**values, name=file.name or path.stem, vary=vary, fixed=fixed, stop=file.stop, expect=file.expect,
-                   folder=path.parent)  # fmt: skip
+        spec = cls(**values, name=file.name or path.stem, vary=vary, fixed=fixed, stop=file.stop, race=file.race,
+                   expect=file.expect, folder=path.parent)  # fmt: skip
         _check_designs(spec, path)
         return spec
 
@@ -253,7 +271,22 @@ def _check_numbers(file: _File, path: Path) -> None:
     for key, value, good, fix in checks:
         if not good:
             raise InputError(f"{path}: {key}", f"is {value}", fix)
+    if file.race is not None:
+        _check_race(file, file.race, path)
     require_within(file.duration_s, file.duration_s, DURATION.unit, DURATION.range, f"{path}: duration_s")
+
+
+def _check_race(file: _File, race: RaceKeys, path: Path) -> None:
+    if race.every < 1:
+        raise InputError(f"{path}: race.every", f"is {race.every}", "give the trials between two looks, one or more")
+    if not 0.0 < race.alpha < 0.5:
+        raise InputError(f"{path}: race.alpha", f"is {race.alpha}", "give a number between 0 and 0.5")
+    if len(file.skills) < 2:
+        raise InputError(f"{path}: race", "has one skill, which nothing can beat", "name a second one, or leave it out")
+    if file.stop.interval_width is not None:
+        raise InputError(
+            f"{path}: race", "and [stop] interval_width would both say when the campaign ends", "keep one of the two"
+        )
 
 
 def _check_skills(file: _File, path: Path) -> None:
@@ -315,9 +348,10 @@ def _check_designs(spec: CampaignSpec, path: Path) -> None:
         )  # fmt: skip
     if spec.plan.in_order and spec.plan.may_stop:
         names = [name for name, axis in spec.vary.items() if axis.kind in ("grid", "values")]
+        key = "stop.interval_width" if spec.race is None else "race"
         raise InputError(
-            f"{path}: stop.interval_width",
+            f"{path}: {key}",
             f"cannot stop early over {', '.join(names)}: grid and values axes run in order, so the first trials are "
             "one end of them and no interval from these trials holds for all",
-            "make these axes uniform or sobol, or leave out [stop]",
+            f"make these axes uniform or sobol, or leave out [{key.split('.')[0]}]",
         )

@@ -22,8 +22,8 @@ def status_of(folder: Path, params: type | None = None) -> dict[str, Any]:
 
     Returns:
         `name`, `robot`, `world`, `rows`, `planned_rows`, `complete`, `stopped_after_trial`, `running` (null, or `pid`
-        and `host` of the process that is writing), `skills` and `comparisons` as in summary.json, `remarks`: sentences
-        to be read first.
+        and `host` of the process that is writing), `skills`, `comparisons` and `race` as in summary.json, `remarks`:
+        sentences to be read first.
 
     Raises:
         InputError: not a campaign's folder, or rows of another campaign or changed ones.
@@ -33,20 +33,20 @@ def status_of(folder: Path, params: type | None = None) -> dict[str, Any]:
     done = found.done
     rule = StopRule(spec)
     rule.add(done.values())
-    planned = spec.trials * len(spec.skills)
-    complete = rule.after is not None or len(done) == planned
-    rows, owner = ordered(spec, done.values(), rule.after), holder(folder)
+    complete = rule.after is not None or len(done) == rule.total(len(done))
+    rows, owner = ordered(spec, done.values(), rule.after, rule.left), holder(folder)
     return {
         "name": spec.name,
         "robot": spec.robot_name,
         "world": spec.world_name,
         "rows": len(rows),
-        "planned_rows": planned,
+        "planned_rows": rule.planned,
         "complete": complete,
         "stopped_after_trial": rule.after,
         "running": {"pid": owner[0], "host": owner[1]} if owner else None,
         "skills": rates(spec, rows, complete),
-        "comparisons": comparisons(spec, rows, complete),
+        "comparisons": comparisons(spec, rows, complete, rule.race),
+        **({"race": rule.race.outcome()} if rule.race else {}),
         "remarks": remarks(
             folder, rows, unchecked=found.unchecked, environments=found.environments,
             summary=read_summary(folder) if (folder / SUMMARY).is_file() and not owner else None,

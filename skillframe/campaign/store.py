@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from skillframe.campaign.rows import Row, absent, cell, columns, decode, encode
+from skillframe.campaign.rows import LEFT_OUT, Row, absent, cell, columns, decode, encode
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.verify import FIX, KEYS, KINDS, Line, check_rows, check_shape
 from skillframe.errors import InputError
@@ -271,11 +271,22 @@ def _check_header(path: Path, header: Row, campaign: str | None) -> int:
     return version
 
 
-def ordered(spec: CampaignSpec, rows: Iterable[Row], stop_after: int | None = None) -> list[Row]:
-    """Rows by trial, then by skill, without those after the trial at which the campaign stopped."""
-    order = {label: i for i, label in enumerate(spec.labels)}
+def ordered(
+    spec: CampaignSpec, rows: Iterable[Row], stop_after: int | None = None, left: Mapping[str, int] | None = None
+) -> list[Row]:
+    """Rows by trial, then by skill, without those after the trial at which the campaign stopped.
+
+    Args:
+        spec: the campaign.
+        rows: all there are.
+        stop_after: the last trial of a campaign that stopped early.
+        left: trials of the skills that a race left out. Their rows beyond are dropped, and the others say so.
+    """
+    order, gone = {label: i for i, label in enumerate(spec.labels)}, left or {}
     kept = (row for row in rows if stop_after is None or row["trial"] <= stop_after)
-    return sorted(kept, key=lambda row: (row["trial"], order[row["skill"]]))
+    raced = (row for row in kept if row["trial"] < gone.get(row["skill"], spec.trials))
+    marked = (row | {LEFT_OUT: gone[row["skill"]]} if row["skill"] in gone else row for row in raced)
+    return sorted(marked, key=lambda row: (row["trial"], order[row["skill"]]))
 
 
 def write_results(folder: Path, spec: CampaignSpec, rows: Sequence[Row]) -> None:

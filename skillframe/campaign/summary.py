@@ -10,7 +10,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from skillframe.campaign.rows import SCORE, Row
+from skillframe.campaign.race import Race
+from skillframe.campaign.rows import LEFT_OUT, SCORE, Row
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.statistics import correction, holm
 from skillframe.campaign.store import FORMAT, VERSION
@@ -34,7 +35,7 @@ def rates(spec: CampaignSpec, rows: Sequence[Row], complete: bool) -> dict[str, 
     Besides, how often which code of `ended_by`, and the largest forces and shares of the motors. Which interval it is,
     and why there may be none, `validity` says. An unfinished campaign counts each skill's trials up to the first one
     that is missing; `uncounted` is the number of its rows beyond. `unended` counts successes whose skill had not
-    ended by itself when the time was up.
+    ended by itself when the time was up. A skill that a race left out says after how many trials, `left_out_after`.
     """
     validity = validity_of(spec.plan, complete=complete)
     return {label: _rate(_of(rows, label, complete), rows, label, validity) for label in spec.labels}
@@ -64,6 +65,7 @@ def _rate(counted: Sequence[Row], rows: Sequence[Row], label: str, validity: Val
         "ended_by": {code: ended.count(code) for code in sorted(set(ended))},
         "largest": {name: _largest([row.get(name) for row in counted]) for name in PEAKS},
         "uncounted": sum(row["skill"] == label for row in rows) - n,
+        **({LEFT_OUT: counted[0][LEFT_OUT]} if counted and LEFT_OUT in counted[0] else {}),
     }
 
 
@@ -90,11 +92,19 @@ def _spread(rows: Sequence[Row], name: str) -> dict[str, float | int | None]:
     return {"trials": len(values), "median": median(values), "smallest": min(values), "largest": max(values)}
 
 
-def comparisons(spec: CampaignSpec, rows: Sequence[Row], complete: bool) -> list[dict[str, Any]]:
-    """Every pair of skills on the trials that both ran. `p_value` is corrected for the number of pairs."""
+def comparisons(
+    spec: CampaignSpec, rows: Sequence[Row], complete: bool, race: Race | None = None
+) -> list[dict[str, Any]]:
+    """Every pair of skills on the trials that both ran. `p_value` is corrected for the number of pairs.
+
+    The p-values of a race are the smallest ones at its looks.
+    """
     validity = validity_of(spec.plan, complete=complete)
     outcome = {label: {r["trial"]: r["success"] for r in _of(rows, label, complete)} for label in spec.labels}
     pairs = [_comparison(a, b, outcome, validity) for a, b in combinations(spec.labels, 2)]
+    if race is not None:
+        for pair in pairs:
+            pair["p_value_uncorrected"] = race.minima[pair["first"], pair["second"]]
     if validity.basis is not Basis.NONE:
         for pair, corrected in zip(pairs, holm([p["p_value_uncorrected"] for p in pairs]), strict=True):
             pair |= {"p_value": corrected, "correction": correction(len(pairs))}
@@ -121,7 +131,7 @@ def _comparison(a: str, b: str, outcome: Mapping[str, Mapping[int, bool]], valid
 
 def summarize(
     spec: CampaignSpec, rows: Sequence[Row], sessions: Sequence[Mapping[str, Any]], *, complete: bool,
-    stop_after: int | None, hashes: Mapping[str, Any],
+    stop_after: int | None, hashes: Mapping[str, Any], race: Race | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """The whole of summary.json.
 
@@ -132,6 +142,7 @@ def summarize(
         complete: all trials ran, or the campaign stopped early as asked.
         stop_after: last trial of a campaign that stopped early.
         hashes: of the campaign and of its files.
+        race: of a campaign that is one.
     """
     opened = [session for session in sessions if "environment" in session]
     last = opened[-1] if opened else {}
@@ -149,7 +160,8 @@ def summarize(
         "stopped_after_trial": stop_after,
         "skills": figures,
         **_verdict(spec, figures, complete),
-        "comparisons": comparisons(spec, rows, complete),
+        "comparisons": comparisons(spec, rows, complete, race),
+        **({"race": race.outcome()} if race else {}),
         **({"scores": scores(spec, rows, complete)} if spec.scores else {}),
         **({"guessed_masses": guess} if guess else {}),
         "wall_s": sum(s.get("wall_s", 0.0) for s in sessions),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,11 +51,11 @@ def command(file: Path, alpha: float, draws: str | None, score: str | None, lowe
     trials = read_trials(table_path(file) if file.is_dir() else file, drawn, score)
     found = compare(trials, alpha, 0 if score is None else -1 if lower else 1)
     if as_json:
-        emit_json(_plain(found) | {"real": trials.real})
+        emit_json(_plain(found) | {"real": trials.real, "left_out_after": dict(trials.left_out)})
         return
     if trials.real:
         click.echo("real trials")
-    _tell(found, score)
+    _tell(found, score, trials.left_out)
 
 
 def _plain(found: Judgement) -> dict[str, Any]:
@@ -65,13 +66,18 @@ def _plain(found: Judgement) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _tell(found: Judgement, score: str | None) -> None:
+def _tell(found: Judgement, score: str | None, left: Mapping[str, int]) -> None:
     for text in found.doubts:
         note(f"note: {text}")
     head = ("rate", "95 % interval") if score is None else (score, "middle half")
-    lines = [(r.policy, r.trials, r.successes, *_figures(r), r.letters) for r in found.standings]
+    lines = [
+        (r.policy, f"{r.trials}, left out" if r.policy in left else r.trials, r.successes, *_figures(r), r.letters)
+        for r in found.standings
+    ]
     table(("policy", "trials", "successes", *head, "alike"), lines)
     click.echo(f"policies that share a letter are not told apart (any false decision: at most {100 * found.alpha:g} %)")
+    for policy, after in left.items():
+        click.echo(f"{policy} was left out of the race after {after} trials; its rate is of these alone")
     for pair in found.pairs:
         click.echo(f"{pair.first} against {pair.second}: {_counts(pair, score)}")
         click.echo(f"  p = {pair.p_value:.2g}: {_decision(pair)}")

@@ -57,7 +57,8 @@ def _claim(results: Results, skill: str) -> list[object]:
     rate = results.rate(skill)
     return [
         tag("strong", f"{rate.successes} of {rate.trials}"),
-        f"{' real' if results.real else ''} trials succeeded ({percent(rate.share)}; {results.said(rate)})",
+        f"{' real' if results.real else ''} trials succeeded ({percent(rate.share)}; {results.said(rate)})"
+        f"{results.mark(skill)}",
     ]
 
 
@@ -93,7 +94,7 @@ def _tile(results: Results, skill: str, index: int) -> Markup:
     return tag(
         "div", tag("p", skill, class_="tile-name"),
         tag("p", percent(rate.share), class_=f"tile-figure s{index % 4 + 1}"),
-        tag("p", f"{rate.successes} of {rate.trials} {kind} succeeded", class_="tile-text"),
+        tag("p", f"{rate.successes} of {rate.trials} {kind} succeeded{results.mark(skill)}", class_="tile-text"),
         interval_bar(rate, index),
         tag("p", results.said(rate), class_="tile-text"),
         tag("p", _typical(results, skill), class_="tile-text faint"), class_="tile",

@@ -12,13 +12,13 @@ import io
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
 from skillframe.campaign.claims.trials import SOURCE, is_torn, real_or_simulated
-from skillframe.campaign.rows import JUDGED, OUTCOME, SCORE, SECOND, TRUTH
+from skillframe.campaign.rows import JUDGED, LEFT_OUT, OUTCOME, SCORE, SECOND, TRUTH
 from skillframe.campaign.statistics import Interval, correction, holm
 from skillframe.campaign.validity import Basis, Plan, Validity, unbroken, validity_of
 from skillframe.errors import InputError
@@ -26,7 +26,7 @@ from skillframe.execution.tracemeta import SHARE_JOINTS
 from skillframe.reports.markup import percent
 
 REQUIRED = ("trial", "skill", "success")
-FIXED = (*REQUIRED, "seed", "reason", "stream", SOURCE, *OUTCOME, *JUDGED)
+FIXED = (*REQUIRED, "seed", "reason", "stream", SOURCE, LEFT_OUT, *OUTCOME, *JUDGED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,6 +90,7 @@ class Results:
         assumed: nothing is known of the plan; the trials are taken for independent, their number for fixed.
         notes: what was odd about the file.
         real: every row is a trial of a real robot. Such a table grows, so its intervals hold at every look.
+        left_out: how many trials the skills ran that a race left out.
     """
 
     rows: tuple[ResultRow, ...]
@@ -100,6 +101,11 @@ class Results:
     assumed: bool = False
     notes: tuple[str, ...] = ()
     real: bool = False
+    left_out: Mapping[str, int] = field(default_factory=dict)
+
+    def mark(self, skill: str) -> str:
+        """What a rate of a skill that a race left out is never shown without, or ""."""
+        return f", left out after {self.left_out[skill]} trials" if skill in self.left_out else ""
 
     def of(self, skill: str) -> list[ResultRow]:
         """A skill's rows."""
@@ -209,8 +215,13 @@ def results_of(text: str, path: Path, declared: Sequence[str] = (), plan: Plan |
         rows, notes = counted, notes + _left_out(len(rows) - len(counted))
     return Results(
         rows=rows, skills=skills, varied=varied, validity=validity, complete=complete, assumed=plan is None,
-        notes=tuple(notes), real=real,
+        notes=tuple(notes), real=real, left_out=left_out_of((row.skill, row.values.get(LEFT_OUT)) for row in rows),
     )  # fmt: skip
+
+
+def left_out_of(marks: Iterable[tuple[str, float | None]]) -> dict[str, int]:
+    """How many trials skills ran that a race left out, from each row's skill and mark."""
+    return {skill: int(after) for skill, after in marks if after is not None and math.isfinite(after)}
 
 
 def _counted(rows: tuple[ResultRow, ...]) -> tuple[ResultRow, ...]:

@@ -206,13 +206,15 @@ def read_folder(folder: Path) -> Chapter:
 def _read_table(chapter: Chapter, folder: Path) -> bool:
     """The campaign's table. Whether it was made from the stored rows, because the campaign runs or was killed."""
     skills = chapter.spec.get("skills")
-    text = live_table(folder, skills if isinstance(skills, list) else [])
+    text = live_table(folder, skills if isinstance(skills, list) else [], chapter.spec)
     path = folder / ("results.csv" if text is None else "rows.jsonl")
     if not path.is_file():
         return False
     given = _declared(chapter.spec)
     chapter.results = read_results(path, *given) if text is None else results_of(text, path, *given)
     chapter.notes += chapter.results.notes
+    chapter.notes += [f"{skill}{chapter.results.mark(skill)}: it was decidedly worse than another, and the campaign is "
+                      "a race; its rate is of these trials alone." for skill in chapter.results.left_out]  # fmt: skip
     _remember(chapter, path, path.name)
     return text is not None
 
@@ -231,7 +233,7 @@ def _declared(spec: dict[str, Any]) -> tuple[list[str], Plan | None]:
     """Varied quantities, and what was fixed before the first trial, or None if the file does not tell."""
     vary, stop, trials, skills = (spec.get(key) for key in ("vary", "stop", "trials", "skills"))
     vary = vary if isinstance(vary, dict) else {}
-    may_stop = isinstance(stop, dict) and stop.get("interval_width") is not None
+    may_stop = "race" in spec or (isinstance(stop, dict) and stop.get("interval_width") is not None)
     try:
         given = flatten(vary, "vary")
         axes = {name: parse_axis(value, name) for name, value in given.items()}

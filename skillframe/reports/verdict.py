@@ -46,7 +46,7 @@ def required(chapter: Chapter, results: Results) -> Requirement:
 
 def complete(chapter: Chapter, results: Results) -> bool:
     """All planned trials are there, or the campaign stopped early as asked."""
-    stopped = chapter.summary.get("stopped_after_trial") is not None
+    stopped = chapter.summary.get("stopped_after_trial") is not None or "race" in chapter.summary
     return results.complete or (stopped and chapter.summary.get("complete") is True)
 
 
@@ -70,7 +70,7 @@ def banner(chapter: Chapter) -> Markup:
     counted = results.rate(skill)
     share = (
         f"{counted.successes} of {counted.trials} trials, {percent(counted.share)}" if counted.trials else "no trial"
-    )
+    ) + results.mark(skill)
     lines: list[tuple[str, object]] = [
         ("Required", asked), ("Result", f"{skill}: {share}; {_interval(results, counted)}"),
         ("Verdict", join([tag("strong", found.word), f": {found.why}"])),

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from skillframe.campaign.claims.compare import Evidence, holm_of_minima
+from skillframe.campaign.race import Race
+from skillframe.campaign.spec import RaceKeys
+from skillframe.campaign.statistics import clopper_pearson
 from tests.figures.teaching import row
 
 pytestmark = pytest.mark.figures
@@ -55,3 +58,37 @@ def test_holms_method_needs_fewer_draws_than_bonferronis(rates):
     row(", ".join(map(str, rates)), f"Holm {by_holm:g}, Bonferroni {by_bonferroni:g}")
     if len(rates) == 4:
         assert by_holm <= 0.85 * by_bonferroni
+
+
+def race_of(won):
+    labels = [str(i) for i in range(won.shape[1])]
+    race = Race(labels, len(won), RaceKeys())
+    race.add(
+        {"trial": t, "skill": s, "success": bool(won[t, i])} for t in range(len(won)) for i, s in enumerate(labels)
+    )
+    return race
+
+
+def truth(rng, policies, kind):
+    """Success rates: all equal, the two best equal, or all drawn by themselves."""
+    rates = rng.uniform(0.5, 0.98, policies)
+    if kind == "all equal":
+        return np.full(policies, rates[0])
+    return np.where(np.arange(policies) == np.argmin(rates), rates.max(), rates) if kind == "two best" else rates
+
+
+@pytest.mark.parametrize("kind", ["all equal", "two best", "all differ"])
+@pytest.mark.parametrize("policies", [2, 3, 5])
+def test_no_more_than_one_in_twenty_of_1000_races_leaves_out_one_of_the_best(policies, kind):
+    rng = np.random.default_rng(2026_11_23 + policies)
+    lost = ended = ran = 0
+    for _ in range(1000):
+        rates = truth(rng, policies, kind)
+        race = race_of(outcomes(rng, 400, rates))
+        lost += any(rates[int(label)] == rates.max() for label in race.left)
+        ended += race.after is not None
+        ran += sum(race.reach.values())
+    low, high = clopper_pearson(lost, 1000)
+    share = f"{100 * ran / (400_000 * policies):.0f} % of the runs"
+    row(f"{policies}, {kind}", f"{lost} of 1000 ({100 * low:.1f} to {100 * high:.1f} %), {ended} ended early, {share}")
+    assert lost <= 50

@@ -12,12 +12,12 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from skillframe.campaign.rows import TRUTH
+from skillframe.campaign.rows import LEFT_OUT, TRUTH
 from skillframe.demonstration.table import read_text
 from skillframe.errors import InputError
 
@@ -57,12 +57,14 @@ class Trials:
         policies: in the order in which they first come.
         doubts: sentences about what the table lacks.
         real: every row is marked as a trial of a real robot.
+        left_out: how many trials the policies ran that a race left out.
     """
 
     rows: tuple[Trial, ...]
     policies: tuple[str, ...]
     doubts: tuple[str, ...] = ()
     real: bool = False
+    left_out: Mapping[str, int] = field(default_factory=dict)
 
 
 def read_trials(path: Path, draws: Sequence[str] = (), score: str | None = None) -> Trials:
@@ -98,8 +100,22 @@ def read_trials(path: Path, draws: Sequence[str] = (), score: str | None = None)
     policies = tuple(dict.fromkeys(row.policy for row in rows))
     if len(policies) < 2:
         raise InputError(path, f"holds {len(policies)} policy", "compare needs two or more")
-    doubts = [*(["the last row was cut short and is left out"] if torn else []), *_doubts(rows, policies)]
-    return Trials(rows=rows, policies=policies, doubts=tuple(doubts), real=real)
+    left = _left_out(path, head, body, policy)
+    doubts = [*(["the last row was cut short and is left out"] if torn else []), *_doubts(rows, policies, left)]
+    return Trials(rows=rows, policies=policies, doubts=tuple(doubts), real=real, left_out=left)
+
+
+def _left_out(path: Path, head: list[str], body: list[tuple[int, list[str]]], policy: int) -> dict[str, int]:
+    """How many trials the policies ran that a race left out."""
+    if LEFT_OUT not in head:
+        return {}
+    at, found = head.index(LEFT_OUT), dict[str, int]()
+    for n, cells in body:
+        if cells[at] and not cells[at].isdecimal():
+            raise InputError(f"{path}: row {n}", f"{LEFT_OUT} is {cells[at]!r}", "give a number of trials, or nothing")
+        if cells[at]:
+            found[cells[policy]] = int(cells[at])
+    return found
 
 
 def cells_of(path: Path) -> tuple[list[str], list[tuple[int, list[str]]], bool]:
@@ -222,12 +238,13 @@ def _check_draws(
                 )  # fmt: skip
 
 
-def _doubts(rows: Sequence[Trial], policies: Sequence[str]) -> list[str]:
+def _doubts(rows: Sequence[Trial], policies: Sequence[str], left: Mapping[str, int]) -> list[str]:
     every = dict.fromkeys(row.trial for row in rows)
     ran = {policy: {row.trial for row in rows if row.policy == policy} for policy in policies}
     said = []
     for policy in policies:
-        missing = [trial for trial in every if trial not in ran[policy]]
+        most = left.get(policy, math.inf)
+        missing = [trial for trial in every if trial not in ran[policy] and not _beyond(trial, most)]
         if missing:
             said.append(f"{policy} did not run {_named(missing)}")
     numbers = sorted(int(trial) for trial in every if trial.isdecimal())
@@ -237,6 +254,11 @@ def _doubts(rows: Sequence[Trial], policies: Sequence[str]) -> list[str]:
     if said:
         said.append("if a trial was left out because of how it ended, no figure here holds")
     return said
+
+
+def _beyond(trial: str, most: float) -> bool:
+    """Whether a race ran a trial without a policy that it had left out after so many."""
+    return trial.isdecimal() and int(trial) >= most
 
 
 def _named(trials: Sequence[str]) -> str:
