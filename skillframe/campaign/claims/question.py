@@ -89,8 +89,9 @@ def begin(
     label = pick_label(spec.labels, skill)
     question = Question(rate=rate, confidence=confidence, ranges=ranges)
     one = replace(
-        spec, skills=(spec.skills[spec.labels.index(label)],), trials=look or LOOKS[len(ranges)], stop=Stop(), race=None,
-        expect=Expect(), vary={**spec.vary, **{n: Axis(kind="sobol", numbers=ends) for n, ends in ranges.items()}},
+        spec, skills=(spec.skills[spec.labels.index(label)],), trials=look or LOOKS[len(ranges)], stop=Stop(),
+        race=None, expect=Expect(),
+        vary={**spec.vary, **{n: Axis(kind="sobol", numbers=ends) for n, ends in ranges.items()}},
     )  # fmt: skip
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise InputError(out, "exists and is not an empty folder", "choose another --out")
