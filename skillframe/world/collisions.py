@@ -40,9 +40,8 @@ from skillframe.world.parts import (
     scene_parts,
 )
 from skillframe.world.plant import Plant
-from skillframe.world.probe import FAR, Overlap, Probe
+from skillframe.world.probe import FAR, Overlap, Posture, Probe
 
-_Posture = tuple[Float, Float, Float]
 _MOVERS = (LINK, HAND, HELD, BASE_LINK, STANDING, OBSTACLE)
 
 
@@ -148,9 +147,9 @@ class Collisions:
         """Bring `distance` of some trials up to date with where their bodies are now."""
         if not self.enabled:
             return
-        known = np.fmin(self.distance, FAR).tolist()
-        for row, posture in self._postures(plant, rows):
-            self.distance[row] = self._probe.distance(*posture, known[row])
+        looked = [*self._postures(plant, rows)]
+        told, postures = [row for row, _ in looked], [posture for _, posture in looked]
+        self.distance[told] = self._probe.distances(postures, np.fmin(self.distance[told], FAR))
         self._at[rows], self._turn[rows] = self._coordinates(plant, rows, self._moved)
 
     def _clear(self, plant: Plant, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -175,7 +174,7 @@ class Collisions:
             position, quaternion = position[rows], quaternion[rows]
         return position.take(bodies, axis=1), quaternion.take(bodies, axis=1)
 
-    def _postures(self, plant: Plant, rows: NDArray[np.int64]) -> Iterator[tuple[int, _Posture]]:
+    def _postures(self, plant: Plant, rows: NDArray[np.int64]) -> Iterator[tuple[int, Posture]]:
         """Of some trials the row, and where its parts are, as the probe takes them."""
         if not len(rows):
             return

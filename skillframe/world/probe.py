@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 
 from skillframe.errors import InputError
-from skillframe.frames import Float
+from skillframe.frames import Float, norm
 from skillframe.world.convert import add_geom
 from skillframe.world.parts import BITS, OBSTACLE, STANDING, Pair, Solid, compared
 
@@ -26,6 +26,10 @@ FAR = 1.0
 """[m] beyond which a distance is not worked out (ours)."""
 _POINT = "point"
 _ARENA = 4 * 1024 * 1024  # bytes; room for some thousand contacts
+
+
+Posture = tuple[Float, Float, Float]
+"""Where parts are: (7 F,) position and quaternion of those that move, (P, 3) and (P, 4) of those placed by trial."""
 
 
 class Overlap(NamedTuple):
@@ -139,25 +143,36 @@ class Probe:
             data.mocap_pos[:], data.mocap_quat[:] = position, quaternion
         mujoco.mj_kinematics(self._model, data)
 
-    def distance(self, free: Float, position: Float, quaternion: Float, known: float = FAR) -> float:
-        """The smallest distance of two convex shapes that may not touch [m], or `known` if none is nearer.
+    def distances(self, postures: Sequence[Posture], known: Float) -> Float:
+        """The smallest distance (N,) of two convex shapes that may not touch [m], or `known` where none is nearer.
 
         Negative is the depth of one in the other. Pairs are asked in the order of the distance that the spheres around
         them leave at least, until that is no less than what was found. Meshes that are not convex are left out, since
-        their hulls are nearer than they are. Without any pair it is NaN. The other arguments are those of `overlaps`.
+        their hulls are nearer than they are. Without any pair it is NaN.
+
+        Args:
+            postures: N of them, each as `overlaps` takes it.
+            known: (N,) [m].
         """
         if not len(self._pairs):
-            return float("nan")
-        self._pose(free, position, quaternion)
-        at = self._data.geom_xpos[self._pairs]
-        least = np.sqrt(np.square(at[:, 0] - at[:, 1]).sum(axis=-1)) - self._reach
-        found = known
-        for index in np.argsort(least).tolist():
-            if least[index] >= found:
-                break
-            one, two = self._pairs[index].tolist()
-            found = min(found, float(mujoco.mj_geomDistance(self._model, self._data, one, two, max(found, 0.0), None)))
-        return found
+            return np.full(len(known), np.nan)
+        data = self._data
+        at, turn = (np.empty((len(known), *frames.shape)) for frames in (data.geom_xpos, data.geom_xmat))
+        for k, posture in enumerate(postures):
+            self._pose(*posture)
+            at[k], turn[k] = data.geom_xpos, data.geom_xmat
+        least = norm(at.take(self._pairs[:, 0], axis=1) - at.take(self._pairs[:, 1], axis=1)) - self._reach
+        rows, pairs = np.nonzero(least < known[:, None])
+        bounds = least[rows, pairs]
+        found, shown = known.tolist(), -1
+        for i in np.lexsort((bounds, rows)).tolist():
+            k = int(rows[i])
+            if bounds[i] < found[k]:
+                if k != shown:
+                    data.geom_xpos[:], data.geom_xmat[:], shown = at[k], turn[k], k
+                one, two = self._pairs[pairs[i]].tolist()
+                found[k] = min(found[k], mujoco.mj_geomDistance(self._model, data, one, two, max(found[k], 0.0), None))
+        return np.array(found)
 
     def _depths(self) -> list[Overlap]:
         deepest: dict[Pair, float] = {}
