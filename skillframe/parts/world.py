@@ -21,11 +21,13 @@ from skillframe.parts.fit import corners, lowest
 from skillframe.parts.load import LoadedParts, PreparedPart, load
 from skillframe.parts.second import in_place, second_parts
 from skillframe.parts.solid import arrays_of
-from skillframe.world.scene import Geom, Scene, State, Task, Tool, Vector
+from skillframe.world.scene import REACTION_S, Geom, Scene, State, Task, Tool, Vector
 from skillframe.world.shapes import FIXTURE_COLOUR, TOOL_COLOUR, shaft
 from skillframe.world.worlds.common import TOOL_DOWN, insertion, tilt_of
 
 GRIPPER = 0.5
+WAITS_S = 0.3
+"""Longer than the free air that begins a recording (`conditioning.contact.LEVEL_TIME`) [s]."""
 _TABLE = (0.06, 0.005)  # least half width and half thickness [m]
 _FLIP = np.array([1.0, -1.0, -1.0])  # fixture axes to tool axes of a tool that points down
 
@@ -109,6 +111,7 @@ def build_world(path: Path, params: PartsParams) -> Scene:
         task=Task(
             direction=(0.0, 0.0, -1.0), aligned=TOOL_DOWN, hand="aligning",
             starts=tuple(_start(height, tilt, params, points) for height, tilt in loaded.starts),
+            waits_s=WAITS_S, held_s=REACTION_S,
         ),
         params=stated(loaded),
     )  # fmt: skip

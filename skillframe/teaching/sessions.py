@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skillframe.demonstration.convention import STANDARD
 from skillframe.demonstration.places import KEY, as_plain
@@ -22,6 +23,7 @@ from skillframe.execution.prepare import drive_maker
 from skillframe.execution.trace import Trace
 from skillframe.extend.reading import is_data_set, write_data_set, write_demonstration
 from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, rotate
+from skillframe.handover import SLOW_TICKS
 from skillframe.robot.guesses import guess_note
 from skillframe.robot.model import RobotModel
 from skillframe.teaching.blind import BlindSettings
@@ -29,12 +31,13 @@ from skillframe.teaching.staged import teacher_for
 from skillframe.teaching.teacher import TeacherSettings
 from skillframe.teaching.teleoperation import OperatorSettings
 from skillframe.world.placement import fixture_poses, places_in_base
-from skillframe.world.scene import Scene
+from skillframe.world.scene import Scene, State
 from skillframe.world.sensors import SensorSettings
 
 MOST_ATTEMPTS = 20
 MOST_AT_ONCE = 100
 """Demonstrations that are simulated side by side, so that memory does not grow with the traces of a thousand."""
+Done = Callable[[State], NDArray[np.bool_]]
 Watch = Callable[[float, float], None]
 """Told how many seconds are simulated, and of how many at most."""
 ESTIMATED = SensorSettings(force_noise=1.0, torque_noise=0.07)
@@ -206,12 +209,26 @@ def _attempt(
     last = (scene.task, *scene.task.then)[-1]
     setup = Setup(
         robot=robot.guided(), scene=scene, center_of_compliance=np.array(scene.tool.frames[scene.tool.hand]),
-        sensors=sensors or SensorSettings(), filter_wrench=False, stop_when=last.done or scene.goal,
+        sensors=sensors or SensorSettings(), filter_wrench=False,
+        stop_when=_held(last.done or scene.goal, last.held_s * robot.spec.control.tick_hz),
         make_drive=drive_maker(robot),
     )  # fmt: skip
     rngs = [np.random.default_rng([seed, slot, attempt]) for slot in slots]
     told = progress_callback(watch, duration_s)
     return simulate(teacher, setup, columns, rngs, duration_s=duration_s, trace_hz=rate_hz, progress=told)
+
+
+def _held(done: Done, ticks: float) -> Done:
+    """`done`, once it has been so for as many ticks. It is asked every `SLOW_TICKS`."""
+    times = np.zeros(())
+
+    def held(state: State) -> NDArray[np.bool_]:
+        nonlocal times
+        times = np.where(done(state), times + 1.0, 0.0)
+        found: NDArray[np.bool_] = times > ticks / SLOW_TICKS
+        return found
+
+    return held
 
 
 def progress_callback(watch: Watch | None, duration_s: float) -> Callable[[float], None] | None:

@@ -13,9 +13,7 @@ import numpy as np
 from skillframe.frames import Float, Pose, move_wrench, rotate, rotate_spatial
 from skillframe.skill import Command, Observation, Skill, row, stack_commands
 from skillframe.teaching.teacher import HANDS, Hand, Teacher, TeacherSettings, firm
-from skillframe.world.scene import Scene, State, Task
-
-REACTION_S = 0.2
+from skillframe.world.scene import REACTION_S, Scene, State, Task
 
 
 def teacher_for(scene: Scene, fixture: Pose, settings: TeacherSettings, firmly: bool = False) -> Skill:

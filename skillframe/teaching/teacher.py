@@ -161,8 +161,11 @@ class Teacher(Skill):
         """Move the hand one tick on and hold the tool with it."""
         noise = self._draw()
         seen_position, seen_rotation = self._delay.push(observation.pose.position, observation.pose.rotation)
-        velocity = self._push(noise[:, :3], seen_position, observation.dt)
-        turning = self._turn_hand(seen_rotation, observation.dt)
+        if observation.time[0] < self._task.waits_s:
+            velocity = turning = self._follow(seen_position, observation.dt)
+        else:
+            velocity = self._push(noise[:, :3], seen_position, observation.dt)
+            turning = self._turn_hand(seen_rotation, observation.dt)
         tremor = self._shake(noise[:, 3:], observation.dt)
         position, rotation, twist = self._arrival.push(
             self._position.copy(), self._rotation, np.concatenate([velocity, turning], axis=-1)
@@ -181,13 +184,18 @@ class Teacher(Skill):
         sample: Float = self._noise[:, self._next - 1]
         return sample
 
+    def _follow(self, seen: Float, dt: float) -> Float:
+        """Let the hand be led, without a push of its own. Returns the velocity (N, 3) that it wants, which is none."""
+        error = self._position - seen
+        self._position = self._position - error * (dt / self._hand.relaxation)
+        return np.zeros_like(error)
+
     def _push(self, noise: Float, seen: Float, dt: float) -> Float:
         """Advance the hand's position. Returns its velocity (N, 3)."""
         settings, hand = self._settings, self._hand
-        error = self._position - seen
         if self._direction is None and self._goal is None:
-            self._position = self._position - error * (dt / hand.relaxation)
-            return np.zeros_like(error)
+            return self._follow(seen, dt)
+        error = self._position - seen
         direction = self._aimed(noise, seen, dt)
         along = (error * direction).sum(-1, keepdims=True)
         sideways = error - along * direction

@@ -23,6 +23,8 @@ from skillframe.world.surfaces import Surface
 Vector = tuple[float, float, float]
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
 KINDS = ("box", "capsule", "cylinder", "mesh", "plane", "sphere")
+REACTION_S = 0.2
+"""How long a person takes to see that something is done [s]; ours."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -179,6 +181,8 @@ class Task:
         done: predicate of a finished demonstration, or of a finished stage; the goal if None.
         then: stages that follow, in order, once `done` has held for a person's reaction time; the last one's `done`
             ends the demonstration, their starts are not looked at.
+        waits_s: how long the person holds still before moving, so that a recording begins in free air [s].
+        held_s: how long the person goes on once it is done, so that the last moment is not lost [s].
         believed: what a blindfolded person knows instead of all this: standard deviations of where the goal is,
             relative to the start, along and across the surface [m] and about its normal [rad].
     """
@@ -191,6 +195,8 @@ class Task:
     starts: tuple[dict[str, float], ...] = ({},)
     done: Callable[[State], NDArray[np.bool_]] | None = None
     then: tuple[Task, ...] = ()
+    waits_s: float = 0.0
+    held_s: float = 0.0
     believed: Vector = (0.004, 0.004, 0.0)
 
 

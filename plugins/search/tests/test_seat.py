@@ -107,6 +107,16 @@ def test_demonstrations_that_seat_nothing_are_refused():
         learned(registry().skill("seat"), [short], LearnOptions())
 
 
+def test_parts_that_touch_only_at_the_bottom_and_rest_there_are_seated_along_the_way_that_they_came():
+    """Of a wide and shallow hole contact shows a way of 1.6 mm, and the tip came straight from 10 mm above it."""
+    whole = seated(0.14)
+    stood = np.minimum(np.arange(len(whole.time)), np.searchsorted(whole.time, 1.7))
+    stays = replace(whole, position=whole.position[stood], quaternion=whole.quaternion[stood])
+    found = read_seat(learned(registry().skill("seat"), [stays], LearnOptions()))
+    np.testing.assert_allclose(found.way, DOWN, atol=0.1)
+    assert found.contact_m > 0.005
+
+
 class Script(Skill):
     """Commands a feed-forward of its own, and ends where it is told to."""
 

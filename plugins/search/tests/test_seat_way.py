@@ -28,3 +28,10 @@ def test_where_contact_begins_early_or_the_tip_came_from_aside_the_way_begins_at
     np.testing.assert_array_equal(_way_begins(aside, 100), aside[100])
     shallow = tip_path((0.0, 0.0, 0.02), (0.0, 0.0, 0.004), (0.0, 0.0, 0.0))  # a free way down, then a shallow hole
     np.testing.assert_array_equal(_way_begins(shallow, 100), shallow[100])
+    np.testing.assert_array_equal(_way_begins(shallow, 100, 0.002), shallow[100])
+
+
+def test_where_it_rests_as_soon_as_it_touches_the_way_is_the_one_that_it_came():
+    bottom = tip_path((0.0, 0.0, 0.006), (0.0, 0.0, 0.001), (0.0, 0.0, 0.0))
+    np.testing.assert_array_equal(_way_begins(bottom, 100, 0.002), bottom[0])
+    np.testing.assert_array_equal(_way_begins(bottom, 100), bottom[100])

@@ -4,7 +4,7 @@ import pytest
 from skillframe.errors import SkillframeError, UnknownName
 from skillframe.frames import Pose, cross, matrix_from_quaternion, norm, rotation_matrix, rotation_vector
 from skillframe.skill import Observation
-from skillframe.teaching.sessions import record
+from skillframe.teaching.sessions import _held, record
 from skillframe.teaching.teacher import AIM_TIME, HANDS, TREMOR_TIME, Teacher, TeacherSettings, firm
 from skillframe.world.scene import Task
 from tests.laws.runs import SILENT, generators, robot, scene
@@ -44,6 +44,26 @@ def test_the_hand_pushes_along_the_task_s_direction_in_the_true_fixture_s_axes()
     command = held(Task(direction=(0.0, 0.0, -1.0), hand="sliding"), STEADY, 1, turn=(0.3, 0.0, 0.0))[0]
     speed = HANDS["sliding"].speed
     np.testing.assert_allclose(command.twist[0, :3], speed * rotation_matrix(np.array([0.3, 0, 0])) @ [0, 0, -1.0])
+
+
+def test_a_person_who_waits_holds_still_first_and_then_does_as_one_who_does_not():
+    task = {"direction": (0.0, 0.0, -1.0), "turn": (0.3, 0.0, 0.0), "hand": "lever"}
+    late, soon = (held(Task(**task, waits_s=wait), STEADY, 200 + round(wait / DT)) for wait in (0.3, 0.0))
+    for command in late[:300]:
+        np.testing.assert_array_equal(command.twist, 0.0)
+        np.testing.assert_array_equal(command.pose.position, late[0].pose.position)
+    for after, before in zip(late[300:], soon, strict=True):
+        np.testing.assert_allclose(after.twist, before.twist, atol=1e-12)
+
+
+def test_who_holds_on_stops_once_it_has_been_done_without_a_break_for_so_long():
+    is_done = iter([True, False] + [True] * 30)
+    told = _held(lambda state: np.array([next(is_done), False]), 200.0)
+    found = [told(None) for _ in range(32)]
+    assert [bool(each[0]) for each in found].index(True) == 22  # 0.2 s after sample 2, asked every 10 ms
+    assert not any(each[1] for each in found)
+    now = _held(lambda state: np.array([True]), 0.0)
+    assert now(None)[0]
 
 
 def test_what_is_led_sideways_relaxes_with_the_hand_s_time_constant():

@@ -4,7 +4,8 @@ The push is learned from what each demonstration shows from shortly before its f
 come the push (at --at), and at the tool's tip the way (from the first contact to the end), the end with its attitude,
 and the height of the first contact. Loose parts touch only near the end, and how they slide there is not the way: where
 the tip came straight from more than twice as far, and more than 30 degrees otherwise than it went in contact, the way
-is that straight and begins with it (our choice). From the user comes how far off the fixture may be. The rest is by
+is that straight and begins with it. So it is where they touch within `LEAST_M` of the end and rest there, as at the
+bottom of a shallow hole that is wide (our choices). From the user comes how far off the fixture may be. The rest is by
 hand. The search is as wide as the mouth can be off its place, both ways at once (our choice):
 
     radius = sqrt(2) (shift + tilt * height of the first contact)
@@ -35,6 +36,7 @@ from skillframe_search.seat_document import Seat, as_phase
 
 BEFORE_S = 0.3  # of each demonstration before its contact that the push is learned with
 LEAST_M = 0.002  # from the first contact to the end
+RESTED_S, RESTED_M = 0.1, 0.0005  # where that is shorter: it stood at the end, in contact, for so long within so much
 STRAIGHT = 0.15  # of its length that a straight way is off its line, at most
 SLID = np.cos(radians(30.0))  # between that way and the one in contact; more is no insertion
 _LOOKED_AT = 200  # samples before the contact
@@ -154,13 +156,20 @@ def _shown(demonstration: Demonstration, point: Float) -> _Shown:
     pose = demonstration.pose
     position = Pose(pose.position, pose.rotation).at(point).position
     first = int(np.searchsorted(demonstration.time, began))
-    return _Shown(position[0], _way_begins(position, first), position[-1], pose.rotation[-1],
+    last = position[demonstration.time >= max(began, contacts[-1][1] - RESTED_S)]
+    rested = contacts[-1][1] - began >= RESTED_S and float(norm(last[0] - last[-1])) < RESTED_M
+    brief = LEAST_M if rested else 0.0
+    return _Shown(position[0], _way_begins(position, first, brief), position[-1], pose.rotation[-1],
                   demonstration.between(began - BEFORE_S, None))  # fmt: skip
 
 
-def _way_begins(position: Float, first: int) -> Float:
-    """Where (3,) the way of a tip (T, 3) to its last place begins: at sample `first`, or before if it slid there."""
+def _way_begins(position: Float, first: int, brief: float = 0.0) -> Float:
+    """Where (3,) the way of a tip (T, 3) to its last place begins.
+
+    That is at sample `first`, or before if it slid from there, or came no further than `brief` [m].
+    """
     touched = position[-1] - position[first]
+    short = float(norm(touched)) < brief
     for i in np.unique(np.linspace(0, first, _LOOKED_AT).astype(int)).tolist():
         left = position[-1] - position[i:]
         length = float(norm(left[0]))
@@ -168,7 +177,7 @@ def _way_begins(position: Float, first: int) -> Float:
             break
         along = left @ (left[0] / length)
         straight = float(norm(left - along[:, None] * left[0] / length).max()) <= STRAIGHT * length
-        if straight and touched @ left[0] < SLID * float(norm(touched)) * length:
+        if straight and (short or touched @ left[0] < SLID * float(norm(touched)) * length):
             return np.asarray(position[i])
     return np.asarray(position[first])
 
