@@ -12,9 +12,9 @@ import numpy as np
 
 from skillframe.errors import InputError
 from skillframe.frames import Float
-from skillframe.parts.declared import MeshPlace
 from skillframe.parts.fit import PartsFit, placed
 from skillframe.parts.pieces import MOST_PIECES, ConvexPieces
+from skillframe.parts.second_declared import MeshPlace
 from skillframe.parts.solid import MeshPart
 
 SHARE = 0.25

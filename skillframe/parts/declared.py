@@ -7,34 +7,20 @@ PLY and OFF carry no unit, and none is guessed.
 from __future__ import annotations
 
 import os
-import re
 import stat
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
 from skillframe.config import build, read_toml
 from skillframe.errors import InputError
+from skillframe.parts.scenes import is_scene, read_scene, with_bodies
+from skillframe.parts.second_declared import MeshPlace, SecondPart, Triple, Units, check_second
 
-Units = Literal["m", "cm", "mm", "um", "in"]
 SCALES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 """Metres per unit of a mesh file."""
 DENSITY = 2700.0
 """Of the held part where the file gives neither mass nor density [kg/m3]: aluminium."""
-_Vector = tuple[float, float, float]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MeshPlace:
-    """Where a mesh lies in the frame in which the two parts are assembled.
-
-    Attributes:
-        xyz: of the mesh's origin [m, -100m to 100m].
-        rpy: roll, pitch and yaw about fixed x, y, z [rad, -360deg to 360deg].
-    """
-
-    xyz: _Vector = (0.0, 0.0, 0.0)
-    rpy: _Vector = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +59,7 @@ class HeldPart:
     assembled: MeshPlace = field(default_factory=MeshPlace)
     density: float | None = None
     mass: float | None = None
-    tip: Literal["auto"] | _Vector = "auto"
+    tip: Literal["auto"] | Triple = "auto"
     grip: float = 0.2
 
 
@@ -138,84 +124,10 @@ class TaskKeys:
         demonstration: how it is shown.
     """
 
-    axis: Literal["auto"] | _Vector = (0.0, 0.0, -1.0)
+    axis: Literal["auto"] | Triple = (0.0, 0.0, -1.0)
     start: StartKeys = field(default_factory=StartKeys)
     seated: SeatedKeys = field(default_factory=SeatedKeys)
     demonstration: ShownKeys = field(default_factory=ShownKeys)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BoxShape:
-    """A box of a second part.
-
-    Attributes:
-        size: its three edges [m, 1um to 2m].
-        xyz: of its middle [m, -100m to 100m].
-        rpy: roll, pitch and yaw about fixed x, y, z [rad, -360deg to 360deg].
-    """
-
-    size: _Vector
-    xyz: _Vector = (0.0, 0.0, 0.0)
-    rpy: _Vector = (0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CylinderShape:
-    """A cylinder of a second part, along its z.
-
-    Attributes:
-        radius: [m, 1um to 1m].
-        length: [m, 1um to 2m].
-        xyz: of its middle [m, -100m to 100m].
-        rpy: roll, pitch and yaw about fixed x, y, z [rad, -360deg to 360deg].
-    """
-
-    radius: float
-    length: float
-    xyz: _Vector = (0.0, 0.0, 0.0)
-    rpy: _Vector = (0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SecondPart:
-    """`[[second]]`, a further part of the fixture, drawn as it stands at the start, in the frame of `pose`.
-
-    Attributes:
-        name: one of its own.
-        joint: "fixed", "hinge" (turns about an axis), "slide" (moves along it) or "free" (lies there).
-        mesh: its file, or boxes and cylinders.
-        units: of the file; GLB has metres.
-        pose: of the mesh.
-        boxes, cylinders: of which it consists, in the frame of `pose`.
-        density: in kg/m3 [1 to 30000].
-        mass: in place of its density [kg, 0.01g to 100kg].
-        anchor: a point of the hinge's axis [m, -100m to 100m].
-        axis: of the hinge or slide, of any length but 0.
-        range: least and largest travel from the start, in rad of a hinge and m of a slide.
-        stiffness: of a spring, in Nm/rad of a hinge and N/m of a slide [0 to 1e6].
-        rest: where the spring is slack, in rad or m.
-        damping: in Nms/rad or Ns/m [0 to 1e5].
-        friction: of the joint, in Nm or N [0 to 1e4].
-        goal: least and largest travel at the end, in rad or m (of a free part how far its centre went).
-    """
-
-    name: str
-    joint: Literal["fixed", "hinge", "slide", "free"]
-    mesh: str = ""
-    units: Units | None = None
-    pose: MeshPlace = field(default_factory=MeshPlace)
-    boxes: tuple[BoxShape, ...] = ()
-    cylinders: tuple[CylinderShape, ...] = ()
-    density: float | None = None
-    mass: float | None = None
-    anchor: _Vector = (0.0, 0.0, 0.0)
-    axis: _Vector = (0.0, 0.0, 1.0)
-    range: tuple[float, float] | None = None
-    stiffness: float = 0.0
-    rest: float = 0.0
-    damping: float = 0.0
-    friction: float = 0.0
-    goal: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -250,9 +162,27 @@ def read_fixture(path: Path) -> FixtureFile:
     if not isinstance(file.task.axis, str) and not any(file.task.axis):
         raise InputError(f"{path}: task.axis", "is zero", 'give for example [0, 0, -1], or "auto"')
     for index, second in enumerate(file.second):
-        _check_second(file, index, path)
+        check_second(file.second, index, path)
         if second.mesh:
             _check_mesh(second, path, f"second[{index}]")
+            if is_scene(second.mesh):
+                fix = "name it as [fixture] mesh, and its bodies come with it"
+                raise InputError(f"{path}: second[{index}].mesh", f"{second.mesh} is a scene", fix)
+    return _with_scene(file, path)
+
+
+def _with_scene(file: FixtureFile, path: Path) -> FixtureFile:
+    """The file with the bodies of its scene that move, if it has one."""
+    scene = file.fixture.mesh if is_scene(file.fixture.mesh) else ""
+    if not scene:
+        for index, part in enumerate(file.second):
+            if part.joint == "scene":
+                what = f"means a body of the scene, and {file.fixture.mesh} is a mesh"
+                raise InputError(f"{path}: second[{index}].joint", what, 'take "hinge", "slide", "free" or "fixed"')
+        return file
+    file = replace(file, second=with_bodies(file.second, path, scene, file.fixture.pose))
+    for index in range(len(file.second)):
+        check_second(file.second, index, path)
     return file
 
 
@@ -282,48 +212,24 @@ def check_file(path: Path, where: object, fix: str, *, name: str = "") -> None:
         raise InputError(where, what + named, "name a file")
 
 
-def _check_second(file: FixtureFile, index: int, path: Path) -> None:
-    """Refuse a second part whose keys say too much or too little."""
-    part, where = file.second[index], f"{path}: second[{index}]"
-    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", part.name):
-        raise InputError(f"{where}.name", f"is {part.name!r}", "take letters, digits and _, a letter first")
-    if part.name in [each.name for each in file.second[:index]]:
-        raise InputError(f"{where}.name", f"{part.name!r} is there already", "give each part a name of its own")
-    if bool(part.mesh) == bool(part.boxes or part.cylinders):
-        said = "has a mesh and shapes" if part.mesh else "has no shape"
-        raise InputError(where, said, "give a mesh, or boxes and cylinders")
-    if part.mass is not None and part.density is not None:
-        raise InputError(where, "has mass and density", "keep one of the two")
-    if not any(part.axis):
-        raise InputError(f"{where}.axis", "is zero", "give for example [0, 0, 1]")
-    _check_joint(part, where)
-
-
-def _check_joint(part: SecondPart, where: str) -> None:
-    jointed = ("anchor", "axis", "range", "stiffness", "rest", "damping", "friction")
-    unused = {"fixed": (*jointed, "goal"), "free": jointed, "slide": ("anchor",), "hinge": ()}[part.joint]
-    usual = SecondPart(name="x", joint="hinge")
-    for key in unused:
-        if getattr(part, key) != getattr(usual, key):
-            raise InputError(f"{where}.{key}", f"means nothing for a part that is {part.joint}", "leave it out")
-    for key, pair in (("range", part.range), ("goal", part.goal)):
-        if pair is not None and not pair[0] < pair[1]:
-            raise InputError(f"{where}.{key}", f"is {list(pair)}", "give the least travel, then the largest")
-    if part.range is not None and not part.range[0] <= 0.0 <= part.range[1]:
-        raise InputError(
-            f"{where}.range", f"{list(part.range)} leaves out 0, where it starts", "measure it from the start"
-        )
-
-
 def _check_mesh(part: FixturePart | HeldPart | SecondPart, path: Path, key: str) -> None:
     file = path.parent / part.mesh
     check_file(file, f"{path}: {key}.mesh", "it is relative to the fixture file", name=repr(part.mesh))
     if not file.resolve().is_relative_to(path.parent.resolve()):
         what = f"{part.mesh} lies outside the fixture file's folder"
         raise InputError(f"{path}: {key}.mesh", what, "put meshes and fixture file into one folder")
-    if part.units is None and file.suffix.lower() != ".glb":
+    if is_scene(part.mesh):
+        if part.units not in (None, "m"):
+            raise InputError(f"{path}: {key}.units", f"is {part.units!r}, and a scene is in metres", "leave it out")
+        return
+    if part.units is None and not has_metres(part.mesh):
         what = f"is missing: {part.mesh} does not say what its numbers are"
         raise InputError(f"{path}: {key}.units", what, 'write for example units = "mm"')
+
+
+def has_metres(mesh: str) -> bool:
+    """Whether a part's file says itself that it is in metres, by its ending."""
+    return mesh.lower().endswith(".glb") or is_scene(mesh)
 
 
 def mesh_files(path: Path) -> dict[str, Path]:
@@ -333,5 +239,17 @@ def mesh_files(path: Path) -> dict[str, Path]:
         InputError: as `read_fixture`.
     """
     file = read_fixture(path)
-    names = (file.fixture.mesh, file.tool.mesh, *(part.mesh for part in file.second))
+    names = [file.fixture.mesh, file.tool.mesh, *(part.mesh for part in file.second)]
+    for scene in {name for name in names[:2] if is_scene(name)}:
+        names += [_inside(mesh, path, scene) for mesh in read_scene(path.parent / scene).meshes]
     return {name: path.parent / name for name in names if name}
+
+
+def _inside(mesh: Path, path: Path, scene: str) -> str:
+    """A scene's mesh relative to the fixture file."""
+    if not mesh.is_file():
+        raise InputError(path.parent / scene, f"names {mesh.name}, which is not there", "it is relative to the scene")
+    if not mesh.resolve().is_relative_to(path.parent.resolve()):
+        what = f"names {mesh}, which lies outside the fixture file's folder"
+        raise InputError(path.parent / scene, what, "put scene, meshes and fixture file into one folder")
+    return mesh.resolve().relative_to(path.parent.resolve()).as_posix()

@@ -13,7 +13,9 @@ import numpy as np
 
 from skillframe.errors import InputError
 from skillframe.frames import Float, rotation_matrix
-from skillframe.parts.declared import FixtureFile, MeshPlace
+from skillframe.parts.declared import FixtureFile
+from skillframe.parts.scenes import turned
+from skillframe.parts.second_declared import MeshPlace
 from skillframe.parts.solid import MeshPart, arrays_of
 
 TOUCH = 1e-5
@@ -88,18 +90,12 @@ def _gap(one: Any, two: Any) -> float:
 
 def moved(solid: Any, place: MeshPlace) -> Any:
     """A solid placed as a fixture file says."""
-    return _turned(solid, _turn_of(place)).translate(list(place.xyz))
-
-
-def _turn_of(place: MeshPlace) -> Float:
-    roll, pitch, yaw = (rotation_matrix(angle * np.eye(3)[k]) for k, angle in enumerate(place.rpy))
-    found: Float = yaw @ pitch @ roll
-    return found
+    return _turned(solid, turned(place.rpy)).translate(list(place.xyz))
 
 
 def placed(points: Float, place: MeshPlace, fit: PartsFit) -> Float:
     """Points (P, 3) of a mesh [m], placed as a fixture file says, in the fixture frame."""
-    found: Float = (points @ _turn_of(place).T + np.array(place.xyz)) @ fit.turn.T + fit.origin
+    found: Float = (points @ turned(place.rpy).T + np.array(place.xyz)) @ fit.turn.T + fit.origin
     return found
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from skillframe.errors import InputError
 from skillframe.parts.checks import SHARE
-from skillframe.parts.declared import check_file
+from skillframe.parts.declared import check_file, has_metres
 from skillframe.parts.load import LoadedParts, PreparedPart
 
 FILE = """\
@@ -37,8 +37,8 @@ def new_text(name: str, plug: str, socket: str, units: str | None, friction: flo
 
 
 def needs_units(*meshes: str) -> bool:
-    """Does any of these files not say what its numbers are? GLB has metres."""
-    return any(not mesh.lower().endswith(".glb") for mesh in meshes)
+    """Does any of these files not say what its numbers are? GLB and scenes have metres."""
+    return not all(has_metres(mesh) for mesh in meshes)
 
 
 def relative(mesh: Path, file: Path) -> str:

@@ -125,7 +125,8 @@ def _digest(path: Path) -> str:
 
 def _load(path: Path, hashes: Mapping[str, str]) -> LoadedParts:
     file = read_fixture(path)
-    plug, socket = (read_part(path.parent / each.mesh, each.units) for each in (file.tool, file.fixture))
+    plug = read_part(path.parent / file.tool.mesh, file.tool.units, held=True)
+    socket = read_part(path.parent / file.fixture.mesh, file.fixture.units)
     check_two(plug, socket)
     found = fit(plug, socket, file)
     check_clearance(found)

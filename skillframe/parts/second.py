@@ -15,18 +15,18 @@ from numpy.typing import NDArray
 from skillframe.errors import InputError
 from skillframe.frames import Float
 from skillframe.parts.checks import SHARE, check_error
-from skillframe.parts.declared import DENSITY, MeshPlace, SecondPart
+from skillframe.parts.declared import DENSITY
 from skillframe.parts.field import error_of, surface_of
 from skillframe.parts.fit import TOUCH, moved, thickness
 from skillframe.parts.load import LoadedParts
 from skillframe.parts.pieces import MOST_PIECES, pieces_of
-from skillframe.parts.solid import MeshPart, arrays_of, read_part, united
+from skillframe.parts.scenes import is_scene, read_scene
+from skillframe.parts.second_declared import MeshPlace, SecondPart
+from skillframe.parts.solid import SIDES, MeshPart, arrays_of, of_shapes, read_part, united
 from skillframe.world.convert import FASTEST_SWING, TIMESTEP
 from skillframe.world.scene import MOVES, Geom, Mover, State, Vector
 
 COLOUR = (0.45, 0.6, 0.5, 1.0)
-SIDES = 64
-"""Of a cylinder; its polygon lies 0.12 % of the radius inside the circle at most."""
 _SMALL = 1e-9  # kg m^2; a part of less inertia cannot be simulated
 
 
@@ -83,7 +83,7 @@ def _made(part: SecondPart, path: Path, loaded: LoadedParts) -> _Made:
 
     drawn = moved(_solid(part, path), part.pose)
     solid = drawn.transform(np.column_stack([loaded.fit.turn, loaded.fit.origin]))
-    name = part.mesh or f"second part {part.name!r}"
+    name = f"second part {part.name!r}" if is_scene(part.mesh) else part.mesh or f"second part {part.name!r}"
     whole = MeshPart(name, solid, (), "")
     geoms = _pieces(whole, loaded) if loaded.plug.pieces is not None else _surface(whole, loaded)
     mesh = trimesh.Trimesh(*arrays_of(solid), process=False)
@@ -96,6 +96,9 @@ def _made(part: SecondPart, path: Path, loaded: LoadedParts) -> _Made:
 def _solid(part: SecondPart, path: Path) -> Any:
     import manifold3d
 
+    if is_scene(part.mesh):
+        scene = read_scene(path.parent / part.mesh)
+        return of_shapes(next(each.shapes for each in scene.moving if each.name == part.name), path.parent / part.mesh)
     if part.mesh:
         return read_part(path.parent / part.mesh, part.units).solid
     shapes = [

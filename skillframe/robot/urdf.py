@@ -58,30 +58,35 @@ def read_urdf(path: Path) -> Urdf:
     Raises:
         InputError: it cannot be loaded; says what, where and what to do.
     """
-    root = _parse_xml(path, _read_bytes(path))
+    root = parse_xml(path, read_bytes(path))
     _check_root(path, root)
     links = _links(path, root)
     joints = _joints(path, root, links)
     return Urdf(path, root.get("name") or path.stem, links, joints, _find_root(path, links, joints))
 
 
-def _read_bytes(path: Path) -> bytes:
+def read_bytes(path: Path, kind: str = "a URDF") -> bytes:
+    """The content of an XML file, which is not empty, not binary and not huge.
+
+    Raises:
+        InputError: it is, or cannot be read. `kind` is what it ought to be.
+    """
     if path.is_dir():
-        raise InputError(path, "is a folder", "give the URDF file in it")
+        raise InputError(path, "is a folder", f"give {kind} file in it")
     try:
         if path.stat().st_size > _LARGEST_FILE:
-            raise InputError(path, "is larger than 64 MB", "is it a URDF?")
+            raise InputError(path, "is larger than 64 MB", f"is it {kind}?")
         content = path.read_bytes()
     except OSError as error:
         raise InputError(path, f"cannot be read ({error.strerror})", "check the path") from None
     if not content.strip():
-        raise InputError(path, "is empty", "give a URDF")
+        raise InputError(path, "is empty", f"give {kind}")
     if b"\0" in content[:1024] and content[:2] not in (b"\xff\xfe", b"\xfe\xff"):
-        raise InputError(path, "is a binary file, not a URDF", "give the URDF itself, which is XML text")
+        raise InputError(path, f"is a binary file, not {kind}", f"give {kind} itself, which is XML text")
     return content
 
 
-def _parse_xml(path: Path, content: bytes) -> ET.Element:
+def parse_xml(path: Path, content: bytes) -> ET.Element:
     """The element tree, built on expat without namespaces. A document type is refused before its entities expand."""
     builder, parser = ET.TreeBuilder(), expat.ParserCreate()
 

@@ -10,9 +10,10 @@ from manifold3d import Manifold
 
 from skillframe import Campaign, learn, record, run
 from skillframe.cli.main import run as typed
-from skillframe.parts.declared import DENSITY, SecondPart, read_fixture
+from skillframe.parts.declared import DENSITY, read_fixture
 from skillframe.parts.found import lines
 from skillframe.parts.load import load
+from skillframe.parts.second_declared import SecondPart
 from skillframe.parts.solid import arrays_of
 from tests import part_meshes
 
