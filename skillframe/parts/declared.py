@@ -162,7 +162,7 @@ def read_fixture(path: Path) -> FixtureFile:
     if not isinstance(file.task.axis, str) and not any(file.task.axis):
         raise InputError(f"{path}: task.axis", "is zero", 'give for example [0, 0, -1], or "auto"')
     for index, second in enumerate(file.second):
-        check_second(file.second, index, path)
+        check_second(file.second, index, f"{path}: second[{index}]")
         if second.mesh:
             _check_mesh(second, path, f"second[{index}]")
             if is_scene(second.mesh):
@@ -181,8 +181,8 @@ def _with_scene(file: FixtureFile, path: Path) -> FixtureFile:
                 raise InputError(f"{path}: second[{index}].joint", what, 'take "hinge", "slide", "free" or "fixed"')
         return file
     file = replace(file, second=with_bodies(file.second, path, scene, file.fixture.pose))
-    for index in range(len(file.second)):
-        check_second(file.second, index, path)
+    for index, part in enumerate(file.second):
+        check_second(file.second, index, f"{path.parent / scene}: body {part.name!r}")
     return file
 
 

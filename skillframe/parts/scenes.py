@@ -1,4 +1,4 @@
-"""A drawn scene, as what stands in it and what moves: boxes, cylinders and meshes on joints.
+"""A drawn scene, MJCF or SDFormat, as what stands in it and what moves: boxes, cylinders and meshes on joints.
 
 Lengths are metres, angles radians, and all places are in the scene's own frame as it stands at the start. Friction and
 contact are the fixture file's. What only shows (visuals, lights, cameras, sensors) is passed over; what would change
@@ -23,7 +23,7 @@ from skillframe.robot.urdf import parse_xml, read_bytes
 if TYPE_CHECKING:
     from skillframe.parts.second_declared import MeshPlace, SecondPart
 
-ENDINGS = (".xml", ".mjcf")
+ENDINGS = (".xml", ".mjcf", ".sdf")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,11 +90,14 @@ def read_scene(path: Path) -> DrawnScene:
         InputError: it cannot be read, or holds what is not read here; names the element.
     """
     from skillframe.parts.mjcf import read_mjcf
+    from skillframe.parts.sdformat import read_sdformat
 
-    root = parse_xml(path, read_bytes(path, "a scene"))
-    if root.tag != "mujoco":
-        raise InputError(path, f"is an XML file of <{root.tag}>, no scene", "give MJCF (<mujoco>)")
-    return read_mjcf(path, root)
+    root = parse_xml(path, read_bytes(path, "a scene"), text=True)
+    readers = {"mujoco": read_mjcf, "sdf": read_sdformat}
+    if root.tag not in readers:
+        what = f"is an XML file of <{root.tag}>, no scene"
+        raise InputError(path, what, "give MJCF (<mujoco>) or SDFormat (<sdf>)")
+    return readers[root.tag](path, root)
 
 
 def standing(path: Path) -> tuple[Shape, ...]:
@@ -105,7 +108,7 @@ def standing(path: Path) -> tuple[Shape, ...]:
     """
     found = read_scene(path)
     if not found.fixed:
-        fix = "leave out the joint of one of its bodies"
+        fix = "leave out a body's joint, or in SDFormat say <static>true</static>"
         raise InputError(path, "has nothing that stands and collides", fix)
     return found.fixed
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Literal
 
 from skillframe.errors import InputError
@@ -102,13 +101,13 @@ class SecondPart:
     goal: tuple[float, float] | None = None
 
 
-def check_second(declared: Sequence[SecondPart], index: int, path: Path) -> None:
+def check_second(declared: Sequence[SecondPart], index: int, where: str) -> None:
     """Refuse a second part whose keys say too much or too little.
 
     Raises:
         InputError: names the part and the key.
     """
-    part, where = declared[index], f"{path}: second[{index}]"
+    part = declared[index]
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", part.name):
         raise InputError(f"{where}.name", f"is {part.name!r}", "take letters, digits and _, a letter first")
     if part.name in [each.name for each in declared[:index]]:

@@ -86,8 +86,17 @@ def read_bytes(path: Path, kind: str = "a URDF") -> bytes:
     return content
 
 
-def parse_xml(path: Path, content: bytes) -> ET.Element:
-    """The element tree, built on expat without namespaces. A document type is refused before its entities expand."""
+def parse_xml(path: Path, content: bytes, text: bool = False) -> ET.Element:
+    """The element tree, built on expat without namespaces. A document type is refused before its entities expand.
+
+    Args:
+        path: of the file, for messages.
+        content: what it holds.
+        text: keep what stands between elements, which says nothing in a URDF.
+
+    Raises:
+        InputError: it is no XML, or has a document type.
+    """
     builder, parser = ET.TreeBuilder(), expat.ParserCreate()
 
     def refuse(*_: object) -> NoReturn:
@@ -96,6 +105,8 @@ def parse_xml(path: Path, content: bytes) -> ET.Element:
     parser.StartDoctypeDeclHandler = refuse
     parser.StartElementHandler = builder.start
     parser.EndElementHandler = builder.end
+    if text:
+        parser.CharacterDataHandler = builder.data
     try:
         parser.Parse(content, True)
     except expat.ExpatError as error:
