@@ -24,6 +24,7 @@ EXTRAS: Mapping[str, str] = {
     "fmu": "an FMU",
     "crane": "a hydraulic machine",
     "parts": "a world of mesh files",
+    "step": "a part drawn as STEP",
 }
 """What each extra of the distribution is for; pyproject.toml says what it installs."""
 LIBRARIES: Mapping[str, tuple[str, str]] = {
@@ -42,6 +43,7 @@ LIBRARIES: Mapping[str, tuple[str, str]] = {
     "casadi": ("casadi", "crane"),
     "trimesh": ("trimesh", "parts"),
     "manifold3d": ("manifold3d", "parts"),
+    "cascadio": ("cascadio", "step"),
 }
 """By module: the distribution that it comes from, and the first extra that installs that."""
 

@@ -95,7 +95,7 @@ def _point(point: tuple[float, ...]) -> str:
 @command.command()
 @click.argument("plug", type=click.Path(path_type=Path))
 @click.argument("socket", type=click.Path(path_type=Path))
-@click.option("--units", help='Of both files, as "mm"; needed for all but GLB.')
+@click.option("--units", help='Of both files, as "mm"; needed for all but GLB and STEP.')
 @click.option(
     "--out", default="fixture.toml", show_default=True, type=click.Path(path_type=Path), help="File to write."
 )
@@ -128,7 +128,8 @@ def new(plug: Path, socket: Path, units: str | None, out: Path, friction: float,
         raise InputError(out, f"cannot be written: there is no folder {out.parent}", "make it first")
     names_of_both = relative(plug, out), relative(socket, out)
     if units is None and needs_units(*names_of_both):
-        raise InputError("--units", f"is missing: {plug.name} and {socket.name} do not say it", "give --units mm")
+        unsaid = " and ".join(each.name for each in (plug, socket) if needs_units(each.name))
+        raise InputError("--units", f"is missing: nothing is said of it in {unsaid}", "give for example --units mm")
     text = new_text(out.name, *names_of_both, units, friction, _axis(axis))
     write_whole(out, text.encode())
     try:

@@ -47,7 +47,7 @@ def around(fit: PartsFit, plug: MeshPart, socket: MeshPart) -> tuple[str, ...]:
 
 
 def mend_error(part: MeshPart, place: MeshPlace, fit: PartsFit, reach: Float) -> float:
-    """By how much what was mended of a part may be off where the parts can meet [m].
+    """By how much a part's triangles and what was mended of them may be off where the parts can meet [m].
 
     Args:
         part: with its mended places.
@@ -58,7 +58,8 @@ def mend_error(part: MeshPart, place: MeshPlace, fit: PartsFit, reach: Float) ->
     Raises:
         InputError: it is more than the play allows.
     """
-    worst = 0.0
+    worst = part.error
+    check_error(worst, fit, part)
     for mend in part.places:
         points = placed(mend.points, place, fit)
         if (points.max(axis=0) < reach[0]).any() or (points.min(axis=0) > reach[1]).any():
@@ -70,7 +71,7 @@ def mend_error(part: MeshPart, place: MeshPlace, fit: PartsFit, reach: Float) ->
             )
             what += f", more than {1000.0 * SHARE * fit.clearance:.2g} mm, a quarter of the clearance"
             raise InputError(part.name, what, "close it where it was drawn")
-        worst = max(worst, mend.error)
+        worst = max(worst, part.error + mend.error)
     return worst
 
 

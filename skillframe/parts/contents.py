@@ -2,7 +2,7 @@
 
 Readers of meshes take what they find: of a file that was cut off, or of a web page saved as a part, they make an empty
 mesh or a wrong one. So a file's own counts are compared with its bytes before it is read. Layouts: STL (3D Systems
-1989), OBJ (Wavefront), PLY (Turk 1994), OFF (Geomview), GLB (Khronos, glTF 2.0 section 4.4).
+1989), OBJ (Wavefront), PLY (Turk 1994), OFF (Geomview), GLB (Khronos, glTF 2.0 section 4.4), STEP (ISO 10303-21).
 """
 
 from __future__ import annotations
@@ -46,13 +46,13 @@ def check_contents(raw: bytes, path: Path) -> tuple[str, ...]:
     Raises:
         InputError: it is empty, of another format, cut off, or contradicts itself.
     """
-    kind = path.suffix.lower()
+    kind = ".step" if path.suffix.lower() == ".stp" else path.suffix.lower()
     if not raw.strip():
         raise InputError(path, "is empty: it holds nothing", _AGAIN)
     if kind == ".stl" and _is_binary_stl(raw):
         return ()
     _check_kind(raw, path, kind)
-    checks = {".stl": _check_stl, ".obj": _check_obj, ".ply": _check_ply, ".off": _check_off}
+    checks = {".stl": _check_stl, ".obj": _check_obj, ".ply": _check_ply, ".off": _check_off, ".step": _check_step}
     if kind in checks:
         checks[kind](raw, path)
     return _check_glb(raw, path) if kind == ".glb" else ()
@@ -79,8 +79,7 @@ def _check_kind(raw: bytes, path: Path, kind: str) -> None:
         if start.startswith(mark):
             raise InputError(path, what, fix)
     if (found := _kind(raw, start)) not in ("", kind):
-        fix = "export it as STL" if found == ".step" else f"rename it to {path.stem}{found}"
-        raise InputError(path, f"is {found.upper()[1:]} by its content", fix)
+        raise InputError(path, f"is {found.upper()[1:]} by its content", f"rename it to {path.stem}{found}")
 
 
 def _kind(raw: bytes, start: bytes) -> str:
@@ -164,6 +163,18 @@ def _check_off(raw: bytes, path: Path) -> None:
     if held < vertices + faces:
         what = f"is cut off: it says {vertices:,} vertices and {faces:,} faces, and {held:,} lines follow"
         raise InputError(path, what, _AGAIN)
+
+
+def _check_step(raw: bytes, path: Path) -> None:
+    if not raw[:4096].lstrip().upper().startswith(b"ISO-10303-21"):
+        raise InputError(path, "is no STEP: it does not begin with ISO-10303-21", _AGAIN)
+    if b"END-ISO-10303-21" not in raw.upper():
+        raise InputError(path, "is cut off: it has no END-ISO-10303-21", _AGAIN)
+    bare = re.sub(rb"/\*.*?\*/|'[^']*'", b"", raw, flags=re.DOTALL)  # texts may hold anything
+    missing = {*re.findall(rb"#(\d+)", bare)} - {*re.findall(rb"#(\d+)\s*=", bare)}
+    if missing:
+        named = ", ".join(f"#{number}" for number in sorted(map(int, missing))[:3])
+        raise InputError(path, f"is damaged: it goes by {named}, which is not in it", _AGAIN)
 
 
 def _whole(word: str, path: Path) -> int:

@@ -1,7 +1,7 @@
 """`fixture.toml` as checked records: which mesh stands, which is held, how they touch, and when they are assembled.
 
 Paths are relative to the file and may not leave its folder, so that a campaign's folder can hold all of it. STL, OBJ,
-PLY and OFF carry no unit, and none is guessed.
+PLY and OFF carry no unit, and none is guessed. GLB has metres, STEP says its own.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from skillframe.config import build, read_toml
 from skillframe.errors import InputError
 from skillframe.parts.scenes import is_scene, read_scene, with_bodies
 from skillframe.parts.second_declared import MeshPlace, SecondPart, Triple, Units, check_second
+from skillframe.parts.step import ENDINGS
 
 SCALES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 """Metres per unit of a mesh file."""
@@ -29,7 +30,7 @@ class FixturePart:
 
     Attributes:
         mesh: its file.
-        units: of the file; GLB has metres.
+        units: of the file; GLB has metres, STEP its own.
         pose: of the mesh; the identity if both parts were exported from one assembly.
         table: whether it stands on a table, a plane under its lowest point.
     """
@@ -46,7 +47,7 @@ class HeldPart:
 
     Attributes:
         mesh: its file.
-        units: of the file; GLB has metres.
+        units: of the file; GLB has metres, STEP its own.
         assembled: where the mesh is when done.
         density: of the part in kg/m3 [1 to 30000].
         mass: of the part, in place of its density [kg, 0.1g to 100kg].
@@ -222,14 +223,14 @@ def _check_mesh(part: FixturePart | HeldPart | SecondPart, path: Path, key: str)
         if part.units not in (None, "m"):
             raise InputError(f"{path}: {key}.units", f"is {part.units!r}, and a scene is in metres", "leave it out")
         return
-    if part.units is None and not has_metres(part.mesh):
+    if part.units is None and not has_units(part.mesh):
         what = f"is missing: {part.mesh} does not say what its numbers are"
         raise InputError(f"{path}: {key}.units", what, 'write for example units = "mm"')
 
 
-def has_metres(mesh: str) -> bool:
-    """Whether a part's file says itself that it is in metres, by its ending."""
-    return mesh.lower().endswith(".glb") or is_scene(mesh)
+def has_units(mesh: str) -> bool:
+    """Does a file say itself what its numbers are, by its ending? GLB and scenes have metres, STEP its own unit."""
+    return mesh.lower().endswith((".glb", *ENDINGS)) or is_scene(mesh)
 
 
 def mesh_files(path: Path) -> dict[str, Path]:

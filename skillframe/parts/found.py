@@ -8,7 +8,7 @@ from typing import Any
 
 from skillframe.errors import InputError
 from skillframe.parts.checks import SHARE
-from skillframe.parts.declared import check_file, has_metres
+from skillframe.parts.declared import check_file, has_units
 from skillframe.parts.load import LoadedParts, PreparedPart
 
 FILE = """\
@@ -28,7 +28,8 @@ axis = {axis}            # of insertion; "auto" takes the first of -z, z, -x, x,
 
 def new_text(name: str, plug: str, socket: str, units: str | None, friction: float, axis: str) -> str:
     """The text of a fixture file for two meshes, named relative to it."""
-    stated = [needs_units(mesh) or not needs_units(plug, socket) for mesh in (socket, plug)]
+    both = needs_units(plug, socket)
+    stated = [needs_units(mesh) or (not both and mesh.lower().endswith(".glb")) for mesh in (socket, plug)]
     lines = [f"units = {_quoted(units)}\n" if units and said else "" for said in stated]
     return FILE.format(
         name=name, socket=_quoted(socket), plug=_quoted(plug), socket_units=lines[0], plug_units=lines[1],
@@ -37,8 +38,8 @@ def new_text(name: str, plug: str, socket: str, units: str | None, friction: flo
 
 
 def needs_units(*meshes: str) -> bool:
-    """Does any of these files not say what its numbers are? GLB and scenes have metres."""
-    return not all(has_metres(mesh) for mesh in meshes)
+    """Does any of these files not say what its numbers are? GLB and scenes have metres, STEP its own unit."""
+    return not all(has_units(mesh) for mesh in meshes)
 
 
 def relative(mesh: Path, file: Path) -> str:

@@ -81,10 +81,10 @@ def in_place(declared: Sequence[SecondPart], state: State) -> NDArray[np.bool_]:
 def _made(part: SecondPart, path: Path, loaded: LoadedParts) -> _Made:
     import trimesh
 
-    drawn = moved(_solid(part, path), part.pose)
-    solid = drawn.transform(np.column_stack([loaded.fit.turn, loaded.fit.origin]))
+    given, error = _solid(part, path)
+    solid = moved(given, part.pose).transform(np.column_stack([loaded.fit.turn, loaded.fit.origin]))
     name = f"second part {part.name!r}" if is_scene(part.mesh) else part.mesh or f"second part {part.name!r}"
-    whole = MeshPart(name, solid, (), "")
+    whole = MeshPart(name, solid, (), "", error=error)
     geoms = _pieces(whole, loaded) if loaded.plug.pieces is not None else _surface(whole, loaded)
     mesh = trimesh.Trimesh(*arrays_of(solid), process=False)
     density = DENSITY if part.density is None else part.density
@@ -93,21 +93,24 @@ def _made(part: SecondPart, path: Path, loaded: LoadedParts) -> _Made:
     return _Made(geoms, solid, mass, np.asarray(mesh.center_mass), inertia)
 
 
-def _solid(part: SecondPart, path: Path) -> Any:
+def _solid(part: SecondPart, path: Path) -> tuple[Any, float]:
+    """What it was drawn as, and by how much its triangles may be off that [m]."""
     import manifold3d
 
     if is_scene(part.mesh):
         scene = read_scene(path.parent / part.mesh)
-        return of_shapes(next(each.shapes for each in scene.moving if each.name == part.name), path.parent / part.mesh)
+        shapes = next(each.shapes for each in scene.moving if each.name == part.name)
+        return of_shapes(shapes, path.parent / part.mesh), 0.0
     if part.mesh:
-        return read_part(path.parent / part.mesh, part.units).solid
-    shapes = [
+        read = read_part(path.parent / part.mesh, part.units)
+        return read.solid, read.error
+    drawn = [
         moved(manifold3d.Manifold.cube(list(box.size), True), MeshPlace(xyz=box.xyz, rpy=box.rpy)) for box in part.boxes
     ]
     for each in part.cylinders:
         rod = manifold3d.Manifold.cylinder(each.length, each.radius, circular_segments=SIDES, center=True)
-        shapes.append(moved(rod, MeshPlace(xyz=each.xyz, rpy=each.rpy)))
-    return united(shapes)
+        drawn.append(moved(rod, MeshPlace(xyz=each.xyz, rpy=each.rpy)))
+    return united(drawn), 0.0
 
 
 def _pieces(whole: MeshPart, loaded: LoadedParts) -> tuple[Geom, ...]:
@@ -115,14 +118,14 @@ def _pieces(whole: MeshPart, loaded: LoadedParts) -> tuple[Geom, ...]:
     if not 0 < len(pieces.hulls) <= MOST_PIECES:
         what = f"takes more than {MOST_PIECES} convex pieces within a quarter of the clearance"
         raise InputError(whole.name, what, "draw it more simply, of extrusions and plane faces")
-    check_error(pieces.error, loaded.fit, whole)
+    check_error(pieces.error + whole.error, loaded.fit, whole)
     return tuple(Geom(kind="mesh", vertices=h.vertices, faces=h.faces, rgba=COLOUR) for h in pieces.hulls)
 
 
 def _surface(whole: MeshPart, loaded: LoadedParts) -> tuple[Geom, ...]:
     low, high = np.reshape(whole.solid.bounding_box(), (2, 3))
     surface = surface_of(whole.solid, low, high)
-    check_error(error_of(surface, low, high), loaded.fit, whole)
+    check_error(error_of(surface, low, high) + whole.error, loaded.fit, whole)
     vertices, faces = arrays_of(whole.solid)
     return (Geom(kind="mesh", vertices=vertices, faces=faces, rgba=COLOUR, surface=surface),)
 

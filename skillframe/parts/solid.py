@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from skillframe.errors import InputError, need
 from skillframe.frames import Float, cross
+from skillframe.parts import step
 from skillframe.parts.contents import check_contents, no_number
 from skillframe.parts.declared import SCALES
 from skillframe.parts.mended import Mend, mended
@@ -25,7 +26,7 @@ from skillframe.robot.meshes import LARGEST_FILE
 
 SIDES = 64
 """Of a cylinder in a scene or second part; its polygon lies 0.12 % of the radius inside the circle at most."""
-FORMATS = (".stl", ".obj", ".ply", ".off", ".glb")
+FORMATS = (".stl", ".obj", ".ply", ".off", ".glb", *step.ENDINGS)
 SMALLEST, LARGEST = 1e-3, 2.0
 """Sizes of parts that are believed [m]."""
 MOST_TRIANGLES, THINNED_BY = 40_000, 2e-6
@@ -44,6 +45,7 @@ class MeshPart(NamedTuple):
         notes: sentences on what was done to it.
         sha256: of the file.
         places: that were mended, in the file's frame.
+        error: of its triangles, by which they may be off what was drawn [m]; 0 where they are what was drawn.
     """
 
     name: str
@@ -51,6 +53,7 @@ class MeshPart(NamedTuple):
     notes: tuple[str, ...]
     sha256: str
     places: tuple[Mend, ...] = ()
+    error: float = 0.0
 
     @property
     def size(self) -> float:
@@ -62,12 +65,12 @@ def read_part(path: Path, units: str | None, held: bool = False) -> MeshPart:
     """A part from its file.
 
     Args:
-        path: STL, OBJ, PLY, OFF or GLB, or a scene, of which it is what stands.
-        units: of its numbers; None for metres.
+        path: STL, OBJ, PLY, OFF, GLB or STEP, or a scene, of which it is what stands.
+        units: of its numbers; None for metres, and for STEP, which says its own.
         held: of a scene it is the one body, whether that stands or not.
 
     Raises:
-        MissingDependency: the extra `parts` is not installed.
+        MissingDependency: the extra `parts` is not installed, or for STEP `step`.
         InputError: it cannot be read, is not closed, or has a size that no part has.
     """
     need("trimesh")
@@ -78,18 +81,24 @@ def read_part(path: Path, units: str | None, held: bool = False) -> MeshPart:
         return MeshPart(path.name, solid, (), hashlib.sha256(path.read_bytes()).hexdigest())
     raw = _content(path)
     left_out = check_contents(raw, path)
-    vertices, faces = _triangles(raw, path)
+    drawn = path.suffix.lower() in step.ENDINGS
+    if drawn and units is not None:
+        raise InputError(path, "says its own unit, as every STEP file", "leave units out for it")
+    vertices, faces = _triangles(step.as_glb(raw, path) if drawn else raw, path)
     _check_numbers(vertices, faces, path)
     _check_size(vertices, units or "m", path)
     mesh = mended(*_merged(vertices * SCALES[units or "m"], faces))
     _check_closed(mesh.vertices, mesh.faces, path)
     solid, notes = _united(mesh.vertices, mesh.faces, path)
+    if drawn:
+        left_out = (f"{path.name} was cut into triangles within {1e6 * step.TOLERANCE:g} um of what was drawn",)
     notes = (*left_out, *(f"{path.name}: {note}" for note in mesh.notes), *notes)
     if solid.num_tri() > MOST_TRIANGLES:
         before, solid = solid.num_tri(), solid.simplify(THINNED_BY)
         kept = f"{path.name} has {before:,} triangles; {solid.num_tri():,} are kept within {THINNED_BY * 1e6:g} um"
         notes = (*notes, kept)
-    return MeshPart(path.name, solid, notes, hashlib.sha256(raw).hexdigest(), mesh.places)
+    error = step.TOLERANCE if drawn else 0.0
+    return MeshPart(path.name, solid, notes, hashlib.sha256(raw).hexdigest(), mesh.places, error)
 
 
 def arrays_of(solid: Any) -> tuple[Float, Faces]:
@@ -143,6 +152,8 @@ def _of_mesh(shape: Shape, path: Path) -> Any:
     vertices, faces, where = shape.vertices, shape.faces, shape.file or path
     if shape.file is not None:
         raw = _content(shape.file)
+        if shape.file.suffix.lower() in step.ENDINGS:
+            raise InputError(path, f"names {shape.file.name}, and STEP is not read in scenes", "export it as STL")
         check_contents(raw, shape.file)
         vertices, faces = _triangles(raw, shape.file)
     _check_numbers(vertices, faces, where)
@@ -153,10 +164,6 @@ def _of_mesh(shape: Shape, path: Path) -> Any:
 
 def _content(path: Path) -> bytes:
     ending = path.suffix.lower()
-    if ending in (".step", ".stp"):
-        raise InputError(
-            path, "is a STEP file, which is not read", "export it as STL, with a finer tolerance than the play"
-        )
     if ending not in FORMATS:
         raise InputError(path, f"is no mesh that is read (there are: {', '.join(FORMATS)})", "export it as STL")
     try:
@@ -170,7 +177,8 @@ def _content(path: Path) -> bytes:
 def _triangles(raw: bytes, path: Path) -> tuple[Float, Faces]:
     import trimesh
 
-    kind = path.suffix.lower().removeprefix(".")
+    ending = path.suffix.lower()
+    kind = "glb" if ending in step.ENDINGS else ending.removeprefix(".")
     try:
         mesh = trimesh.load(io.BytesIO(raw), file_type=kind, force="mesh", process=False)
         vertices, faces = np.array(mesh.vertices, dtype=float), np.array(mesh.faces, dtype=np.int64)
@@ -196,7 +204,8 @@ def _check_size(vertices: Float, units: str, path: Path) -> None:
     if SMALLEST <= size <= LARGEST:
         return
     likely = [word for word in ("mm", "m", "cm", "in", "um") if SMALLEST <= extent * SCALES[word] <= LARGEST]
-    fix = f'say units = "{likely[0]}"' if likely else "check what it was exported as"
+    own = path.suffix.lower() in step.ENDINGS
+    fix = f'say units = "{likely[0]}"' if likely and not own else "check what it was exported as"
     raise InputError(path, f"is {size:.3g} m long in {units}, and a part is 1 mm to 2 m", fix)
 
 

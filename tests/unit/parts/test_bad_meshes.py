@@ -77,7 +77,7 @@ FILES = {
     "part.txt": (WORDS, "is no mesh that is read"),
     "part": (WORDS, "is no mesh that is read"),
     "part.gltf": ("{}", "is no mesh that is read"),
-    "part.step": ("ISO-10303-21;", "STEP"),
+    "part.step": ("ISO-10303-21;", "cut off: it has no END-ISO-10303-21"),
     "points.obj": (obj(V, []), "24 vertices and no face"),
     "lines.obj": (obj(V, []) + "l 1 2\n", "24 vertices and no face"),
     "range.obj": (obj(V, [*F, [1, 2, 998]]), "line 69 has a face of vertex 999, and there are 1 to 24"),
@@ -271,7 +271,7 @@ def test_a_pair_that_does_not_go_together_is_one_sentence_and_leaves_nothing(nam
 def test_units_that_are_not_given_are_asked_for_by_the_word_to_type(folder, capsys):
     write(folder, "plug.stl", binary_stl(V, F))
     assert new(folder, "plug.stl", units=None) == 2
-    sentence(capsys, "--units: is missing", "give --units mm")
+    sentence(capsys, "--units: is missing: nothing is said of it in plug.stl and socket.stl", "--units mm")
 
 
 def test_units_of_two_glb_files_are_taken_where_they_are_given(folder, capsys):

@@ -36,12 +36,12 @@ def plant_of(scene, count=1, draws=None):
     return made
 
 
-def after(plant, ticks, pull=0.0):
+def after(plant, ticks, pull=0.0, damping=20.0):
     """What is told of the parts after each tick, the tool standing still by itself. Forces on the parts are lost."""
     rows = []
     for _ in range(ticks):
         bias = plant.kinematics(np.zeros(3)).bias
-        plant.step(bias - 20.0 * plant.state[1] + pull, np.arange(plant.count))
+        plant.step(bias - damping * plant.state[1] + pull, np.arange(plant.count))
         rows.append({name: value.copy() for name, value in plant.tip_state().second.items()})
     return rows
 
@@ -88,6 +88,25 @@ def test_joint_friction_holds_what_weighs_less_and_a_range_ends_what_weighs_more
     drops = scene_with(tmp_path / "drops", slack)
     assert after(plant_of(held), 300)[-1]["a.travel"][0] == pytest.approx(-CREEP * 0.3, rel=0.02)  # it starts at rest
     assert after(plant_of(drops), 300)[-1]["a.travel"][0] == pytest.approx(-0.003, abs=5e-5)
+
+
+def test_the_held_part_pushes_a_slide_as_far_as_force_over_stiffness_and_walls_do_not_hold_that(tmp_path):
+    """A bar across the hole, as long as the block is wide, is pushed down by the pin with 2 N."""
+    bar = BOX.replace("0.01, 0.02, 0.03", "0.024, 0.004, 0.002").replace("0.04, 0.0, 0.05", "0.0, 0.0, -0.002")
+    spring = 'joint = "slide"\nstiffness = 500.0\ndamping = 5.0\ngoal = [-0.01, -0.001]\n'
+    plant = plant_of(scene_with(tmp_path, spring, bar))
+    down, damping = np.array([0.0, 0.0, -2.0, 0.0, 0.0, 0.0, 0.0]), np.array([35.0] * 3 + [0.5, 0.5, 0.0, 0.0])
+    weight = 2700.0 * 0.024 * 0.004 * 0.002 * GRAVITY
+    assert after(plant, 500, down, damping)[-1]["a.travel"][0] == pytest.approx(
+        -(2.0 + weight) / 500.0, rel=0.01
+    )  # damped critically: e^-10
+
+
+def test_a_free_part_rests_with_its_weight_on_one_that_slides(tmp_path):
+    above = BOX.replace('"a"', '"b"').replace("0.04, 0.0, 0.05", "0.04, 0.0, 0.0801") + 'joint = "free"\n'
+    spring = 'joint = "slide"\nstiffness = 100.0\ndamping = 2.0\n'
+    sag = after(plant_of(scene_with(tmp_path, spring, above + BOX)), 500)[-1]["a.travel"][0]
+    assert sag == pytest.approx(-2.0 * MASS * GRAVITY / 100.0, rel=0.01)  # e^-6 of what swings is left, and less of it
 
 
 def test_drawn_joint_friction_of_the_robot_leaves_that_of_second_parts(tmp_path):
