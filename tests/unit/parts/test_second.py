@@ -94,16 +94,18 @@ def test_the_held_part_pushes_a_slide_as_far_as_force_over_stiffness_and_walls_d
     """A bar across the hole, as long as the block is wide, is pushed down by the pin with 2 N."""
     bar = BOX.replace("0.01, 0.02, 0.03", "0.024, 0.004, 0.002").replace("0.04, 0.0, 0.05", "0.0, 0.0, -0.002")
     spring = 'joint = "slide"\nstiffness = 500.0\ndamping = 5.0\ngoal = [-0.01, -0.001]\n'
-    plant = plant_of(scene_with(tmp_path, spring, bar))
-    down, damping = np.array([0.0, 0.0, -2.0, 0.0, 0.0, 0.0, 0.0]), np.array([35.0] * 3 + [0.5, 0.5, 0.0, 0.0])
+    beside = BOX.replace('"a"', '"b"') + 'joint = "free"\n'  # with a free part any may meet the fixture, its parent
+    plant = plant_of(scene_with(tmp_path, spring, beside + bar))
+    down, damping = np.array([0.0, 0.0, -2.0] + [0.0] * 10), np.array([35.0] * 3 + [0.5, 0.5] + [0.0] * 8)
     weight = 2700.0 * 0.024 * 0.004 * 0.002 * GRAVITY
     assert after(plant, 500, down, damping)[-1]["a.travel"][0] == pytest.approx(
         -(2.0 + weight) / 500.0, rel=0.01
     )  # damped critically: e^-10
 
 
-def test_a_free_part_rests_with_its_weight_on_one_that_slides(tmp_path):
-    above = BOX.replace('"a"', '"b"').replace("0.04, 0.0, 0.05", "0.04, 0.0, 0.0801") + 'joint = "free"\n'
+@pytest.mark.parametrize("joint", ["free", "slide"])
+def test_a_part_rests_with_its_weight_on_one_that_slides(tmp_path, joint):
+    above = BOX.replace('"a"', '"b"').replace("0.04, 0.0, 0.05", "0.04, 0.0, 0.0801") + f'joint = "{joint}"\n'
     spring = 'joint = "slide"\nstiffness = 100.0\ndamping = 2.0\n'
     sag = after(plant_of(scene_with(tmp_path, spring, above + BOX)), 500)[-1]["a.travel"][0]
     assert sag == pytest.approx(-2.0 * MASS * GRAVITY / 100.0, rel=0.01)  # e^-6 of what swings is left, and less of it
