@@ -15,7 +15,7 @@ EXAMPLES := $(wildcard examples/*.py)
 GALLERY := docs/gallery/pictures
 PICTURES := $(EXAMPLES:examples/%.py=$(GALLERY)/%.png)
 
-.PHONY: demo install wheels test test-core test-rest test-beside test-slow mutants figures reproduced bench docs gallery lint clean
+.PHONY: demo install wheels test test-core test-rest test-beside test-step test-slow mutants figures reproduced bench docs gallery lint clean
 
 demo: install
 	$(BIN)/skillframe quickstart --out $(OUT)
@@ -59,6 +59,11 @@ test-rest: $(VENV)/.test
 # The core's tests once more, beside the plug-ins.
 test-beside: $(VENV)/.test
 	$(PYTEST) $(SIDE_BY_SIDE) -m "core and not slow and not figures" tests/unit
+
+# What reads STEP, whose library is 99 MB and not among the others.
+test-step: $(VENV)/.test
+	$(PIP) install -e '.[step]'
+	$(PYTEST) tests/unit/parts/test_step.py
 
 test-slow: $(VENV)/.test
 	$(PYTEST) $(SIDE_BY_SIDE) -m "slow and not figures"
