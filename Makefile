@@ -6,7 +6,8 @@ OUT ?= demo
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
-PYTEST := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q --timeout 900
+# Compiled files are kept whatever the environment says: each test that starts a program would compile it all again.
+PYTEST := PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q --timeout 900
 # Tests run side by side; figures and ratios do not, since some of them measure time.
 SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist worksteal
 PROJECTS := pyproject.toml plugins/all.txt $(wildcard plugins/*/pyproject.toml)
