@@ -37,7 +37,9 @@ if TYPE_CHECKING:
 )
 @click.option("--free-air", metavar="FROM,TO", help="Stretch without contact [s] [default: start to first contact].")
 @click.option("--noise", metavar="N,NM", help="Sensor noise per sample [N, Nm] [default: from the recording].")
-@click.option("--corner", type=NUMBER, help="Corner frequency [Hz] [default: the recording's most likely].")
+@click.option(
+    "--corner", type=NUMBER, help="Corner frequency [Hz] [default: chosen so that no plain 10 Hz filter is better]."
+)
 @click.option("--json", "as_json", is_flag=True, help="What was identified as JSON on stdout.")
 def command(
     file: Path, out: Path, method: str, bias: bool, weight: bool | None, free_air: str | None, noise: str | None,
@@ -105,8 +107,10 @@ def _pair(name: str, text: str | None) -> tuple[float, float] | None:
     return numbers[0], numbers[1]
 
 
-def _model(demonstration: Demonstration, noise: tuple[float, float] | None, corner: float | None) -> WrenchModel:
-    """The wrench model: from the recording, with what was given in its place."""
+def _model(demonstration: Demonstration, noise: tuple[float, float] | None, corner: float | None) -> WrenchModel | None:
+    """The wrench model: from the recording, with what was given in its place. None if nothing was given."""
+    if noise is None and corner is None:
+        return None
     import numpy as np
 
     from skillframe.conditioning.noise import model_of
@@ -144,4 +148,19 @@ def _show(out: Path, removed: Removed | None, said: dict[str, Any]) -> None:
         corner = said["corner_hz"]
         click.echo(f"noise       {six(said['noise'])}")
         click.echo(f"{said['method']:<12}corner {corner[0]:.1f} Hz (force), {corner[3]:.1f} Hz (torque)")
+        for line in _chosen(said):
+            click.echo(line)
     click.echo(f"written     {out}")
+
+
+def _chosen(said: dict[str, Any]) -> list[str]:
+    """What the filter does where nothing happens, and why it has its corner. Nothing where it was told."""
+    if "because" not in said:
+        return []
+    quiet, opened, lines = said["quiet_corner_hz"], said["opened"], []
+    for i, name, unit in ((0, "force", "N"), (1, "torque", "Nm")):
+        passes = [v for v in said["passes"][3 * i : 3 * i + 3] if v is not None]
+        open_at = f"its own for changes above {max(passes):.2g} {unit}" if passes else "never its own"
+        share = f" ({100.0 * opened[i]:.0f} % of the samples)" if passes else ""
+        lines.append(f"{name:<12}{quiet[3 * i]:.1f} Hz where nothing happens, {open_at}{share}: {said['because'][i]}")
+    return lines

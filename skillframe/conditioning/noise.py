@@ -50,6 +50,26 @@ def noise_figures(time: Float, wrench: Float, alive: NDArray[np.bool_] | None = 
     Raises:
         InputError: fewer than ten samples, or no window without a stall.
     """
+    width, live, scatter, quietest = _quiet(time, wrench, alive)
+    return NoiseFigures(
+        np.median(scatter[quietest], axis=0), np.median(scatter, axis=0), float(time[int(live[quietest[0]]) * width])
+    )
+
+
+def window_rows(
+    time: Float, wrench: Float, alive: NDArray[np.bool_] | None = None
+) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Rows (K, W) of the windows without a stall, and which are the quietest quarter. As `noise_figures` takes them."""
+    width, live, _, quietest = _quiet(time, wrench, alive)
+    quiet = np.zeros(len(live), dtype=bool)
+    quiet[quietest] = True
+    return live[:, None] * width + np.arange(width), quiet
+
+
+def _quiet(
+    time: Float, wrench: Float, alive: NDArray[np.bool_] | None
+) -> tuple[int, NDArray[np.intp], Float, NDArray[np.intp]]:
+    """Samples in a window, the windows that count, their scatter (K, 6), and which of them are the quietest quarter."""
     if len(time) < LEAST_SAMPLES:
         raise InputError(
             "wrench", f"{len(time)} samples are too few for noise figures", f"give at least {LEAST_SAMPLES}"
@@ -62,10 +82,7 @@ def noise_figures(time: Float, wrench: Float, alive: NDArray[np.bool_] | None = 
         )  # fmt: skip
     scatter = detrended_std(_cut(np.asarray(wrench, dtype=float), width)[live])
     rank = (scatter / np.maximum(np.median(scatter, axis=0), FLOOR)).sum(axis=1)
-    quietest = np.argsort(rank, kind="stable")[: max(1, len(live) // 4)]
-    return NoiseFigures(
-        np.median(scatter[quietest], axis=0), np.median(scatter, axis=0), float(time[int(live[quietest[0]]) * width])
-    )
+    return width, live, scatter, np.argsort(rank, kind="stable")[: max(1, len(live) // 4)]
 
 
 def _windows(time: Float, alive: NDArray[np.bool_] | None) -> tuple[int, NDArray[np.intp]]:
@@ -141,9 +158,15 @@ def _innovation_variance(corners: Float, wrench: Float, dt: float) -> Float:
     return result
 
 
-def model_of(demonstration: Demonstration) -> WrenchModel:
-    """The wrench model of one demonstration. Sensor noise stated in its metadata wins over the estimate."""
-    model = estimate_model(demonstration.time, demonstration.wrench, alive_samples(demonstration))
+def model_of(demonstration: Demonstration, alive: NDArray[np.bool_] | None = None) -> WrenchModel:
+    """The wrench model of one demonstration. Sensor noise stated in its metadata wins over the estimate.
+
+    Args:
+        demonstration: as recorded.
+        alive: (T,) where the sensor did not stall; found if not given.
+    """
+    alive = alive_samples(demonstration) if alive is None else alive
+    model = estimate_model(demonstration.time, demonstration.wrench, alive)
     sensor = demonstration.meta.get("sensor")
     if not isinstance(sensor, dict):
         return model

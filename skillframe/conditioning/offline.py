@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.conditioning.contact import first_free_air
+from skillframe.conditioning.cored import cored
 from skillframe.conditioning.noise import LEAST_SAMPLES, model_of, noise_figures
 from skillframe.conditioning.payload import Payload, gravity_in_tool, identify_payload, refuse_absurd
 from skillframe.demonstration.faults.fault import COPY, SATURATED
@@ -40,28 +41,33 @@ class Removed(NamedTuple):
 
 
 def smooth(demonstration: Demonstration, model: WrenchModel | None = None) -> Demonstration:
-    """The demonstration with its wrench smoothed over time (Rauch-Tung-Striebel), which shifts nothing in time.
+    """The demonstration with its wrench smoothed over time, which shifts nothing in time.
 
     Args:
         demonstration: as recorded.
-        model: noise figures; estimated from the recording if not given.
+        model: noise figures, for a smoother (Rauch-Tung-Striebel) with these and no other. If not given they are
+            identified, and the smoother is the one of `conditioning.cored`.
     """
     return _with_filter(demonstration, model, "smoother")
 
 
 def filter_wrench(demonstration: Demonstration, model: WrenchModel | None = None) -> Demonstration:
-    """The demonstration with its wrench filtered as the loop would, causally. Takes the arguments of `smooth`."""
+    """The demonstration with its wrench filtered causally. Takes the arguments of `smooth`."""
     return _with_filter(demonstration, model, "filter")
 
 
 def _with_filter(demonstration: Demonstration, model: WrenchModel | None, method: str) -> Demonstration:
-    model = model or model_of(demonstration)
-    dt = 1.0 / demonstration.rate
-    design = WrenchFilter(model, dt)
-    run = design.smooth if method == "smoother" else design.filter
-    said = {"method": method, "noise": model.noise.tolist(), "corner_hz": model.corner(dt).tolist()}
-    wrench = run(demonstration.time, demonstration.wrench)
-    return replace(demonstration, wrench=wrench, meta=_noted(with_faults(demonstration), said))
+    d, dt = demonstration, 1.0 / demonstration.rate
+    if model is None:
+        live = alive(d)
+        model = model_of(d, live)
+        wrench, chosen = cored(d.time, d.wrench, model, causal=method == "filter", alive=live)
+    else:
+        design = WrenchFilter(model, dt)
+        wrench = (design.smooth if method == "smoother" else design.filter)(d.time, d.wrench)
+        chosen = {"corner_hz": model.corner(dt).tolist()}
+    said = {"method": method, "noise": model.noise.tolist(), **chosen}
+    return replace(d, wrench=wrench, meta=_noted(with_faults(d), said))
 
 
 def with_faults(demonstration: Demonstration) -> dict[str, Any]:
