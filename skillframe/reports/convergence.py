@@ -22,7 +22,7 @@ from skillframe.reports.svg import Axes, padded, picture, text
 from skillframe.reports.theory import Region, boundary, mark
 
 FEW_VALUES, MOST_CELLS, TRIALS_PER_CELL = 8, 7, 5
-MOST_CURVES, CURVE_BINS = 4, 8
+CURVE_BINS = 8
 FAILS, BETWEEN, WORKS = np.array([224, 132, 80]), np.array([244, 240, 232]), np.array([98, 162, 216])
 
 

@@ -19,7 +19,7 @@ from skillframe.reports.markup import Markup, figure, join, tag
 from skillframe.reports.svg import LEFT, Axes, envelope, legend, padded, picture, text
 
 AXES = ("x", "y", "z")
-LEAST_RANGE = {"N": 1.0, "Nm": 0.05, "mm": 0.5, "°": 0.5}
+LEAST_RANGE = {"N": 1.0, "Nm": 0.05, "mm": 0.5, "°": 0.5, "bar": 1.0, "%": 1.0, "kN": 0.1, "kJ": 0.01}
 MOST_EVENTS = 12
 CONTACT_N = 0.5
 LABEL_GAP, LIMIT_GAP = 12.0, 24.0

@@ -70,6 +70,7 @@ def cause_of(failure: str) -> str:
     "force limit: 80.1 N is above 80 N (at 2.2 s)" and its like are all "force limit"; a link that "is 79 mm inside
     the fixture" loses its depth.
     """
+    failure = failure.partition("; ")[0]  # what to do about it is no part of the cause
     clauses = re.split(r"(: |, )", re.sub(r"\s*\(at [^)]*\)|\d+ mm (?=inside the fixture)", "", failure).strip())
     kept = clauses[0]
     for separator, clause in zip(clauses[1::2], clauses[2::2], strict=True):

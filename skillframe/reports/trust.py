@@ -10,7 +10,7 @@ import numpy as np
 
 from skillframe.campaign.validity import Basis
 from skillframe.frames import Float
-from skillframe.reports.convergence import MOST_CURVES, cell_map, influence, rate_curves
+from skillframe.reports.convergence import cell_map, influence
 from skillframe.reports.markup import Markup, figure, join, note, number, percent, table, tag
 from skillframe.reports.motors import motors_table
 from skillframe.reports.peaks import DEFINED, PEAK, WORDS, said
@@ -20,6 +20,7 @@ from skillframe.reports.scores import scores_table
 from skillframe.reports.sources import Chapter
 from skillframe.reports.svg import Axes, padded, picture, text
 from skillframe.reports.theory import regions, theory_sentence
+from skillframe.reports.what_if import what_if
 
 MOST_TRIALS_NAMED = 6
 PEAKS = "peak_force_n"
@@ -59,12 +60,7 @@ def _map(chapter: Chapter, results: Results) -> Markup:
     if len(pair) == 2:
         maps = [cell_map(results, skill, pair, limits) for skill in results.skills]
         parts += [tag("div", *maps, class_="grid"), _colour_key()]
-    curves = [rate_curves(results, name, limits) for name in ranked[:MOST_CURVES]]
-    left_out = [quantity(name).label for name in ranked[MOST_CURVES:]]
-    parts += [_skill_key(results), tag("div", *curves, class_="grid")]
-    if left_out:
-        parts.append(note(f"Less telling and not drawn: {', '.join(left_out)}."))
-    return join(parts)
+    return join([*parts, _skill_key(results), what_if(results, limits)])
 
 
 def _how_to_read(results: Results, pair: Sequence[str], ranked: Sequence[str]) -> str:
