@@ -18,6 +18,7 @@ import numpy as np
 from skillframe.errors import InputError
 from skillframe.frames import Float
 from skillframe.parts.scenes import DrawnScene, Moving, Shape, refuse, turned
+from skillframe.robot.urdf import parse_xml, read_bytes
 
 _KNOWN = {
     "sdf": ("world", "model"),
@@ -64,6 +65,28 @@ class _Pose(NamedTuple):
 _NONE = _Pose(np.eye(3), np.zeros(3))
 
 
+class DrawnLink(NamedTuple):
+    """A link where its model is drawn: rotation (3, 3) and origin (3,) of its frame, its shapes, and its mass [kg]."""
+
+    rotation: Float
+    origin: Float
+    shapes: tuple[Shape, ...]
+    mass: float | None
+
+
+def read_links(path: Path) -> dict[str, DrawnLink]:
+    """The links of an SDFormat file by name, whatever joins them.
+
+    Raises:
+        InputError: it cannot be read, or holds what is not read.
+    """
+    return {
+        name: DrawnLink(*model.frame(name), tuple(model.shapes(name)), model.mass([name]))
+        for model in _models(path, parse_xml(path, read_bytes(path, "an SDFormat"), text=True))
+        for name in model.links
+    }
+
+
 def read_sdformat(path: Path, root: ET.Element) -> DrawnScene:
     """What stands and moves in an SDFormat file.
 
@@ -74,12 +97,7 @@ def read_sdformat(path: Path, root: ET.Element) -> DrawnScene:
     Raises:
         InputError: it holds what is not read, or a number that is none.
     """
-    version = root.get("version", "")
-    if version not in _VERSIONS:
-        what = f"is SDFormat {version or 'of no version'}; {_VERSIONS[0]} to {_VERSIONS[-1]} are read"
-        raise InputError(path, what, 'say <sdf version="1.9">, and what that means')
-    _check_known(path, root)
-    models = [_Model(path, each) for each in (*root.findall("model"), *root.findall("world/model"))]
+    models = _models(path, root)
     shapes = [shape for model in models for shape in model.standing]
     moving = [body for model in models for body in model.moving()]
     names = [body.name for body in moving]
@@ -89,6 +107,15 @@ def read_sdformat(path: Path, root: ET.Element) -> DrawnScene:
     drawn = [*shapes, *(shape for body in moving for shape in body.shapes)]
     files = dict.fromkeys(shape.file for shape in drawn if shape.file is not None)
     return DrawnScene(fixed=tuple(shapes), moving=tuple(moving), meshes=tuple(files))
+
+
+def _models(path: Path, root: ET.Element) -> list[_Model]:
+    version = root.get("version", "")
+    if version not in _VERSIONS:
+        what = f"is SDFormat {version or 'of no version'}; {_VERSIONS[0]} to {_VERSIONS[-1]} are read"
+        raise InputError(path, what, 'say <sdf version="1.9">, and what that means')
+    _check_known(path, root)
+    return [_Model(path, each) for each in (*root.findall("model"), *root.findall("world/model"))]
 
 
 def _check_known(path: Path, element: ET.Element) -> None:
@@ -115,7 +142,7 @@ class _Model:
         self.parents = {name: self._ends(each) for name, each in self.joints.items()}
         self.groups = self._grouped()
         self.fixed = [name for name in self.links if static or self.groups[name] == self.groups[_WORLD]]
-        self.standing = [shape for name in self.fixed for shape in self._shapes(name)]
+        self.standing = [shape for name in self.fixed for shape in self.shapes(name)]
 
     def _ends(self, joint: ET.Element) -> tuple[str, str, str]:
         """A joint's kind, parent and child."""
@@ -149,13 +176,13 @@ class _Model:
         return found
 
     def _body(self, own: list[str], hung: list[tuple[str, str, str, str]]) -> Moving:
-        shapes = tuple(shape for name in own for shape in self._shapes(name))
+        shapes = tuple(shape for name in own for shape in self.shapes(name))
         where = f"link {own[0]!r}"
         if not shapes:
             raise refuse(self.path, where, "moves and has nothing that collides")
         if any(self.links[name].findtext("gravity", "1").strip() in ("0", "false") for name in own):
             raise refuse(self.path, f"{where} without gravity")
-        mass = self._mass(own)
+        mass = self.mass(own)
         if not hung:
             return Moving(name=own[0], joint="free", shapes=shapes, mass=mass)
         (name, kind, parent, child), *more = hung
@@ -164,7 +191,7 @@ class _Model:
             raise refuse(self.path, where, f"{what}; fix the parent to the world, or make it a static model")
         return self._jointed(name, kind, child, shapes, mass)
 
-    def _mass(self, own: list[str]) -> float | None:
+    def mass(self, own: list[str]) -> float | None:
         """Of links that are one, or None where they say none."""
         given = [each for name in own if (each := self.links[name].find("inertial")) is not None]
         masses = [self._least(each, "mass") for each in given if each.find("mass") is not None]
@@ -227,7 +254,8 @@ class _Model:
         pose = element.find("pose")
         return "" if pose is None else pose.get("relative_to", pose.get("frame", ""))
 
-    def _shapes(self, link: str) -> list[Shape]:
+    def shapes(self, link: str) -> list[Shape]:
+        """What collides of a link, in the scene."""
         found = []
         for element in self.links[link].findall("collision"):
             if self._relative(element):

@@ -33,6 +33,7 @@ MOST_TRIANGLES, THINNED_BY = 40_000, 2e-6
 _SAME = 1e-6  # of the size: vertices that are nearer are one
 _CHANGED = 0.01
 _FLAT = 1e-12  # of the size cubed: a body of less volume is flat
+_LOST = 1e-4  # of the volume, between a mesh and its solid, is told; manifold3d merges what is thin as a rounding error
 Faces = NDArray[np.int64]
 
 
@@ -248,6 +249,9 @@ def _united(vertices: Float, faces: Faces, path: Path) -> tuple[Any, tuple[str, 
     voids = [_checked(vertices, body[:, ::-1], path) for body, v in zip(bodies, volumes, strict=True) if v < -flat]
     if not full:
         raise InputError(path, "has no volume", "export a solid body, not a surface")
+    whole = sum(each for each in volumes if each > flat)
+    if abs(lost := 1.0 - sum(each.volume() for each in full) / whole) > _LOST:
+        notes.append(f"the volume of {path.name} is off by {100.0 * abs(lost):.2g} %: it touches itself along an edge")
     solid = united(full)
     if len(full) > 1:
         lost = 1.0 - solid.volume() / sum(each for each in volumes if each > 0.0)
@@ -275,9 +279,15 @@ def _volume(vertices: Float, faces: Faces) -> float:
 
 def _checked(vertices: Float, faces: Faces, path: Path) -> Any:
     used, faces = np.unique(faces, return_inverse=True)
-    solid = solid_of(vertices[used], faces.reshape(-1, 3))
+    faces = faces.reshape(-1, 3)
+    solid = solid_of(vertices[used], faces)
     if solid.status().name != "NoError" or solid.is_empty():
         raise InputError(path, f"is no solid ({solid.status().name})", "repair it where it was drawn")
+    lost = 1.0 - solid.volume() / _volume(vertices[used], faces)
+    if abs(lost) > _CHANGED:
+        off = f"its volume is off by {100.0 * abs(lost):.2g} %"
+        what = f"cannot be made a solid: {off} where it touches itself along an edge"
+        raise InputError(path, what, "let its bodies overlap or stay apart where it was drawn")
     return solid
 
 

@@ -8,7 +8,7 @@ import trimesh
 from skillframe.errors import InputError
 from skillframe.parts.load import load
 from skillframe.parts.mended import edges_of, mended
-from skillframe.parts.solid import arrays_of, read_part
+from skillframe.parts.solid import arrays_of, read_part, united
 from skillframe.parts.world import PartsParams, build_world
 from tests.bad_meshes import binary_stl, cube, joined, pin, plug, quads
 from tests.part_meshes import FILE, box, round_pair, write
@@ -175,3 +175,20 @@ def test_where_a_part_lies_is_where_its_mended_places_are(pair):
     )
     assert load(pair(finned(0.05, -12.0), "moved", everything)).contact_error == pytest.approx(0.05 * MM, abs=1e-6)
     assert load(pair(finned(0.5), "moved far", everything)).contact_error < 1e-6
+
+
+def test_no_volume_is_lost_unsaid_where_bodies_touch_along_an_edge(tmp_path):
+    """A cup of five boxes whose floor is turned by 90 degrees of eight digits: slivers, an edge of four triangles."""
+    walls = [box((-8, 0, -8), (-4.2, 15, 8)), box((4.2, 0, -8), (8, 15, 8)),
+             box((-4.2, 0, -8), (4.2, 15, -4.2)), box((-4.2, 0, 4.2), (4.2, 15, 8))]  # fmt: skip
+    floor = box((-2, -8, -8), (2, 8, 8)).rotate([0.0, 0.0, np.degrees(1.5707963)]).translate([0.0, -2.0, 0.0])
+    cup = united([*walls, floor])
+    vertices, faces = arrays_of(cup)
+    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices] + [f"f {a} {b} {c}" for a, b, c in faces + 1]
+    (tmp_path / "cup.obj").write_text("\n".join(lines))
+    try:
+        found, said = read_part(tmp_path / "cup.obj", "mm").solid.volume(), ""
+    except InputError as error:
+        found, said = None, str(error)
+    volume = 1e-9 * (15 * (16**2 - 8.4**2) + 4 * 16**2)
+    assert "is off by 6.1 % where it touches itself along an edge" in said or found == pytest.approx(volume, rel=1e-4)

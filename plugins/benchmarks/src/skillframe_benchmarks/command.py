@@ -1,4 +1,4 @@
-"""`skillframe benchmark automate`: the hundred assemblies of AutoMate, from the user's copy of their meshes."""
+"""`skillframe benchmark`: the hundred assemblies of AutoMate, and insertions of 100 points, from the user's copies."""
 
 from __future__ import annotations
 
@@ -76,6 +76,41 @@ def automate(
     jobs = [AssemblyJob(pair=pair, folder=(out / pair.name).resolve(), plan=plan) for pair in found]
     with terminable() as code:
         return _run(jobs, out, workers or os.cpu_count() or 1, as_json, code)
+
+
+@command.command()
+@click.argument("folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
+@click.option("--out", type=click.Path(path_type=Path), default=Path("insertion"), show_default=True,
+              help="Folder for a world each.")  # fmt: skip
+def insertion(folder: Path, out: Path) -> int:
+    """Worlds of the AI for Industry Challenge: its plugs and ports of boxes, for --score insertion_points.
+
+    FOLDER is a checkout of intrinsic-dev/aic, or its aic_assets/models. Says what is found in each pair, or why it is
+    refused. Exit code 2 where all are.
+
+    \b
+    Example:
+      skillframe benchmark insertion aic --out insertion
+      skillframe run sc.skill.json --world insertion/sc/fixture.toml --coc tip --score insertion_points
+    """
+    from skillframe.errors import SkillframeError
+    from skillframe.parts.found import lines
+    from skillframe.parts.load import load
+    from skillframe_benchmarks.boxes import INSERTIONS, write
+
+    refused = []
+    for name in INSERTIONS:
+        try:
+            path, height = write(folder, name, out)
+            said = lines(load(path))
+        except SkillframeError as error:
+            refused.append(f"{name} is refused: {error}")
+            continue
+        where = f"{1000.0 * abs(height):.2g} mm {'below' if height < 0.0 else 'above'} its published place"
+        click.echo("\n".join([f"{path} written, the plug at rest {where}", *said]))
+    for sentence in refused:
+        click.echo(sentence, err=True)
+    return 2 if len(refused) == len(INSERTIONS) else 0
 
 
 def _chosen(what: str, given: Sequence[str], known: Sequence[str]) -> tuple[str, ...]:
