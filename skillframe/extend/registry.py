@@ -22,7 +22,7 @@ from skillframe.extend import hookspecs
 from skillframe.extend.contract import ATTRIBUTE, GROUP, contract_problem, requirement_problem
 from skillframe.extend.discovery import installed
 from skillframe.extend.homes import where_to_get
-from skillframe.extend.part_worlds import FILE_ENDING, world_of_file
+from skillframe.extend.part_worlds import FILE_ENDING, refuse_part, world_of_file
 from skillframe.extend.plugin import KINDS as KINDS
 from skillframe.extend.plugin import RECORDS as RECORDS
 from skillframe.extend.plugin import BadPlugin as BadPlugin
@@ -172,6 +172,7 @@ class Registry:
         """
         if name.endswith(FILE_ENDING):
             return world_of_file(name)
+        refuse_part(name)
         record: WorldType = self._get("world", name)
         return record
 

@@ -21,8 +21,8 @@ SHARE = 0.25
 """Largest contact error, as a share of the clearance."""
 THIN = 2e-4
 """Least thickness of a wall [m]; ours: contacts sink by some 0.06 mm, and out the other side beyond half of a wall."""
-HEAVY = 1.5
-"""Mass of a part that is asked about [kg]."""
+HEAVY, HEAVIEST = 1.5, 100.0
+"""Mass of a part that is asked about, and that no robot here holds [kg]."""
 _ROUND = np.radians(30.0)
 _BESIDE = 1e-3
 

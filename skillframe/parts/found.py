@@ -89,7 +89,7 @@ def lines(loaded: LoadedParts) -> list[str]:
         f"clearance along the way {play:.3g} mm (median; least {least:.3g} mm)",
         f"contact by {_contact(loaded)}; contact error {1e6 * loaded.contact_error:.2g} um "
         f"(at most {1e6 * SHARE * found.clearance:.3g} um is let pass)",
-        f"{plug} weighs {1000.0 * loaded.mass:.3g} g",
+        f"{plug} weighs " + (f"{1000.0 * loaded.mass:.3g} g" if loaded.mass < 1.0 else f"{loaded.mass:.3g} kg"),
         *(f"note: {note}" for note in loaded.notes),
     ]  # fmt: skip
 

@@ -12,6 +12,7 @@ import numpy as np
 from skillframe.errors import InputError
 from skillframe.frames import Float
 from skillframe.parts.checks import (
+    HEAVIEST,
     HEAVY,
     SHARE,
     around,
@@ -129,6 +130,7 @@ def _load(path: Path, hashes: Mapping[str, str]) -> LoadedParts:
     socket = read_part(path.parent / file.fixture.mesh, file.fixture.units)
     check_two(plug, socket)
     found = fit(plug, socket, file)
+    mass, center, inertia, notes = _inertia(found, plug, file)
     check_clearance(found)
     reach = np.reshape(_reach(found).bounding_box(), (2, 3))
     errors = [mend_error(plug, file.tool.assembled, found, reach), mend_error(socket, file.fixture.pose, found, reach)]
@@ -138,7 +140,6 @@ def _load(path: Path, hashes: Mapping[str, str]) -> LoadedParts:
         side._replace(error=side.error + error)
         for side, error in zip(_prepared(plug, socket, found), errors, strict=True)
     )
-    mass, center, inertia, notes = _inertia(found, plug, file)
     return LoadedParts(
         name_of(path), file, found, held, standing, mass, center, inertia, _starts(found, file),
         (*plug.notes, *socket.notes, *notes, *around(found, plug, socket)), hashes,
@@ -210,6 +211,9 @@ def _inertia(found: PartsFit, plug: MeshPart, file: FixtureFile) -> tuple[float,
     mass = float(mesh.volume) * density if file.tool.mass is None else file.tool.mass
     inertia = np.diag(mesh.moment_inertia) * (mass / float(mesh.volume))
     notes = []
+    if mass > HEAVIEST:
+        what = f"is {plug.size:.2g} m long and weighs {mass:.3g} kg at {density:g} kg/m3"
+        raise InputError(plug.name, what, "check its units, or give mass")
     if file.tool.mass is None and mass > HEAVY:
         notes.append(f"{plug.name} weighs {mass:.2g} kg at {density:g} kg/m3; a hollow part? give mass")
     return mass, np.asarray(mesh.center_mass) + np.array([0.0, 0.0, found.depth]), inertia, tuple(notes)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from skillframe.errors import UnknownName
+from skillframe.errors import InputError, UnknownName
 from skillframe.extend.registry import KINDS, RECORDS, PluginConflict, load_registry
 
 GOOD = """
@@ -243,3 +243,12 @@ def test_a_plugin_installed_with_pip_is_found_and_leaves_when_uninstalled(tmp_pa
     environment["PYTHONPATH"] = str(Path(tmp_path) / "nowhere")
     gone = subprocess.run([sys.executable, "-c", ask], env=environment, capture_output=True, text=True, check=False)
     assert "UnknownName" in gone.stderr
+
+
+def test_a_part_that_is_named_as_a_world_says_how_it_becomes_one():
+    known = load_registry()
+    for name in ("plug.stl", "folder/PLUG.STEP", "scene.xml"):
+        with pytest.raises(InputError, match="is a part, not a world; make one of two parts, skillframe worlds new"):
+            known.world(name)
+    with pytest.raises(UnknownName):
+        known.world("peg.in.hole")

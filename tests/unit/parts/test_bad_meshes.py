@@ -238,6 +238,7 @@ def test_a_line_break_in_a_name_does_not_break_the_fixture_file(folder, capsys):
 
 
 PIN, HOLE = round_pair()
+BLOCK = box((-18, -18, -30), (18, 18, 0))
 PAIRS = {
     # held, standing, more arguments, words of the sentence
     "a plug thicker than its hole": (rod(6.0, -12, 8), HOLE, (), "overlap by 0.57 mm"),
@@ -253,6 +254,7 @@ PAIRS = {
     "an axis of nothing": (PIN, HOLE, ("--axis", "[0, 0, 0]"), "is no direction"),
     "an axis that is TOML": (PIN, HOLE, ("--axis", "[0, 0, -1]\nfriction = 3"), "is no direction"),
     "no folder": (PIN, HOLE, ("--out", "none/fixture.toml"), "there is no folder none"),
+    "inches": (rod(9.95, -24, 40), BLOCK - rod(10, -24, 1), ("--units", "in"), "kg at 2700 kg/m3; check its units"),
     "units of another world": (PIN, HOLE, ("--units", "furlong"), "unknown value 'furlong'"),
 }  # fmt: skip
 
