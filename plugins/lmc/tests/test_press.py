@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from skillframe_lmc import intervals
 from skillframe_lmc.describe import describe
 from skillframe_lmc.intervals import track
 from skillframe_lmc.learner import learn
-from skillframe_lmc.press import presses
+from skillframe_lmc.press import Press, presses
 from skillframe_lmc.settings import Settings
 from synthetic import valley
 
@@ -98,6 +99,51 @@ def test_a_press_is_a_push_and_no_limpness_along_it(case: str, count: int) -> No
         along = [abs(np.array(axis) @ unit(np.array(true))) for axis in part["compliant_axes"]]
         assert not part["fully_compliant"]
         assert max(along, default=0.0) < np.sin(np.radians(45.0))
+
+
+def found_in(d: Demonstration) -> Press:
+    """What its standing force and its way say."""
+    here = np.zeros(3)
+    blocks = track(d, here, here, "base")
+    (result,) = presses([blocks], [intervals.translation(blocks, Settings())]) or []
+    return result
+
+
+def test_way_and_standing_force_together_are_nearer_than_either() -> None:
+    down = np.array([0.0, 0.0, -1.0])
+    each = [found_in(press(2000 + seed)) for seed in range(40)]
+    assert all(p.in_air for p in each)
+    way, force, both = (
+        float(np.sqrt(np.mean([np.degrees(np.arccos(v @ down)) ** 2 for v in vectors])))
+        for vectors in ([p.way for p in each], [unit(p.votes.mean(axis=0)) for p in each], [p.push for p in each])
+    )
+    # two axes of 5 degrees for the force; 7 degrees over 3 s with 0.5 s of memory leave 7 sqrt(1 / 3.5) = 3.7 an axis
+    # for the way, and the inverse variances add up: 3.0. 40 seeds scatter by 11 %.
+    assert force == pytest.approx(np.sqrt(2.0) * 5.0, rel=0.33)
+    assert way == pytest.approx(np.sqrt(2.0) * 3.7, rel=0.33)
+    assert both == pytest.approx(np.sqrt(2.0) * 3.0, rel=0.33)
+    assert both < min(way, force)
+
+
+def test_where_nothing_was_met_on_the_way_both_decide_and_it_is_said() -> None:
+    part = translation(learn([press(3)], LearnOptions()))
+    assert re.match(r"nothing was met on the way, so the push is that of the way \(\d+ %", part["evidence"]["message"])
+    assert part["desired_direction"] == pytest.approx(found_in(press(3)).push.tolist())
+    assert part["compliant_axes"] == []
+
+
+def test_a_way_with_friction_or_a_bend_is_not_mixed_in_or_counts_little() -> None:
+    rubbed = press(0, residual=0.3)
+    moving = np.arange(len(rubbed.time)) < int(0.24 / SPEED * RATE)
+    sliding = rubbed.wrench + np.outer(moving, [8.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert not found_in(replace(rubbed, wrench=sliding)).in_air
+    d = press(5, aim=0.0)
+    bent = d.position.copy()
+    bent[:, 0] += np.minimum(0.08, 0.08 * np.arange(len(bent)) / (0.5 * 0.24 / SPEED * RATE))
+    p = found_in(replace(d, position=bent))
+    force = unit(p.votes.mean(axis=0))
+    # half of the way runs 30 degrees aside: the scatter of its headings takes the weight off it
+    assert np.arccos(p.push @ force) < 0.5 * np.arccos(p.push @ p.way)
 
 
 def undecided(count: int) -> list[list[Demonstration]]:

@@ -14,6 +14,7 @@ import numpy as np
 from skillframe.frames import Float, norm, unit
 from skillframe_lmc.directions import Choice, choose
 from skillframe_lmc.intervals import Motion
+from skillframe_lmc.press import LEANING
 from skillframe_lmc.sectors import sectors
 from skillframe_lmc.settings import Settings
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 OPEN_HALF_WIDTH = radians(20.0)
 ONE_SIDED = 0.8  # |sum| / sum of |.| of the sideways means: 1 if all lean the same way, 0 if they balance
-LEANING = 0.15  # a sideways mean below this is wandering
+SIDEWAYS = 0.15  # a sideways mean below this is wandering
 MOST_DRAWN = 30
 ONE_WAY, CONTRADICTS = radians(10.0), radians(20.0)  # mean ways this near each other; a push this far from them all
 
@@ -55,7 +56,7 @@ def is_ambiguous(part: Learned) -> bool:
         return False
     sideways = part.means - (part.means @ choice.direction)[:, None] * choice.direction
     lean = norm(sideways)
-    return bool(lean.max() >= LEANING and norm(sideways.sum(axis=0)) > ONE_SIDED * lean.sum())
+    return bool(lean.max() >= SIDEWAYS and norm(sideways.sum(axis=0)) > ONE_SIDED * lean.sum())
 
 
 def _message(part: Learned, settings: Settings, open_direction: bool) -> str:
@@ -71,8 +72,14 @@ def _message(part: Learned, settings: Settings, open_direction: bool) -> str:
 
 
 def _press_message(part: Learned) -> str:
-    """That the standing force decided, and not the way to it."""
+    """That the standing force decided, alone or together with the way to it."""
     force, seconds = np.median([p.force for p in part.pressed]), np.median([p.seconds for p in part.pressed])
+    if all(p.in_air for p in part.pressed):
+        share = np.mean([LEANING**2 / (LEANING**2 + p.error**2) for p in part.pressed])
+        return (
+            f"nothing was met on the way, so the push is that of the way ({100.0 * share:.0f} % of the weight) and of "
+            f"the {force:.0f} N under which the tool stood for {seconds:.1f} s"
+        )
     return (
         f"the way there gives no direction: the push is that of the {force:.0f} N under which the tool stood for "
         f"{seconds:.1f} s"

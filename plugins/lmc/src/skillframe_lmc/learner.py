@@ -128,7 +128,7 @@ def _learn_part(
             choice = choose(given, settings, heading(moving, turned and name == "translation"))
             modes = _modes(moving, choice) if settings.contact_modes and not turned else []
             choice = choose(modes, settings) if modes else choice
-    stood = _standing(name, tracks, motions, moving, settings) if choice is None or choice.direction is None else None
+    stood = _standing(name, tracks, motions, moving, choice, settings)
     if stood is not None:
         done, given, choice = stood.work, [p.sectors for p in stood.presses], stood.choice
     if done is not None and not done.environment_drove:
@@ -163,9 +163,12 @@ class _Standing(NamedTuple):
 
 
 def _standing(
-    name: Name, tracks: Sequence[Track], motions: Sequence[Motion], moving: Sequence[Motion], settings: Settings
-) -> _Standing | None:
-    """What the standing force says where the motion alone gives no direction, or None unless all were pressed.
+    name: Name, tracks: Sequence[Track], motions: Sequence[Motion], moving: Sequence[Motion], moved: Choice | None,
+    settings: Settings,
+) -> _Standing | None:  # fmt: skip
+    """What the standing force says, or None unless all were pressed.
+
+    It is asked where the motion alone gives no direction (`moved`), or where nothing was met on the way.
 
     Raises:
         InputError: they were pressed along their way, and no push explains it: what is left is a skill that gives way
@@ -173,8 +176,9 @@ def _standing(
     """
     if name == "rotation" or len(moving) != len(motions) or (found := presses(tracks, motions)) is None:
         return None
+    in_air = all(p.in_air for p in found)
     done = work([p.motion for p in found])
-    if done.environment_drove:
+    if done.environment_drove or not (in_air or moved is None or moved.direction is None):
         return None
     choice = choose([p.sectors for p in found], settings, heading(moving))
     if choice.direction is None:
@@ -184,6 +188,8 @@ def _standing(
             f"push explains it (the hand would have been off by {np.degrees(choice.pyramid_angle):.0f} degrees)",
             "cut the recordings into phases (skillframe segment), or demonstrate the press the same way each time",
         )  # fmt: skip
+    if in_air:
+        choice = choice._replace(direction=unit(np.mean([p.push for p in found], axis=0)))
     return _Standing(found, done, choice)
 
 
