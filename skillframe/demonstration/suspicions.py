@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from skillframe.demonstration.attitude_doubts import tared, w_first
 from skillframe.demonstration.checks import GAP
 from skillframe.demonstration.columns import WRENCH
 from skillframe.demonstration.contradiction import WORK_COSINE, Turning, weight_evidence, work_cosine
@@ -183,5 +184,5 @@ def frame_and_sign(d: Demonstration) -> Iterator[str]:
 
 
 AUDITS: Sequence[Suspicion] = (
-    clock, quaternions, motion, held_pose, channels, magnitudes, spikes, frame_and_sign,
+    clock, quaternions, w_first, motion, held_pose, channels, magnitudes, spikes, frame_and_sign, tared,
 )  # fmt: skip

@@ -2,8 +2,8 @@
 
 An edit of a stretch is *found* if a stall or fault of its kind covers it to 0.05 s at both ends, *partly* if one of
 its kind touches it, *missed* else. Edits of the whole are found if the audit gives a warning of their kind that it
-does not give of the sound recording, or reading refuses the file. A *false alarm* is a stall, a fault or a difference
-of clocks that a sound recording is said to have.
+does not give of the sound recording, or reading refuses the file. A *false alarm* is a stall, a fault, a difference
+of clocks, another order of the quaternion or a tared weight that a sound recording is said to have.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ def drawn(first: int, *names: str) -> list[np.random.Generator]:
 def alarms(d: Demonstration) -> list[str]:
     """What a sound recording is said to have."""
     found = audit(d)
-    late = [t for t in found.warnings if t.startswith("clocks:")]
+    late = [t for t in found.warnings if t.startswith(("clocks:", "quaternion:", "weight:"))]
     return [*(f"stall {s}" for s in found.stalls), *(f"{f['kind']} {f}" for f in found.faults), *late]
 
 
