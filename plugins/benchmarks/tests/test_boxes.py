@@ -7,6 +7,7 @@ from skillframe_benchmarks.boxes import write
 from skillframe.cli.main import run
 from skillframe.errors import InputError
 from skillframe.parts.load import load
+from skillframe.parts.solid import arrays_of
 
 SHAPE = "<collision name='c'><pose>{pose}</pose><geometry>{shape}</geometry></collision>"
 MODEL = """\
@@ -57,6 +58,13 @@ def test_boxes_become_a_world_in_which_the_tip_is_home_in_the_ports_frame(tmp_pa
     assert loaded.fit.clearance == pytest.approx(0.0002, abs=1e-7) and loaded.mass == 0.04
     assert np.allclose(loaded.fit.plug.volume(), 0.02 * 0.008**2, rtol=1e-6) and loaded.backend == "pieces"
     assert loaded.fit.socket.volume() == pytest.approx((0.016**2 - 0.0084**2) * 0.015 + 0.016**2 * 0.004, rel=1e-6)
+
+
+def test_faces_that_meet_but_for_the_digits_of_an_angle_are_one_face(tmp_path):
+    """The floor's angle has seven digits: its corners lie 3 nm beside the walls', which would be cut apart there."""
+    published(tmp_path)
+    vertices, _ = arrays_of(load(write(tmp_path, "sc", tmp_path / "out").path).fit.socket)
+    assert len(np.unique(np.round(vertices[:, 2], 12))) == 3  # below the floor, above it, and the mouth
 
 
 def test_a_plug_whose_boxes_reach_into_the_port_is_raised_until_they_touch(tmp_path):
