@@ -61,6 +61,7 @@ def test_a_pin_has_its_size_whatever_its_unit_and_its_facets_keep_the_tolerance(
     assert part.notes == ("plug.step was cut into triangles within 5 um of what was drawn",)
 
 
+@pytest.mark.slow
 @needs_step
 def test_two_drawings_become_a_world_whose_contact_error_has_the_tolerance(tmp_path, capsys):
     written(tmp_path, pin(5.0, -12.0, 8.0))
@@ -85,6 +86,7 @@ def test_a_drawing_that_lacks_what_it_goes_by_is_refused(tmp_path):
     assert "goes by #9, which is not in it" in said(written(tmp_path, text.replace("\n#9=", "\n#9")))
 
 
+@pytest.mark.slow
 @needs_step
 def test_a_drawing_that_makes_no_body_is_one_sentence(tmp_path, capfd):
     text = pin(5.0, -12.0, 8.0).replace("'part'", "'part #99999'")

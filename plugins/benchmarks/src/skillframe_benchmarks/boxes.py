@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from skillframe.errors import InputError
 from skillframe.files import write_whole
@@ -166,7 +165,7 @@ def _sdf(model: str, shapes: Sequence[Shape]) -> str:
     link = ET.SubElement(drawn, "link", name=model)
     for number, shape in enumerate(shapes):
         each = ET.SubElement(link, "collision", name=f"{shape.kind}_{number}")
-        pose = [*shape.origin, *pin.rpy.matrixToRpy(shape.rotation)]
+        pose = [*shape.origin, *_rpy(shape.rotation)]
         ET.SubElement(each, "pose").text = " ".join(repr(float(x)) for x in pose)
         keys = {"size": shape.size} if shape.kind == "box" else dict(zip(("radius", "length"), shape.size, strict=True))
         kind = ET.SubElement(ET.SubElement(each, "geometry"), shape.kind)
@@ -174,3 +173,10 @@ def _sdf(model: str, shapes: Sequence[Shape]) -> str:
             ET.SubElement(kind, key).text = " ".join(repr(float(x)) for x in np.atleast_1d(value))
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _rpy(rotation: Float) -> tuple[float, float, float]:
+    """Roll, pitch and yaw about fixed x, y, z. Yaw is taken off first: roll is known where pitch is 90 degrees."""
+    yaw = float(np.arctan2(rotation[1, 0], rotation[0, 0]))
+    left = rotation_matrix(np.array([0.0, 0.0, -yaw])) @ rotation
+    return float(np.arctan2(-left[1, 2], left[1, 1])), float(np.arctan2(-left[2, 0], left[0, 0])), yaw
