@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 UNITS: tuple[tuple[str, str, float], ...] = (
-    ("scale", "", 1.0),
+    ("scale|frozen|zero|stuck|runaway|loss", "", 1.0),
     ("torque|joint_friction", "Nm", 1.0),
     ("force", "N", 1.0),
     ("stiffness", "N/m", 1.0),

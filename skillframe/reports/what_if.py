@@ -85,7 +85,7 @@ def what_if(results: Results, limits: Sequence[Region]) -> Markup:
         parts += [
             tag("h4", f"{label[0].upper()}{label[1:]}"),
             tag("p", *_apart(words)),
-            tag("div", *curves, class_="grid"),
+            tag("div", *curves, class_="grid three"),
         ]
     if left_out := influence(results)[MOST:]:
         parts.append(note(f"Less telling and not drawn: {', '.join(quantity(name).label for name in left_out)}."))

@@ -6,7 +6,7 @@ import typing
 from pathlib import Path
 
 from skillframe.campaign.rows import columns
-from skillframe.campaign.spec import CampaignSpec
+from skillframe.campaign.spec import CampaignSpec, RaceKeys
 from skillframe.robot.spec import RobotFile
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "reference" / "files.md").read_text(encoding="utf-8")
@@ -39,5 +39,7 @@ def test_every_table_of_robot_toml_is_on_the_page_in_detail():
 
 
 def test_every_column_of_results_is_on_the_page_in_its_order():
-    spec = CampaignSpec(name="n", seed=1, trials=1, robot="r", world="w", skills=("a.json",), scores=("NAME",))
+    spec = CampaignSpec(
+        name="n", seed=1, trials=1, robot="r", world="w", skills=("a.json", "b.json"), scores=("NAME",), race=RaceKeys()
+    )
     assert first_cells("results.csv") == columns(spec, [{"second.NAME": 0.0}])
