@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from skillframe.campaign.axes import Axis
+from skillframe.campaign.claims.real import is_real
 from skillframe.campaign.folder import Describe, prepare
 from skillframe.campaign.replay import pick_label
 from skillframe.campaign.spec import CampaignSpec, Expect, Stop
@@ -151,6 +152,11 @@ def read_question(folder: Path) -> Question:
         InputError: not such a folder, or damaged.
     """
     path = folder / QUESTION
+    if is_real(folder):
+        raise InputError(
+            folder, "holds real trials, and where they are run is not skillframe's to choose",
+            f"look at their interval, valid at every look: skillframe report {folder} --out page.html",
+        )  # fmt: skip
     if not path.is_file():
         raise InputError(folder, "asks no question", FIX)
     content = read_json(path, FIX)

@@ -107,6 +107,9 @@ def test_no_campaign_takes_real_trials_and_no_claim_is_written_over_trials_that_
     two_skills(tmp_path / "bench")
     assert run(["campaign", "certify", str(tmp_path / "bench")]) == 2
     assert "a claim has to be written before the trials" in capsys.readouterr().err
+    for question in ("map", "break", "matter"):
+        assert run(["campaign", question, str(tmp_path / "bench")]) == 2
+        assert "holds real trials, and where they are run is not skillframe's to choose" in capsys.readouterr().err
     (tmp_path / "campaign.toml").write_text("")
     assert enter(tmp_path, "--skill", "a", "--success") == 2
     assert "whose trials are simulated" in capsys.readouterr().err
