@@ -1,7 +1,7 @@
 """HDF5 recordings: robomimic and robosuite (`data/demo_0/obs/...`), REASSEMBLE and others, as named arrays.
 
-Read through h5py, the extra `hdf5`. Where a group `data` holds groups of one recording each, `--episode` names the one.
-Images are never loaded.
+Read through h5py, the extra `hdf5`. Files that `robomimic` wrote are read without `--columns`. Where a group `data`
+holds groups of one recording each, `--episode` names the one. Images are never loaded.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Any
 from skillframe.demonstration.arrays import WIDEST, read_as_table, table_of
 from skillframe.demonstration.foreign import Arrays, foreign, refuse_no_file
 from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration.robomimic import metadata_of, read_own
 from skillframe.demonstration.table import Table
 from skillframe.errors import InputError, UnknownName, extras_named
 
@@ -31,7 +32,17 @@ def read_hdf5(path: Path, options: Mapping[str, Any]) -> Demonstration:
         MissingDependency: h5py is not installed.
     """
     notes = list[str]()
-    return read_as_table(path, options, hdf5_table(path, options, notes), notes)
+    table = hdf5_table(path, options, notes)
+    if options.get("columns") is None and (meta := _own_metadata(path, options)) is not None:
+        return read_own(table, meta, options)
+    return read_as_table(path, options, table, notes)
+
+
+def _own_metadata(path: Path, options: Mapping[str, Any]) -> dict[str, Any] | None:
+    import h5py
+
+    with foreign(path, "HDF5"), h5py.File(path, "r") as file:
+        return metadata_of(path, _episode(path, file, options.get("episode")))
 
 
 def hdf5_table(path: Path, options: Mapping[str, Any], notes: list[str] | None = None) -> Table:

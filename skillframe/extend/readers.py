@@ -79,6 +79,7 @@ def reader_types(tool_poses: ToolPoses) -> Iterable[ReaderType]:
     yield ReaderType(
         name="hdf5", summary="HDF5: robomimic, robosuite, REASSEMBLE and others, with --columns",
         suffixes=(".h5", ".hdf5"), read=_reader("hdf5", "read_hdf5"), table=_table("hdf5", "hdf5_table"),
+        write=_writer("robomimic", "write_robomimic"),
     )  # fmt: skip
     yield ReaderType(
         name="parquet", summary="parquet files and folders of LeRobot data sets, with --columns and --episode",

@@ -1,0 +1,176 @@
+"""A skill's border, boxes and breaking point by the campaign's commands, beside Sobol, grid and random trials.
+
+    python -m tests.figures.searched peg --out FOLDER --trials 1000
+
+Each step is a command, timed in processor seconds, and kept: the same line goes on where it was ended. Beside: as many
+trials as the border took, by Sobol points, a grid and at random. From each the same surrogate predicts 512 fresh
+random trials. What breaks the skill is the nearest failure to what is nominal, of the ranges' half widths.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import shutil
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from skillframe.campaign.claims.surrogate import Surrogate
+from skillframe.cli.main import run
+
+HELD_OUT = 512
+
+
+class Asked(NamedTuple):
+    """A world, how its skill is run, and its ranges with what is nominal in them."""
+
+    world: str
+    setting: str
+    duration_s: float
+    ranges: dict[str, tuple[float, float]]
+    nominal: tuple[float, ...]
+
+
+ASKED = {
+    "peg": Asked("peg_in_hole", 'coc = "tip"', 10.0, {
+        "start.tilt_x": (-0.16, 0.16), "start.tilt_y": (-0.16, 0.16), "world.friction": (0.05, 0.5),
+    }, (0.0, 0.0, 0.1)),
+    "valley": Asked("valley", "", 6.0, {
+        "fixture.offset_x": (-0.03, 0.06), "fixture.tilt_y": (-0.9, 0.9),
+    }, (0.0, 0.0)),
+}  # fmt: skip
+
+
+def taught(asked: Asked, folder: Path) -> None:
+    """Two demonstrations of a simulated person, and the skill learned from them."""
+    demonstration = ["demonstration", "record", "--world", asked.world, "--count", "2", "--seed", "1"]
+    assert run([*demonstration, "--out", str(folder / "d.npz")]) == 0
+    shown = [str(folder / f"d{i}.npz") for i in (1, 2)]
+    assert run(["learn", *shown, "--out", str(folder / "learned.skill.json")]) == 0
+
+
+def campaign(
+    asked: Asked, folder: Path, name: str, trials: int, seed: int, axis: Callable[[float, float], str]
+) -> Path:
+    """A campaign file over the ranges, each an axis in the words of `axis`."""
+    lines = [f'"{key}" = {axis(low, high)}' for key, (low, high) in asked.ranges.items()]
+    head = (
+        f'world = "{asked.world}"\nrobot = "panda"\ntrials = {trials}\nseed = {seed}\nskills = ["learned.skill.json"]'
+    )
+    path = folder / f"{name}.toml"
+    path.write_text(f"{head}\n{asked.setting}\nduration_s = {asked.duration_s}\n[vary]\n" + "\n".join(lines) + "\n")
+    return path
+
+
+def uniform(low: float, high: float) -> str:
+    return f"{{ uniform = [{low}, {high}] }}"
+
+
+def sobol(low: float, high: float) -> str:
+    return f"{{ sobol = [{low}, {high}] }}"
+
+
+def rows_of(asked: Asked, *tables: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, d), each range from -1 to 1, and success (n,)."""
+    rows = [row for table in tables for row in csv.DictReader(table.read_text().splitlines())]
+    low, high = np.array(list(asked.ranges.values())).T
+    points = np.array([[float(row[key]) for key in asked.ranges] for row in rows])
+    return 2.0 * (points - low) / (high - low) - 1.0, np.array([row["success"] == "1" for row in rows])
+
+
+def timed(folder: Path, name: str, command: Sequence[str]) -> float:
+    """Processor seconds of a command, run once and kept."""
+    kept = folder / f"{name}.seconds"
+    if not kept.exists():
+        began = time.process_time()
+        assert run(command) in (0, 1), command
+        kept.write_text(f"{time.process_time() - began:.1f}")
+    return float(kept.read_text())
+
+
+def told(name: str, *figures: object) -> None:
+    print("| " + " | ".join(map(str, (name, *figures))) + " |", flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("task", choices=ASKED)
+    parser.add_argument("--out", type=Path, required=True)
+    chosen = parser.parse_args()
+    asked, folder = ASKED[chosen.task], chosen.out
+    folder.mkdir(parents=True, exist_ok=True)
+    if not (folder / "learned.skill.json").exists():
+        taught(asked, folder)
+    seconds = timed(folder, "fresh", ["campaign", "run", str(campaign(asked, folder, "fresh", HELD_OUT, 77, uniform)),
+                                      "--out", str(folder / "fresh"), "--traces", "0"])  # fmt: skip
+    points, works = rows_of(asked, folder / "fresh" / "results.csv")
+    told("fresh, at random", HELD_OUT, f"{works.mean():.3f} succeed", f"{seconds:.0f} s")
+
+    border = folder / "border"
+    go_on = (
+        [str(border)]
+        if border.exists()
+        else [str(campaign(asked, folder, "border", 1, 9, uniform)), "--out", str(border)]
+    )
+    seconds = timed(folder, "map", ["campaign", "map", *go_on])
+    seen = rows_of(asked, border / "look" / "results.csv", *sorted(border.glob("border/*/results.csv")))
+    count = len(seen[1])
+    nominal = rows_nominal(asked)
+    predicted("campaign map", seen, (points, works), nominal, seconds)
+    beside = {"Sobol": (count, sobol), "random": (count, uniform)}
+    side = round(count ** (1.0 / len(asked.ranges)))
+    beside["grid"] = (side ** len(asked.ranges), lambda low, high: grid(low, high, side))
+    for name, (trials, axis) in beside.items():
+        path = campaign(asked, folder, name.lower(), trials, 5, axis)
+        out = folder / name.lower()
+        seconds = timed(folder, name.lower(), ["campaign", "run", str(path), "--out", str(out), "--traces", "0"])
+        predicted(name, rows_of(asked, out / "results.csv"), (points, works), nominal, seconds)
+
+    for rate in (0.95, 0.99):
+        claim = folder / f"claim{rate}"
+        if not claim.exists():
+            shutil.copytree(border, claim)
+        seconds = timed(folder, claim.name, ["campaign", "certify", str(claim), "--rate", str(rate)])
+        found = json.loads((claim / "certificate.json").read_text())["predicate"]
+        told(f"certify {rate}", found["certified"], found.get("box"), f"{seconds:.0f} s")
+    seconds = timed(folder, "break", ["campaign", "break", str(border)])
+    told("break", (border / "breaking.json").read_text(), f"{seconds:.0f} s")
+
+
+def grid(low: float, high: float, count: int) -> str:
+    return f"{{ grid = {{ from = {low}, to = {high}, count = {count} }} }}"
+
+
+def rows_nominal(asked: Asked) -> np.ndarray:
+    low, high = np.array(list(asked.ranges.values())).T
+    found: np.ndarray = 2.0 * (np.array(asked.nominal) - low) / (high - low) - 1.0
+    return found
+
+
+def predicted(
+    name: str,
+    seen: tuple[np.ndarray, np.ndarray],
+    fresh: tuple[np.ndarray, np.ndarray],
+    nominal: np.ndarray,
+    cpu: float,
+) -> None:
+    """How many fresh trials the surrogate of some trials gets wrong, and the nearest failure to what is nominal."""
+    (points, works), (there, truth) = seen, fresh
+    wrong = int(((Surrogate(points, works).mean(there) > 0.0) != truth).sum())
+    lost = np.linalg.norm(points[~works] - nominal, axis=1)
+    told(
+        name,
+        len(works),
+        f"{wrong} of {len(truth)} wrong",
+        f"nearest failure {lost.min(initial=np.inf):.3f}",
+        f"{cpu:.0f} s",
+    )
+
+
+if __name__ == "__main__":
+    main()
