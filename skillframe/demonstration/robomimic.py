@@ -13,9 +13,9 @@ The layout is the one that robomimic's data sets have (its documentation, "Datas
       next_obs/...                   the same of the next sample, of the last one its own
       actions                (T, 6)  motion to the next sample: position in 0.05 m, rotation vector (base) in 0.5 rad
       rewards, dones         (T,)    1 at the last sample
-      states                 (T, 1)  0, as the documentation asks of what has no simulator's states
+      states                 (T, 1)  0, as documented for what has no simulator's states
 
-Actions, rewards, dones and the environment in `env_args` (the task's name, type 2, "gym") are our choice. Actions are to
+Actions, rewards, dones and environment in `env_args` (the task's name, type 2, "gym") are our choice. Actions have to
 stay within -1 and 1. Metadata stands in the attribute `skillframe` of `data/demo_0`, so that reading needs no
 `--columns`.
 """
