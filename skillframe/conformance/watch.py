@@ -129,8 +129,11 @@ def _deed(event: str, arguments: tuple[Any, ...]) -> str:
 
 
 def _own(path: Any) -> bool:
-    """What the interpreter itself writes when a module is imported, and the device that takes everything."""
-    return path == os.devnull or "__pycache__" in str(path)
+    """What the interpreter itself writes when a module is imported, and the device that takes everything.
+
+    A number stands for a file that was opened by its path before, and told then.
+    """
+    return isinstance(path, int) or path == os.devnull or "__pycache__" in str(path)
 
 
 def _name(path: Any) -> str:

@@ -71,6 +71,7 @@ def test_the_page_says_what_is_found_in_its_plug(parts):
 
 @pytest.mark.slow
 @pytest.mark.needs_plugins
+@pytest.mark.filterwarnings("ignore:.*spikes")  # a plug that glances off the rim moves on, and counts as damage
 def test_two_meshes_become_a_skill_that_seats_the_part(parts, tmp_path):
     skill = learn(record(parts, count=2, seed=1).save(tmp_path / "demo.npz"))
     once = run(skill, parts, coc="tip", set={"fixture.tilt_y": "1deg"})
