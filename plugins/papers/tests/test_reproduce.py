@@ -291,7 +291,7 @@ def test_a_verdict_is_committed_for_every_row_and_a_changed_one_is_exit_code_1(c
         _end(Outcome([{**entry, "row": "21", "verdict": verdict}], [], [], False), tmp_path, True, True, 130)
         for verdict in (said["21"], "fail")
     )
-    assert set(said.values()) == {"pass", "fail", "reported"} and (same, changed) == (0, 1)
+    assert {"pass", "fail"} <= set(said.values()) <= {"pass", "fail", "reported"} and (same, changed) == (0, 1)
     assert "changed: row 21 is 'fail', the docs say 'pass'" in capsys.readouterr().err
 
 

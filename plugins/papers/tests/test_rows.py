@@ -7,7 +7,7 @@ from math import atan, degrees, radians
 import numpy as np
 import pytest
 from skillframe_papers import bars, committed, document, refresh, store
-from skillframe_papers.rows import crane, followed, lmc, nulls, one_arm, phases, plain_cuts, skills, two_arms
+from skillframe_papers.rows import crane, few, followed, lmc, nulls, one_arm, phases, plain_cuts, skills, two_arms
 from skillframe_papers.rows.insertion import Row, link_weights, raised, sticking
 from skillframe_papers.rows.phases import Taught
 from skillframe_papers.rows.sweep import HEIGHTS_M, NAMES, Sweep
@@ -346,3 +346,26 @@ def test_rows_computed_again_replace_their_own_number_and_leave_the_others(tmp_p
     assert all(rows[each["row"]] == each for each in old if each["row"] != "9")
     assert "row 9: fail, 7 s of processor time" in said[0] and f"all {len(old)} rows" in said[1]
     assert (root / refresh.PAGE).read_text(encoding="utf-8") == document.render(list(rows.values()))
+
+
+@pytest.mark.parametrize(
+    ("three", "ten", "null", "verdict"),
+    [
+        ([18] * 5, [19] * 5, [5] * 5, "pass"),  # 90 of 100 where ten find 95: at least 0.9 of them
+        ([12] * 5, [19] * 5, [5] * 5, "fail"),  # 60 where ten find 95
+        ([17] * 5, [19] * 5, [5] * 5, "reported"),  # 85, below 85.5, which is not excluded
+        ([18] * 5, [19] * 5, [18] * 5, "fail"),  # somebody who does not know teaches as well
+    ],
+)
+def test_few_demonstrations_suffice_where_they_find_what_many_do_and_more_than_chance(three, ten, null, verdict):
+    found = {"from 1": [9] * 5, "from 3": three, "from 10": ten, few.NULL: null}
+    row = few._told(RowRun(settings={}), found, 10, 100)
+    assert row.verdict == verdict
+    assert f"{sum(ten)} from 10" in row.ours and row.ours.endswith(f": {sum(null)}")
+
+
+def test_each_of_the_five_believes_in_a_place_of_his_own_6_mm_away():
+    places = np.array([few.believed(k)[:2] for k in range(few.PEOPLE)])
+    np.testing.assert_allclose(np.linalg.norm(places, axis=1), 0.006)
+    apart = np.linalg.norm(places[:, None] - places[None], axis=-1)[np.triu_indices(few.PEOPLE, 1)]
+    assert apart.min() > 0.005  # more than the 4 mm by which a person is unsure of each axis

@@ -1,0 +1,101 @@
+"""Row 14 of the papers' results: how many blind demonstrations a search needs.
+
+Five people believe that the hole lies 6 mm from where a search starts, each in a direction of his own, and it does.
+Nothing but their demonstrations tells the direction. Searches learned from a few of one person's demonstrations stand
+beside those learned from ten of the same person, on the same goals, planned for 7 s. The null is the same method,
+taught as often by somebody who believes that the hole lies at the start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import cos, pi, sin
+from typing import NamedTuple
+
+import numpy as np
+from skillframe_search.trials import NOBODY_KNEW, Task, demonstrations, document, goals, search
+
+from skillframe.demonstration.record import Demonstration
+from skillframe.extend.records import RowResult, RowRun
+from skillframe.frames import Float
+from skillframe_papers.bars import ahead, counted, judged, together
+from skillframe_papers.rows.search import EARLY_S, GIVEN, SHIFT
+
+PEOPLE, QUICK_PEOPLE = 5, 1
+GOALS, QUICK_GOALS = 20, 5
+ONE, FEW, MANY = 1, 3, 10
+GOAL_SEED = 66_000
+KEPT = 0.9
+"""Of what many demonstrations find, a few must find as much."""
+NULL = f"from {FEW} of somebody who does not know"
+
+
+class Given(NamedTuple):
+    """A person's task, his demonstrations, and as many as a few of somebody who does not know."""
+
+    task: Task
+    own: tuple[Demonstration, ...]
+    unknowing: tuple[Demonstration, ...]
+
+
+def _task(job: RowRun, centre: tuple[float, float, float]) -> Task:
+    params = (("fillet", job.settings["world.fillet"]), ("friction", job.settings["world.friction"]))
+    return Task("peg_in_hole", params, (0.004, 0.004, 0.0), centre)
+
+
+def believed(index: int) -> tuple[float, float, float]:
+    """Where person `index` believes the hole to be, from the start [m, m, rad]: the first where row 23's does."""
+    angle = 2.0 * pi * index / PEOPLE
+    return (SHIFT[0] * cos(angle), SHIFT[0] * sin(angle), 0.0)
+
+
+def _people(job: RowRun) -> list[Given]:
+    """A quick run takes demonstrations that rows 13 and 23 have recorded."""
+    people, seed = job.count(PEOPLE, QUICK_PEOPLE), 1 + job.seed
+    unknowing = demonstrations(_task(job, NOBODY_KNEW), max(GIVEN, FEW * people), seed)
+    tasks = [_task(job, believed(k)) for k in range(people)]
+    return [
+        Given(task, demonstrations(task, job.count(MANY, GIVEN), seed), unknowing[FEW * k : FEW * (k + 1)])
+        for k, task in enumerate(tasks)
+    ]
+
+
+def _found(job: RowRun, given: Given, taught: tuple[Demonstration, ...], where: Float) -> int:
+    """Goals that a search learned from some demonstrations finds in time."""
+    settings = {key: job.settings[key] for key in ("push", "speed", "stiffness")}
+    time = min(EARLY_S, float(job.settings["time"]))
+    learned = document("search", given.task, taught, time=time, algorithm="sampling", **settings)
+    _, seconds = search(learned, given.task.scene, where, duration_s=time, seed=5 + job.seed)
+    return int(np.isfinite(seconds).sum())
+
+
+def few(job: RowRun) -> RowResult:
+    """Row 14: goals found, over the number of demonstrations."""
+    people, each = _people(job), job.count(GOALS, QUICK_GOALS)
+    counts = (FEW, GIVEN) if job.quick else (ONE, FEW, MANY)
+    found = {name: list[int]() for name in (*(f"from {n}" for n in counts), NULL)}
+    for k, given in enumerate(people):
+        where = goals(each, given.task, GOAL_SEED + 1000 * job.seed + k)
+        for n in counts:
+            found[f"from {n}"].append(_found(job, given, given.own[:n], where))
+        found[NULL].append(_found(job, given, given.unknowing, where))
+        job.tell(f"person {k}: {', '.join(f'{name} {hits[-1]}' for name, hits in found.items())} of {each}")
+    return _told(job, found, counts[-1], each * len(people))
+
+
+def _told(job: RowRun, found: Mapping[str, list[int]], most: int, count: int) -> RowResult:
+    """The row, from goals found by each person's searches."""
+    hits = {name: sum(values) for name, values in found.items()}
+    ours, many, null = hits[f"from {FEW}"], hits[f"from {most}"], hits[NULL]
+    enough = judged(ours, count, KEPT * many / count, quick=job.quick)
+    return RowResult(
+        ours=f"{counted(ours, count)} holes found in {EARLY_S:g} s from {FEW} demonstrations, {many} from {most}; "
+        f"null, from {FEW} of somebody who does not know: {null}",
+        verdict=together([enough], ahead(ours, null, count, quick=job.quick)),
+        head=("search learned", f"found in {EARLY_S:g} s", "by person"),
+        rows=[(name, counted(hits[name], count), ", ".join(map(str, each))) for name, each in found.items()],
+        difference="The paper gives no number. Each number of demonstrations is one choice of "
+        "them a person, the first ones, so that counts of one person are less apart than their intervals say.",
+        values={name.replace(" ", "_"): value / count for name, value in hits.items() if name != NULL}
+        | {"null": null / count},
+    )  # fmt: skip
