@@ -130,7 +130,7 @@ def reading_settings(options: dict[str, Any]) -> dict[str, Any]:
     "--out",
     required=True,
     type=click.Path(path_type=Path),
-    help="File to write: .npz (native), .csv or .hdf5 (robomimic); without an ending a LeRobot data set.",
+    help="File: .npz (native), .csv, .hdf5 (robomimic) or .mcap (ROS 2); without an ending a LeRobot data set.",
 )
 @reading_options
 @click.option("--json", "as_json", is_flag=True, help="The audit of what was written as JSON on stdout.")

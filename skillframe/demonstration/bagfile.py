@@ -152,15 +152,24 @@ def topics_of(path: Path, bag: Any) -> dict[str, str]:
     return topics
 
 
+def messages_of(path: Path, bag: Any, topic: str) -> list[Any]:
+    """All messages of a topic in the order of their receive times.
+
+    Raises:
+        InputError: they are damaged.
+    """
+    with _foreign(path):
+        connections = [c for c in bag.connections if c.topic == topic]
+        return [bag.deserialize(raw, c.msgtype) for c, _, raw in bag.messages(connections)]
+
+
 def read_topic(path: Path, bag: Any, topic: str, kind: str, notes: list[str]) -> Recorded:
     """All messages of a topic, sorted by their headers' stamps. Adds a note if that was needed.
 
     Raises:
         InputError: there are none, or they are damaged.
     """
-    with _foreign(path):
-        connections = [c for c in bag.connections if c.topic == topic]
-        messages = [bag.deserialize(raw, c.msgtype) for c, _, raw in bag.messages(connections)]
+    messages = messages_of(path, bag, topic)
     if not messages:
         raise InputError(f"{path}: {topic}", "holds no messages", "choose another topic, or record it again")
     if not all(hasattr(getattr(m, "header", None), "stamp") for m in messages):

@@ -32,6 +32,7 @@ from skillframe.demonstration.bagfile import (
 )
 from skillframe.demonstration.columns import POSITION, QUATERNION, WRENCH, Columns
 from skillframe.demonstration.franka import FRANKA, FRANKA_NOTE, six, tool_poses_of, wrenches_of
+from skillframe.demonstration.mcap_written import own_text, read_own
 from skillframe.demonstration.metafile import read_meta
 from skillframe.demonstration.options import ReadOptions, read_options
 from skillframe.demonstration.record import Demonstration
@@ -72,8 +73,12 @@ def read_bag(path: Path, options: Mapping[str, Any], tool_poses: ToolPoses) -> D
     chosen, notes = read_options(options), list[str]()
     _refuse_text_options(path, chosen)
     refuse_other_files(path)
+    checksums = checksum_notes(path)
+    named = any(value is not None for value in (chosen.pose_topic, chosen.pose_frames, chosen.wrench_topic))
+    if not named and (text := own_text(path)) is not None:
+        return read_own(path, text, options)
     meta = read_meta(path)
-    notes += [*parts_note(path), *checksum_notes(path)]
+    notes += [*parts_note(path), *checksums]
     with opened(path) as bag:
         topics = topics_of(path, bag)
         wrenches = _wrench_topic(path, topics, chosen, meta)

@@ -17,7 +17,7 @@ from typing import Any, BinaryIO, NamedTuple
 from skillframe.errors import InputError
 
 MAGIC = b"\x89MCAP0\r\n"
-FOOTER, CHANNEL, CHUNK, DATA_END = 0x02, 0x04, 0x06, 0x0F
+FOOTER, CHANNEL, CHUNK, METADATA, DATA_END = 0x02, 0x04, 0x06, 0x0C, 0x0F
 READ = ("cdr", "ros1")
 """Encodings of messages that are read: those of ROS 2 and ROS 1."""
 FOOTER_LENGTH = 20
@@ -92,6 +92,37 @@ def _channel(file: BinaryIO, record: _Record) -> tuple[str, str]:
         texts.append(content[place + 4 : place + 4 + length].decode("utf-8", "replace"))
         place += 4 + length
     return texts[0], texts[1]
+
+
+def metadata_record(path: Path, name: str) -> dict[str, str]:
+    """What the first metadata record of a name holds, empty where there is none or the file is no MCAP.
+
+    Raises:
+        InputError: a record is cut off, or damaged.
+    """
+    with path.open("rb") as file:
+        if file.read(len(MAGIC)) != MAGIC:
+            return {}
+        for record in _records(path, file):
+            if record.kind == METADATA:
+                file.seek(record.content)
+                found, *texts = _texts(path, record, file.read(min(record.length, LARGEST_CHUNK)))
+                if found == name:
+                    return dict(zip(texts[::2], texts[1::2], strict=False))
+    return {}
+
+
+def _texts(path: Path, record: _Record, content: bytes) -> list[str]:
+    """Name, and keys and values in turn, of a metadata record: each with its length before it, as is the map's."""
+    texts, place = list[str](), 0
+    try:
+        while place < len(content):
+            length = int.from_bytes(content[place : place + 4], "little")
+            texts.append(content[place + 4 : place + 4 + length].decode())
+            place += 4 + length + 4 * (len(texts) == 1)  # after the name stands how long the map is
+    except UnicodeDecodeError:
+        raise InputError(path, f"is damaged: its metadata at byte {record.start} are no text", AGAIN) from None
+    return texts or [""]
 
 
 def _records(path: Path, file: BinaryIO) -> Iterator[_Record]:

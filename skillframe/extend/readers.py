@@ -54,7 +54,7 @@ def _bag_reader(tool_poses: ToolPoses) -> Callable[[Path, Mapping[str, Any]], De
 
 
 def reader_types(tool_poses: ToolPoses) -> Iterable[ReaderType]:
-    """The core's formats: native npz, CSV, delimited text, files of arrays, HDF5, parquet, ROS bags.
+    """The core's formats: native npz, CSV, delimited text, files of arrays, HDF5, parquet, ROS bags, MCAP.
 
     Args:
         tool_poses: forward kinematics for recorded joint states.
@@ -87,5 +87,9 @@ def reader_types(tool_poses: ToolPoses) -> Iterable[ReaderType]:
     )  # fmt: skip
     yield ReaderType(
         name="rosbag", summary="ROS 1 and ROS 2 bags, with --pose-topic and --wrench-topic",
-        suffixes=(".bag", ".db3", ".mcap"), read=_bag_reader(tool_poses),
+        suffixes=(".bag", ".db3"), read=_bag_reader(tool_poses),
+    )  # fmt: skip
+    yield ReaderType(
+        name="mcap", summary="MCAP files of ROS 1 and ROS 2, with --pose-topic and --wrench-topic; written for ROS 2",
+        suffixes=(".mcap",), read=_bag_reader(tool_poses), write=_writer("mcap_written", "write_mcap"),
     )  # fmt: skip
