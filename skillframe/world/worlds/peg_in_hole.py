@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skillframe.frames import Float, norm
 from skillframe.world.scene import Scene, State, Task
@@ -46,7 +47,7 @@ class PegParams:
 
 
 def build(params: PegParams) -> Scene:
-    """The hole opens upwards at the fixture's origin. The goal is the tip below `done_depth`."""
+    """The hole opens upwards at the fixture's origin. The goal is the tip in the hole, below `done_depth`."""
     require(
         "peg_in_hole",
         {
@@ -61,6 +62,10 @@ def build(params: PegParams) -> Scene:
     def distance(state: State) -> Float:
         return norm(state.tip.position - np.array([0.0, 0.0, -params.depth]))
 
+    def inserted(state: State) -> NDArray[np.bool_]:
+        tip = state.tip.position
+        return (tip[..., 2] < -params.done_depth) & (norm(tip[..., :2]) < params.radius)  # in it, not beside its block
+
     return Scene(
         name="peg_in_hole",
         fixture=hole(params.radius + params.clearance, params.depth, params.boxes, wall=0.025),
@@ -69,7 +74,7 @@ def build(params: PegParams) -> Scene:
         start_tip=(0.0, 0.0, 0.001),
         start_quaternion=TOOL_DOWN,
         start_lift=tilt_lift(params.radius),
-        goal=lambda state: state.tip.position[..., 2] < -params.done_depth,
+        goal=inserted,
         goal_error=lambda state: (distance(state), tilt_of(state)),
         way=insertion(params.depth, params.radius),
         task=Task(
