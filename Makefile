@@ -4,6 +4,7 @@
 PYTHON ?= python3
 OUT ?= demo
 VENV := .venv
+LEROBOT := .venv-lerobot
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 # Compiled files are kept whatever the environment says: each test that starts a program would compile it all again.
@@ -16,7 +17,7 @@ EXAMPLES := $(wildcard examples/*.py)
 GALLERY := docs/gallery/pictures
 PICTURES := $(EXAMPLES:examples/%.py=$(GALLERY)/%.png)
 
-.PHONY: demo install wheels test test-core test-rest test-beside test-step test-slow mutants figures reproduced bench docs gallery lint clean
+.PHONY: demo install wheels test test-core test-rest test-beside test-step test-lerobot test-slow mutants figures reproduced bench docs gallery lint clean
 
 demo: install
 	$(BIN)/skillframe quickstart --out $(OUT)
@@ -66,6 +67,17 @@ test-step: $(VENV)/.test
 	$(PIP) install -e '.[step]'
 	$(PYTEST) tests/unit/parts/test_step.py
 
+# What runs inside LeRobot. It brings gigabytes and holds libraries back, so it has an environment of its own, and CI does
+# not run it.
+$(LEROBOT)/.installed: plugins/lerobot/pyproject.toml
+	$(PYTHON) -m venv --clear $(LEROBOT)
+	$(LEROBOT)/bin/python -m pip install --quiet -e '.[sim]' -e plugins/lmc -e plugins/gym -e plugins/lerobot \
+	  pytest pytest-timeout hypothesis
+	@touch $@
+
+test-lerobot: $(LEROBOT)/.installed
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(LEROBOT)/bin/python -m pytest -q -W ignore --timeout 900 plugins/lerobot
+
 test-slow: $(VENV)/.test
 	$(PYTEST) $(SIDE_BY_SIDE) -m "slow and not figures"
 
@@ -99,7 +111,7 @@ lint: $(VENV)/.dev
 	$(BIN)/mypy
 
 clean:
-	rm -rf $(VENV) build dist docs/_build docs/gallery
+	rm -rf $(VENV) $(LEROBOT) build dist docs/_build docs/gallery
 
 # The papers' results, computed again and put into the committed tables and the page of the docs. `make reproduced
 # ROWS="3 5"` does some of them, QUICK=--quick the quick ones. A verdict that changes is told, and is no error here.

@@ -37,6 +37,10 @@ CAMPAIGN = Path(__file__).resolve().parents[2] / "plugins" / "baselines" / "comp
 TEACHINGS = (103, 104)  # as in plugins/baselines/tests/test_comparison.py
 ENVS, ROLLOUT = 16, 2048  # trials side by side, and steps of all of them between two updates (PPO's own 2048)
 LOOKS = (0, 5, 10, 20)  # after how many rollouts PPO is tried, beside the last
+TOLD = {
+    "success": "is_success", "seconds": "duration_s", "peak": "peak_force_n", "far_m": "final_error_m",
+    "failure": "failure",
+}  # fmt: skip
 Policy = Callable[[dict[str, Float]], Float]
 Found = dict[str, list[Any]]
 
@@ -57,7 +61,7 @@ def drawn(spec: CampaignSpec) -> tuple[dict[str, Float], list[np.random.Generato
 
 def tried(policy: Policy) -> Found:
     """A policy of the environment's observations on all draws."""
-    found: Found = {"success": [], "seconds": [], "peak": [], "failure": []}
+    found: Found = {name: [] for name in TOLD}
     for teaching in TEACHINGS:
         spec = spec_of(teaching)
         task = Task(spec.world, spec.robot, None, {"duration_s": spec.duration_s})
@@ -65,14 +69,13 @@ def tried(policy: Policy) -> Found:
         while not (seen := cohort.see()).ended.all():
             cohort.step(policy(seen.observation))
         for i in range(spec.trials):
-            told = cohort.told(i)
-            _note(found, told["is_success"], told["duration_s"], told["peak_force_n"], told["failure"])
+            _note(found, *(cohort.told(i)[name] for name in TOLD.values()))
     return found
 
 
 def taught() -> Found:
     """LMC from its two demonstrations on the same draws, as `skillframe campaign run` runs it."""
-    found: Found = {"success": [], "seconds": [], "peak": [], "failure": []}
+    found: Found = {name: [] for name in TOLD}
     for teaching in TEACHINGS:
         spec = spec_of(teaching)
         shown = record(spec.world, spec.robot, count=2, seed=teaching).demonstrations
@@ -81,13 +84,13 @@ def taught() -> Found:
         given, rngs = drawn(spec)
         result = simulate(skill, setup, given, rngs, duration_s=spec.duration_s)
         for i in range(spec.trials):
-            peak, seconds = float(result.peak_force_n[i]), float(result.duration_s[i])
-            _note(found, bool(result.success[i]), seconds, peak, str(result.failure[i]))
+            seconds, peak, far = (float(a[i]) for a in (result.duration_s, result.peak_force_n, result.final_error_m))
+            _note(found, bool(result.success[i]), seconds, peak, far, str(result.failure[i]))
     return found
 
 
-def _note(found: Found, success: bool, seconds: float, peak: float, failure: str) -> None:
-    for name, value in zip(found, (success, seconds, peak, failure), strict=True):
+def _note(found: Found, *values: Any) -> None:
+    for name, value in zip(found, values, strict=True):
         found[name].append(value)
 
 
@@ -149,7 +152,7 @@ def training_env(seed: int) -> Any:
 
 
 def trained(seed: int, steps: int) -> list[dict[str, Any]]:
-    """PPO of one seed, tried after some rollouts and after the last: rows with steps, CPU seconds and what was found."""
+    """PPO of one seed, tried after some rollouts and after the last: steps, CPU seconds and what was found."""
     import torch
     from stable_baselines3 import PPO
 

@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PLUGINS = sorted(p for p in (ROOT / "plugins").iterdir() if (p / "pyproject.toml").is_file())
-PACKAGES = ["skillframe", *(f"skillframe_{plugin.name}" for plugin in PLUGINS)]
+PACKAGES = ["skillframe", *(next((plugin / "src").glob("*/__init__.py")).parent.name for plugin in PLUGINS)]
 SCRIPT = """
 from pathlib import Path
 from skillframe import Command, Demonstration, Observation, Pose, Skill

@@ -16,10 +16,14 @@ PROJECTS = [ROOT, *sorted(path.parent for path in (ROOT / "plugins").glob("*/pyp
 COPIED = [line.split()[:-1] for word, line in LINES if word == "COPY" and not line.startswith("--from")]
 
 
+LARGE = {"lerobot_policy_skillframe"}
+"""Not in the image: what drags gigabytes in, and is of use only beside a program that the image does not have."""
+
+
 def declared():
     """Extras by distribution."""
     read = [tomllib.loads((p / "pyproject.toml").read_text(encoding="utf-8"))["project"] for p in PROJECTS]
-    return {each["name"]: set(each.get("optional-dependencies", {})) for each in read}
+    return {each["name"]: set(each.get("optional-dependencies", {})) for each in read if each["name"] not in LARGE}
 
 
 def test_every_line_is_an_instruction_and_every_stage_that_is_copied_from_is_there():

@@ -28,8 +28,14 @@ def recipe(target):
     return [line.strip().replace("$(BIN)/", "") for line in lines.splitlines()]
 
 
-def test_there_are_nine_distributions():
-    assert len(PROJECTS) == 9
+def test_there_are_ten_distributions():
+    assert len(PROJECTS) == 10
+
+
+def test_all_are_installed_for_every_day_but_what_drags_lerobot_in():
+    text = (ROOT / "plugins" / "all.txt").read_text(encoding="utf-8")
+    everyday = re.findall(r"^-e plugins/(\w+)", text, re.MULTILINE)
+    assert {folder.name for folder in PROJECTS[1:]} - {*everyday} == {"lerobot"}
 
 
 @pytest.mark.parametrize("folder", PROJECTS, ids=lambda path: path.name)

@@ -63,7 +63,8 @@ def test_whatever_is_imported_is_declared(place):
     through_core |= names(OPTIONAL["sim"]) if any("skillframe[sim]" in each for each in lists[0]) else set()
     declared = {name.replace("-", "_") for each in lists for name in names(each)} | through_core
     modules = {module for path in (ROOT / place).rglob("*.py") for module in imported(path)}
-    foreign = modules - sys.stdlib_module_names - {"yaml"} - {m for m in modules if m.startswith("skillframe")}
+    own = {"yaml"} | {p.name for p in (ROOT / place).iterdir()} | {m for m in modules if m.startswith("skillframe")}
+    foreign = modules - sys.stdlib_module_names - own
     assert {LIBRARIES.get(module, (module, ""))[0] for module in foreign} <= declared
 
 

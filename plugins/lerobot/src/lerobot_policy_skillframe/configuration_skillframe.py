@@ -11,15 +11,15 @@ from typing import Any
 
 from lerobot.configs.policies import PreTrainedConfig
 from lerobot.configs.types import FeatureType, PolicyFeature
+from skillframe_gym.settings import EnvSettings
 
 from lerobot_policy_skillframe.following import STATE, WRENCH
 from skillframe.errors import InputError
-from skillframe_gym.settings import EnvSettings
 
 OBSERVED_STATE, OBSERVED_WRENCH, ACTION = "observation.state", "observation.wrench", "action"
 STATE_OF_ENV = "observation.environment_state"
 """Where the wrench is looked for as well: LeRobot's own loop hands on no other vector of an environment."""
-NOT_TRAINED = "a skill is not trained by LeRobot; learn it with: skillframe learn DEMONSTRATION ... --out NAME.skill.json"
+NOT_TRAINED = "is no way to learn a skill", "learn it with: skillframe learn DEMONSTRATION ... --out NAME.skill.json"
 
 
 @PreTrainedConfig.register_subclass("skillframe")
@@ -36,6 +36,8 @@ class SkillframeConfig(PreTrainedConfig):  # type: ignore[misc]
         seed: of skills that draw.
     """
 
+    input_features: dict[str, PolicyFeature] | None = field(default_factory=dict)
+    output_features: dict[str, PolicyFeature] | None = field(default_factory=dict)
     skill: str = ""
     point: str = "tip"
     coc: str | None = None
@@ -94,7 +96,7 @@ class SkillframeConfig(PreTrainedConfig):  # type: ignore[misc]
         Raises:
             InputError: always.
         """
-        raise InputError("policy.type=skillframe", *NOT_TRAINED.split("; "))
+        raise InputError("training by LeRobot", *NOT_TRAINED)
 
     def get_scheduler_preset(self) -> None:
         """There is none."""
@@ -108,4 +110,5 @@ class SkillframeConfig(PreTrainedConfig):  # type: ignore[misc]
         for name, size in ((OBSERVED_STATE, STATE), (OBSERVED_WRENCH, WRENCH)):
             feature = (self.input_features or {}).get(name)
             if feature is not None and tuple(feature.shape) != (size,):
-                raise InputError(name, f"has shape {tuple(feature.shape)}, not ({size},)", "give the layout of the page")
+                text = f"has shape {tuple(feature.shape)}, not ({size},)"
+                raise InputError(name, text, "give it as skillframe's data sets have it")

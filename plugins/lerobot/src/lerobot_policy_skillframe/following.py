@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from skillframe_gym.settings import SOFTEST, STIFFEST, EnvSettings
 
 from skillframe.demonstration.record import resolve_point
 from skillframe.document.file import load, understood
@@ -27,7 +28,6 @@ from skillframe.extend.records import CoordinatorType, Document
 from skillframe.extend.registry import registry
 from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, rotate, rotation_vector, skew
 from skillframe.skill import Command, Observation, Skill, Status
-from skillframe_gym.settings import SOFTEST, STIFFEST, EnvSettings
 
 STATE, WRENCH = 7, 6
 """Numbers of what is observed: position and quaternion x, y, z, w of a point of the tool in base, and its wrench."""
@@ -114,7 +114,7 @@ class Following:
         for name, values, size in (("state", state, STATE), ("wrench", wrench, WRENCH)):
             if values.ndim != 2 or values.shape[1] != size or not np.all(np.isfinite(values)):
                 text = f"should be (N, {size}) finite numbers, and has shape {values.shape} or a number that is none"
-                raise InputError(f"observation.{name}", text, "give it in the layout of the data sets")
+                raise InputError(f"observation.{name}", text, "give it as skillframe's data sets have it")
         first, dt = self._skill is None, 1.0 / self.settings.rate_hz
         rotation = matrix_from_quaternion(state[:, 3:])
         self._arm = rotate(rotation, np.broadcast_to(self._shift, (len(state), 3)))

@@ -86,7 +86,7 @@ class SkillframePolicy(PreTrainedPolicy):  # type: ignore[misc]
         Raises:
             InputError: always.
         """
-        raise InputError("training", *NOT_TRAINED.split("; "))
+        raise InputError("training by LeRobot", *NOT_TRAINED)
 
     def get_optim_params(self) -> Any:
         """Refuse.
@@ -94,7 +94,7 @@ class SkillframePolicy(PreTrainedPolicy):  # type: ignore[misc]
         Raises:
             InputError: always.
         """
-        raise InputError("training", *NOT_TRAINED.split("; "))
+        raise InputError("training by LeRobot", *NOT_TRAINED)
 
     def _save_pretrained(self, save_directory: Path) -> None:
         self.config._save_pretrained(save_directory)
@@ -118,7 +118,9 @@ class SkillframePolicy(PreTrainedPolicy):  # type: ignore[misc]
         if not folder.is_dir():
             raise InputError(folder, "is no folder of a saved policy", "give one; fetch it from a hub first")
         config = SkillframeConfig.from_pretrained(folder) if config is None else config
-        return cls(config, document=read_skill(folder / SKILL_FILE)).eval()
+        policy = cls(config, document=read_skill(folder / SKILL_FILE))
+        policy.eval()
+        return policy
 
 
 def _array(batch: dict[str, Tensor], name: str, *others: str) -> Float:
