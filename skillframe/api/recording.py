@@ -6,12 +6,11 @@ from collections.abc import Callable
 from typing import Any
 
 from skillframe.api.tasks import Robot, Settings, World, robot_of, scene_of
-from skillframe.errors import InputError, UnknownName
+from skillframe.errors import InputError, UnknownName, extras_named
 from skillframe.robot.model import RobotModel
 from skillframe.teaching import sessions
 from skillframe.teaching.blind import BlindSettings
 from skillframe.teaching.blind_sessions import record_blind
-from skillframe.teaching.machine_sessions import record_operated
 from skillframe.teaching.sessions import Recording
 from skillframe.teaching.teacher import TeacherSettings
 from skillframe.teaching.teleoperation import OperatorSettings
@@ -57,6 +56,9 @@ def record(
     common: dict[str, Any] = {"count": count, "seed": seed, "draws": draws, "progress": progress, "watch": watch}
     common |= {} if rate_hz is None else {"rate_hz": rate_hz}
     if isinstance(person, OperatorSettings):
+        with extras_named():
+            from skillframe.teaching.machine_sessions import record_operated  # needs casadi, which arms do without
+
         return record_operated(model, scene, person, **common)
     if isinstance(person, BlindSettings):
         return record_blind(model, scene, person, **common)

@@ -110,6 +110,12 @@ def test_without_a_simulator_a_command_that_needs_one_says_what_to_type(tmp_path
     assert said == f"error: {missing_extra('mujoco')}"
 
 
+def test_without_casadi_demonstrations_of_an_arm_are_recorded():
+    code = "import sys; sys.modules['casadi'] = None\nfrom skillframe import record; record('valley', 'free_tool')"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 def test_without_its_libraries_a_video_is_refused_before_the_run(tmp_path):
     said = without(["av"], "run", "none.json", "--world", "valley", "--video", tmp_path / "a.mp4")
     assert said == f"error: {missing_extra('av')}"
