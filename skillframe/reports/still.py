@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from skillframe.frames import Pose, norm, quaternion_from_matrix
-from skillframe.reports.raster import draw, over_paper, png
+from skillframe.reports.raster import Image, draw, over_paper, png
 from skillframe.reports.shapes import Mesh, merge, mesh_of, section
 from skillframe.reports.stage import CLOSE, Camera, fitted
 
@@ -28,14 +28,33 @@ def scene_picture(fixture: Geoms, tool: Geoms, place: Pose) -> bytes:
         tool: geoms in the tool frame, likewise.
         place: of the tool frame in the fixture frame.
     """
-    still = [section(mesh, np.zeros(3), _AHEAD) for mesh in _meshes(fixture)]
-    turn = quaternion_from_matrix(place.rotation)
-    held = [mesh.placed(place.position, turn) for mesh in _meshes(tool)]
-    shown = [merge(part) for part in (still, held) if part]
-    points = np.concatenate([np.zeros((1, 3)), *(mesh.vertices for mesh in shown)])
-    view = fitted(points[norm(points) < CLOSE], Camera(np.zeros(3), 1.0))
-    image = over_paper(draw(shown, view, WIDTH, HEIGHT))
+    image = View(fixture, tool, place).image(place, WIDTH, HEIGHT)
     return png(np.concatenate([image, np.full((HEIGHT, WIDTH, 1), 255, np.uint8)], axis=-1))
+
+
+class View:
+    """A scene cut open, seen by a camera that stays while the tool moves.
+
+    Args:
+        fixture: geoms in the fixture frame, as plain values.
+        tool: geoms in the tool frame, likewise.
+        first: of the tool frame in the fixture frame, which the camera is fitted to.
+    """
+
+    def __init__(self, fixture: Geoms, tool: Geoms, first: Pose) -> None:
+        still = [section(mesh, np.zeros(3), _AHEAD) for mesh in _meshes(fixture)]
+        self._still, self._tool = [merge(still)] if still else [], _meshes(tool)
+        points = np.concatenate([np.zeros((1, 3)), *(mesh.vertices for mesh in self._shown(first))])
+        self._camera = fitted(points[norm(points) < CLOSE], Camera(np.zeros(3), 1.0))
+
+    def image(self, place: Pose, width: int, height: int) -> Image:
+        """The picture (height, width, 3), red, green and blue, with the tool frame at a place in the fixture frame."""
+        return over_paper(draw(self._shown(place), self._camera, width, height))
+
+    def _shown(self, place: Pose) -> list[Mesh]:
+        turn = quaternion_from_matrix(place.rotation)
+        held = [mesh.placed(place.position, turn) for mesh in self._tool]
+        return [*self._still, *([merge(held)] if held else [])]
 
 
 def _meshes(geoms: Geoms) -> list[Mesh]:

@@ -86,6 +86,21 @@ def test_a_vector_environment_is_as_many_single_ones_to_the_last_bit_also_after_
         WorldEnv("free", "free_tool").step(np.zeros(6, np.float32))
 
 
+def test_a_picture_is_drawn_where_it_is_asked_for_and_shows_the_tool_where_it_is():
+    env = WorldEnv("peg_in_hole", **CHEAP, render_mode="rgb_array")
+    with pytest.raises(SkillframeError, match="reset"):
+        env.render()
+    env.reset(seed=1)
+    first = env.render()
+    assert first.shape == (240, 320, 3) and first.dtype == np.uint8 and np.array_equal(first, env.render())
+    env.step(np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0]))
+    changed = np.any(env.render() != first, axis=-1)
+    assert 0.001 < changed.mean() < 0.5  # the tool has sunk, and the camera stays
+    assert WorldEnv("peg_in_hole", **CHEAP).render() is None
+    with pytest.raises(SkillframeError, match="human"):
+        WorldEnv("peg_in_hole", **CHEAP, render_mode="human")
+
+
 def test_the_same_seed_is_the_same_episode_and_another_is_another():
     env = WorldEnv("peg_in_hole", **CHEAP, vary=WIDE)
     actions = np.zeros((2, 6), np.float32)

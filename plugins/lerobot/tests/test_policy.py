@@ -1,5 +1,6 @@
 """A skill inside LeRobot: found by its name, made by LeRobot's factories, saved, loaded, and run by LeRobot's loop."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -14,8 +15,9 @@ from lerobot.configs.policies import PreTrainedConfig
 from lerobot.envs.configs import EnvConfig
 from lerobot.envs.factory import make_env, make_env_pre_post_processors
 from lerobot.policies.factory import make_policy, make_pre_post_processors
-from lerobot.scripts.lerobot_eval import eval_policy_all
+from lerobot.scripts.lerobot_eval import eval_policy_all, main
 from lerobot.utils.import_utils import register_third_party_plugins
+from lerobot_policy_skillframe import SkillframePolicy
 
 from skillframe.errors import InputError
 
@@ -91,3 +93,16 @@ def test_lerobot_s_own_loop_inserts_the_peg(config, env, tmp_path):
     )  # fmt: skip
     assert found["overall"]["pc_success"] == 100.0 and found["overall"]["n_episodes"] == 2
     assert np.isfinite(found["overall"]["avg_sum_reward"])
+
+
+def test_lerobot_s_own_program_runs_a_saved_policy_and_films_it(config, tmp_path, monkeypatch):
+    for part in (SkillframePolicy(config), *make_pre_post_processors(config)):
+        part.save_pretrained(tmp_path / "saved")
+    given = {
+        "policy.path": tmp_path / "saved", "env.type": "skillframe", "env.settings": "{robot: free_tool}",
+        "env.episode_length": 5, "eval.n_episodes": 1, "eval.batch_size": 1, "output_dir": tmp_path / "out",
+    }  # fmt: skip
+    monkeypatch.setattr("sys.argv", ["lerobot-eval", *(f"--{name}={value}" for name, value in given.items())])
+    main()
+    told = json.loads((tmp_path / "out" / "eval_info.json").read_text())
+    assert told["overall"]["n_episodes"] == 1 and len(list(tmp_path.glob("out/videos/*/*.mp4"))) == 1

@@ -22,11 +22,12 @@ from numpy.typing import NDArray
 
 from skillframe.api.tasks import Robot, Settings, World, robot_of, scene_of
 from skillframe.demonstration.record import resolve_point
-from skillframe.errors import InputError, SkillframeError
+from skillframe.errors import InputError, SkillframeError, UnknownName
 from skillframe.execution.prepare import drive_maker
 from skillframe.execution.setup import Setup
 from skillframe.frames import Float
 from skillframe_gym.episodes import Cohort, Seen
+from skillframe_gym.pictures import Camera
 from skillframe_gym.settings import EnvSettings, observation_space
 
 SCALE_M, WORTH = 0.01, 10.0
@@ -48,12 +49,12 @@ class Task:
             self.settings = EnvSettings(**settings)
         except TypeError as error:
             raise InputError("environment", str(error).partition("() ")[2], "see EnvSettings") from None
-        self._scene, self._fixed = scene_of(world, set, depth=4)
+        self.scene, self._fixed = scene_of(world, set, depth=4)
         model = robot_of(robot)
-        point = np.zeros(3) if model.spec.hydraulic else resolve_point("tip", self._scene.tool.frames)
+        point = np.zeros(3) if model.spec.hydraulic else resolve_point("tip", self.scene.tool.frames)
         self._setup = Setup(
-            robot=model, scene=self._scene, center_of_compliance=point, make_drive=drive_maker(model),
-            stop_when=self._scene.goal,
+            robot=model, scene=self.scene, center_of_compliance=point, make_drive=drive_maker(model),
+            stop_when=self.scene.goal,
         )  # fmt: skip
         self._axes = self.settings.axes
 
@@ -67,7 +68,7 @@ class Task:
 
     def _drawn(self, rng: np.random.Generator) -> dict[str, Any]:
         """Quantities of one trial: what is fixed, over what is drawn, over the start."""
-        starts = self._scene.task.starts if self.settings.starts == "task" else ({},)
+        starts = self.scene.task.starts if self.settings.starts == "task" else ({},)
         start = starts[int(rng.integers(len(starts)))]
         return {**start, **{name: axis.draw(rng) for name, axis in self._axes.items()}, **self._fixed}
 
@@ -86,29 +87,32 @@ class WorldEnv(gymnasium.Env[Obs, NDArray[np.float32]]):
         world: a name, a fixture file, or a scene.
         robot: a name, a robot.toml or its folder, or a loaded robot.
         set: what differs from the nominal in every trial, {"world.friction": 0.2}, as with `run`.
-        render_mode: only None; `run` and `report` draw.
+        render_mode: "rgb_array": `render` draws the tool over the fixture cut open; None: nothing is drawn.
         settings: fields of `EnvSettings`.
 
     Raises:
         SkillframeError: something given cannot be used; says what, where, and what to do.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  (Gymnasium's own form)
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012  (Gymnasium's own form)
 
     def __init__(
-        self, world: World, robot: Robot = "panda", *, set: Settings | None = None, render_mode: None = None,
+        self, world: World, robot: Robot = "panda", *, set: Settings | None = None, render_mode: str | None = None,
         **settings: Any,
     ) -> None:  # fmt: skip
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise UnknownName("render_mode", str(render_mode), self.metadata["render_modes"])
         self.task = Task(world, robot, set, settings)
         self.action_space: Any = self.task.settings.action_space()
         self.observation_space: Any = observation_space()
         self.render_mode = render_mode
         self._cohort: Cohort | None = None
+        self._camera: Camera | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Obs, dict[str, Any]]:
         """Begin the next trial. `options` has none."""
         super().reset(seed=seed)
-        self._cohort = self.task.begin([self.np_random])
+        self._cohort, self._camera = self.task.begin([self.np_random]), None
         self._seen = self._cohort.see()
         self._told = False
         return _row(self._seen, 0), {}
@@ -128,6 +132,20 @@ class WorldEnv(gymnasium.Env[Obs, NDArray[np.float32]]):
         info = self._cohort.told(0) if self._told else {}
         late = bool(seen.by_time[0])
         return _row(seen, 0), float(self.task.reward(before, seen)[0]), self._told and not late, late, info
+
+    def render(self) -> Any:
+        """A picture (240, 320, 3) of where the trial stands, if `render_mode` is "rgb_array", else None.
+
+        Raises:
+            SkillframeError: there is no trial.
+        """
+        if self.render_mode is None:
+            return None
+        if self._cohort is None:
+            raise SkillframeError("no episode was begun; call reset() first")
+        tip = self._cohort.tip(0)
+        self._camera = self._camera or Camera(self.task.scene, tip)
+        return self._camera.picture(tip)
 
 
 class WorldVectorEnv(VectorEnv[Obs, NDArray[np.float32], NDArray[Any]]):

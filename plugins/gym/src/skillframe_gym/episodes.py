@@ -144,6 +144,11 @@ class Cohort:
             "final_error_rad": float(result.final_error_rad[i]),
         }  # fmt: skip
 
+    def tip(self, i: int) -> Pose:
+        """Pose of trial i's tip in the true fixture frame, for pictures: nothing observes it."""
+        position, rotation = self._loop.plant.tip_state().tip
+        return Pose(position[i], rotation[i])
+
     def _show(self, rows: NDArray[np.int64]) -> None:
         """Keep what some trials observe now. Sensors of trials that have ended go on reading beside the others."""
         for name, values in self._observed().items():

@@ -63,11 +63,13 @@ class SkillframeEnv(EnvConfig):  # type: ignore[misc]
     def gym_kwargs(self) -> dict[str, Any]:
         """What `gymnasium.make` is given."""
         most = {"max_episode_steps": self.episode_length, "duration_s": self.episode_length / self.fps}
-        return {**most, "rate_hz": float(self.fps), **self.settings}
+        return {**most, "rate_hz": float(self.fps), "render_mode": "rgb_array", **self.settings}
 
 
 class Renamed(gymnasium.ObservationWrapper[Any, Any, Any]):
     """A world that shows its pose and wrench under LeRobot's names, as float32."""
+
+    metadata = WorldEnv.metadata
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(WorldEnv(**settings))

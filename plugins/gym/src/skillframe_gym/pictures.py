@@ -1,0 +1,37 @@
+"""What an environment draws: the tool over the fixture cut open, as on the page of a run, by the page's own renderer.
+
+The robot's links are not drawn, and neither is what the fixture's parts do.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.frames import Pose
+from skillframe.reports.still import View
+from skillframe.world.drawing import geom_json
+from skillframe.world.scene import Scene
+
+WIDTH, HEIGHT = 320, 240
+"""Pixels; our choice."""
+
+
+class Camera:
+    """Pictures of a scene from one place.
+
+    Args:
+        scene: what is drawn.
+        tip: pose of the tool's tip in the fixture frame that the picture is fitted to.
+    """
+
+    def __init__(self, scene: Scene, tip: Pose) -> None:
+        self._back = -np.array(scene.tool.frames["tip"])
+        sprung = (geom for part in scene.sprung for geom in part.geoms)
+        shown = ((*scene.fixture, *sprung), scene.tool.geoms)
+        fixture, tool = ([geom_json(geom) for geom in geoms if geom.visible] for geoms in shown)
+        self._view = View(fixture, tool, tip.at(self._back))
+
+    def picture(self, tip: Pose) -> NDArray[np.uint8]:
+        """(240, 320, 3), red, green and blue."""
+        return self._view.image(tip.at(self._back), WIDTH, HEIGHT)
