@@ -16,6 +16,9 @@ from skillframe.world.scene import Scene, State, Task
 from skillframe.world.shapes import filleted_peg, hole, shaft
 from skillframe.world.worlds.common import TOOL_DOWN, WRIST_TO_TIP, insertion, require, tilt_lift, tilt_of, tool
 
+FLOOR = 0.002
+"""[m] by which no contact gives way within a robot's limits of force; ours."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PegParams:
@@ -47,7 +50,11 @@ class PegParams:
 
 
 def build(params: PegParams) -> Scene:
-    """The hole opens upwards at the fixture's origin. The goal is the tip in the hole, below `done_depth`."""
+    """The hole opens upwards at the fixture's origin. The goal is the tip in the hole, below `done_depth`.
+
+    In it means nearer to its axis than the peg is thick, which leaves out what stands beside its block, and no more
+    than `FLOOR` below its floor, which leaves out what has gone under the block.
+    """
     require(
         "peg_in_hole",
         {
@@ -64,7 +71,8 @@ def build(params: PegParams) -> Scene:
 
     def inserted(state: State) -> NDArray[np.bool_]:
         tip = state.tip.position
-        return (tip[..., 2] < -params.done_depth) & (norm(tip[..., :2]) < params.radius)  # in it, not beside its block
+        above_floor = tip[..., 2] > -params.depth - FLOOR
+        return (tip[..., 2] < -params.done_depth) & (norm(tip[..., :2]) < params.radius) & above_floor
 
     return Scene(
         name="peg_in_hole",

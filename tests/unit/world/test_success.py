@@ -24,11 +24,12 @@ def test_a_peg_is_in_once_its_tip_is_58_of_60_millimetres_deep(scene):
     assert bottom == pytest.approx(-0.060)
 
 
-def test_a_peg_beside_the_block_of_the_hole_is_not_in_however_deep(scene):
-    """The block reaches 42 mm from the hole's axis. A policy that was trained on depth alone went round it."""
+def test_a_peg_beside_the_block_of_the_hole_or_under_it_is_not_in_however_deep(scene):
+    """The block reaches 42 mm from the hole's axis. Policies that were trained on depth went round it, and below it."""
     peg = scene("peg_in_hole")
     assert done(peg, (0.0164, 0.0, -0.059)) and not done(peg, (0.0166, 0.0, -0.059))
     assert not done(peg, (0.0, 0.06, -0.059)) and not done(peg, (-0.06, 0.0, -0.2))
+    assert done(peg, (0.0, 0.0, -0.0619)) and not done(peg, (0.0, 0.0, -0.0621))
 
 
 def test_between_peg_and_hole_there_is_a_quarter_of_a_millimetre_all_round(scene):
