@@ -17,6 +17,8 @@ TOOL_DOWN = (1.0, 0.0, 0.0, 0.0)
 """Attitude in the fixture frame of a tool that points down: half a turn about x (tool z = fixture -z)."""
 WRIST_TO_TIP = 0.2
 TOOL_MASS = 0.6
+FLOOR = 0.002
+"""[m] further below the floor of a hole nothing is in it: contacts give way less within a robot's limits (ours)."""
 
 
 def tool(geoms: tuple[Geom, ...], tip: float = WRIST_TO_TIP, hand: str = "wrist") -> Tool:

@@ -14,10 +14,7 @@ from numpy.typing import NDArray
 from skillframe.frames import Float, norm
 from skillframe.world.scene import Scene, State, Task
 from skillframe.world.shapes import filleted_peg, hole, shaft
-from skillframe.world.worlds.common import TOOL_DOWN, WRIST_TO_TIP, insertion, require, tilt_lift, tilt_of, tool
-
-FLOOR = 0.002
-"""[m] by which no contact gives way within a robot's limits of force; ours."""
+from skillframe.world.worlds.common import FLOOR, TOOL_DOWN, WRIST_TO_TIP, insertion, require, tilt_lift, tilt_of, tool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from skillframe.frames import Float, norm
 from skillframe.world.scene import Geom, Scene, State, Task
 from skillframe.world.shapes import FIXTURE_COLOUR, TOOL_COLOUR, filleted_peg, hole, shaft
-from skillframe.world.worlds.common import TOOL_DOWN, WRIST_TO_TIP, insertion, require, tilt_lift, tilt_of, tool
+from skillframe.world.worlds.common import FLOOR, TOOL_DOWN, WRIST_TO_TIP, insertion, require, tilt_lift, tilt_of, tool
 
 HALF_PLATE = 0.045
 WALL = 0.003  # of the rings around the pins' holes
@@ -76,7 +76,8 @@ def build(params: SocketParams) -> Scene:
         return norm(state.tip.position - np.array([0.0, 0.0, -params.depth]))
 
     def plugged(state: State) -> NDArray[np.bool_]:
-        deep: NDArray[np.bool_] = state.tip.position[..., 2] < -params.done_depth
+        height = state.tip.position[..., 2]
+        deep: NDArray[np.bool_] = (height < -params.done_depth) & (height > -params.depth - FLOOR)
         return deep & (norm(state.tip.position[..., :2]) < params.radius)
 
     return Scene(

@@ -65,6 +65,7 @@ def test_a_ball_is_at_the_bottom_within_a_millimetre_across_and_two_up(scene):
 def test_a_plug_is_in_once_it_is_16_of_18_millimetres_deep(scene):
     socket = scene("socket")
     assert not done(socket, (0.0, 0.0, -0.0159)) and done(socket, (0.0, 0.0, -0.0161))
+    assert done(socket, (0.0, 0.0, -0.0199)) and not done(socket, (0.0, 0.0, -0.0201))  # under the plate
 
 
 def test_a_box_is_in_the_corner_of_the_pallets_within_a_centimetre(scene):
