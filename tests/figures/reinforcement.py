@@ -65,7 +65,7 @@ def tried(policy: Policy) -> Found:
     for teaching in TEACHINGS:
         spec = spec_of(teaching)
         task = Task(spec.world, spec.robot, None, {"duration_s": spec.duration_s})
-        cohort = Cohort(task._setup, EnvSettings(duration_s=spec.duration_s), *drawn(spec))
+        cohort = Cohort(task.setup, EnvSettings(duration_s=spec.duration_s), *drawn(spec))
         while not (seen := cohort.see()).ended.all():
             cohort.step(policy(seen.observation))
         for i in range(spec.trials):

@@ -52,7 +52,7 @@ class Task:
         self.scene, self._fixed = scene_of(world, set, depth=4)
         model = robot_of(robot)
         point = np.zeros(3) if model.spec.hydraulic else resolve_point("tip", self.scene.tool.frames)
-        self._setup = Setup(
+        self.setup = Setup(
             robot=model, scene=self.scene, center_of_compliance=point, make_drive=drive_maker(model),
             stop_when=self.scene.goal,
         )  # fmt: skip
@@ -64,7 +64,7 @@ class Task:
         drawn = [self._drawn(first) for first, _ in children]
         names = sorted({name for trial in drawn for name in trial})
         draws = {name: np.array([float(trial.get(name, 0.0)) for trial in drawn]) for name in names}
-        return Cohort(self._setup, self.settings, draws, [second for _, second in children])
+        return Cohort(self.setup, self.settings, draws, [second for _, second in children])
 
     def _drawn(self, rng: np.random.Generator) -> dict[str, Any]:
         """Quantities of one trial: what is fixed, over what is drawn, over the start."""
