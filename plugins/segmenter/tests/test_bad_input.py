@@ -112,6 +112,41 @@ def test_a_boundary_moved_out_of_its_demonstration_is_refused():
             learn(slides(), set_boundary=[f"1:1={time}"])
 
 
+ROW = {"file": "a.npz", "start": 1.0, "end": 3.0, "boundaries": [1.5, 2.0], "labels": [0, 1, 0]}
+
+
+@pytest.mark.parametrize(
+    ("moves", "words"),
+    [
+        ([(0, 1.1)], r"a.npz: boundary 1 at 1.1 s leaves a phase of 0.1 s, and one needs 0.2 s; put it from 1.20 s to"),
+        ([(0, 1.9)], r"leaves a phase of 0.1 s, .* put it from 1.20 s to 1.80 s"),
+        ([(1, 2.81)], r"boundary 2 at 2.81 s leaves a phase of 0.19 s, .* put it from 1.70 s to 2.80 s"),
+        ([(0, 2.5), (1, 2.6)], r"boundary 1 at 2.5 s leaves a phase of 0.1 s, .* from 1.20 s to 2.40 s"),
+    ],
+)
+def test_a_boundary_that_leaves_a_phase_too_short_is_refused_with_where_it_may_be(moves, words):
+    with pytest.raises(InputError, match=words):
+        moved([ROW], [Move(0, *move) for move in moves], ["a.npz"])
+
+
+def test_the_shortest_phase_is_taken_on_either_side_and_what_was_found_is_kept():
+    rows = moved([ROW, ROW], [Move(0, 0, 1.2), Move(0, 1, 2.8)], ["a.npz", "b.npz"])
+    found = {"boundaries": [1.5, 2.0], "labels": [0, 1, 0]}
+    assert rows[0] == {**ROW, "boundaries": [1.2, 2.8], "set": [0, 1], "found": found}
+    assert rows[1] == {**ROW, "found": found}
+
+
+def test_a_phase_found_shorter_than_that_stays_where_nobody_moves_it():
+    short = {**ROW, "boundaries": [1.5, 2.85]}
+    assert moved([short], [Move(0, 0, 1.4)], ["a.npz"])[0]["boundaries"] == [1.4, 2.85]
+
+
+def test_a_boundary_with_no_room_says_to_move_its_neighbours():
+    tight = {**ROW, "boundaries": [1.5, 1.6, 1.8], "labels": [0, 1, 0, 1]}
+    with pytest.raises(InputError, match="move its neighbours too"):
+        moved([tight], [Move(0, 1, 1.65)], ["a.npz"])
+
+
 @pytest.fixture(scope="module")
 def policy():
     body = learn(slides())

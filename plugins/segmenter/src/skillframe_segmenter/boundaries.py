@@ -10,8 +10,10 @@ from typing import NamedTuple
 
 from skillframe.errors import InputError, UnknownName
 from skillframe.extend.records import Document
+from skillframe_segmenter.settings import PHASE_MIN_S
 
 OPTION = "--set-boundary"
+ROUNDING_S = 1e-6
 
 
 class Move(NamedTuple):
@@ -46,10 +48,17 @@ def parse_move(text: str, names: Sequence[str]) -> Move:
 def moved(rows: Sequence[Document], moves: Sequence[Move], names: Sequence[str]) -> list[Document]:
     """Rows of `demonstrations` with boundaries moved.
 
+    Returns:
+        the rows. Each also holds `found`, its `boundaries` and `labels` as they stood, and one that a person has moved
+        something in holds `set`, the numbers of the boundaries moved.
+
     Raises:
-        InputError: a boundary that is not there, or a place outside its neighbours.
+        InputError: a boundary that is not there, a place outside its neighbours, or too short a phase.
     """
-    result = [{**row, "boundaries": list(row["boundaries"])} for row in rows]
+    result = [
+        {**row, "boundaries": list(row["boundaries"]), "found": {key: row[key] for key in ("boundaries", "labels")}}
+        for row in rows
+    ]
     for move in moves:
         where = names[move.demonstration] or f"demonstration {move.demonstration + 1}"
         cuts = result[move.demonstration]["boundaries"]
@@ -57,8 +66,11 @@ def moved(rows: Sequence[Document], moves: Sequence[Move], names: Sequence[str])
             there = ", ".join(f"{t:.2f} s" for t in cuts) or "none"
             raise InputError(where, f"has no boundary {move.boundary + 1} (there are: {there})", f"fix {OPTION}")
         cuts[move.boundary] = move.time
+        result[move.demonstration]["set"] = sorted({*result[move.demonstration].get("set", []), move.boundary})
     for move in moves:
         _check_order(result[move.demonstration], move, names)
+    for move in moves:
+        _check_length(result[move.demonstration], move, names)
     return result
 
 
@@ -69,4 +81,19 @@ def _check_order(row: Document, move: Move, names: Sequence[str]) -> None:
             names[move.demonstration] or f"demonstration {move.demonstration + 1}",
             f"boundary {move.boundary + 1} cannot be at {move.time:g} s: boundaries stay inside and in order",
             f"it lasts from {row['start']:.2f} s to {row['end']:.2f} s; fix {OPTION}",
+        )
+
+
+def _check_length(row: Document, move: Move, names: Sequence[str]) -> None:
+    """Whether both phases that a moved boundary parts last long enough."""
+    edges = [row["start"], *row["boundaries"], row["end"]]
+    before, here, after = edges[move.boundary : move.boundary + 3]
+    shortest = min(here - before, after - here)
+    if shortest < PHASE_MIN_S - ROUNDING_S:
+        first, last = math.ceil(100.0 * (before + PHASE_MIN_S) - 1e-4), math.floor(100.0 * (after - PHASE_MIN_S) + 1e-4)
+        raise InputError(
+            names[move.demonstration] or f"demonstration {move.demonstration + 1}",
+            f"boundary {move.boundary + 1} at {here:g} s leaves a phase of {shortest:.3g} s, and one needs "
+            f"{PHASE_MIN_S:g} s",
+            f"put it from {first / 100:.2f} s to {last / 100:.2f} s" if first <= last else "move its neighbours too",
         )

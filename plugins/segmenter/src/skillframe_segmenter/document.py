@@ -17,7 +17,7 @@ from skillframe_segmenter.model import PhaseModel, from_document
 from skillframe_segmenter.placed import is_placed, learned_of, placement_of
 
 FOLLOWED = ("wrench_hmm", "pose_hmm")
-SHARED = ("phases", "phase_model", "demonstrations", "type", "type_version", "recoveries", "explained")
+SHARED = ("phases", "phase_model", "demonstrations", "type", "type_version", "recoveries", "explained", "phase_min_s")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

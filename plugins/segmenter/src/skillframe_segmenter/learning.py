@@ -32,7 +32,7 @@ from skillframe_segmenter.boards import learn_places, names_places
 from skillframe_segmenter.boundaries import Move, moved, parse_move
 from skillframe_segmenter.explained import explained
 from skillframe_segmenter.segmentation import refitted
-from skillframe_segmenter.settings import PolicySettings, Settings
+from skillframe_segmenter.settings import PHASE_MIN_S, PolicySettings, Settings
 from skillframe_segmenter.zvc import ZvcSettings
 
 SHORTEST_S = 0.25
@@ -76,6 +76,7 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
         **{key: value for key, value in bodies[0].items() if key in ("frame", *_alike(bodies))},
         "phases": [_as_phase(body, own["skill"], _alike(bodies)) for body in bodies],
         "recoveries": own["recoveries"],
+        "phase_min_s": PHASE_MIN_S,
         "explained": explained(found["demonstrations"], demonstrations, options.at, options.axes),
         **found,
     }

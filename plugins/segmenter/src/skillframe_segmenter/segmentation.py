@@ -24,12 +24,11 @@ from skillframe_segmenter.boundaries import OPTION
 from skillframe_segmenter.features import Features, Scales, features, scales, typical_scales
 from skillframe_segmenter.model import PhaseModel, Pose0
 from skillframe_segmenter.rounds import rounds
-from skillframe_segmenter.settings import WINDOW_S, Settings
+from skillframe_segmenter.settings import FEWEST_PER_PHASE, WINDOW_S, Settings
 from skillframe_segmenter.windows import Windows, cut_all
 
 SHORT, SHORT_JOINED = 3, (5, 8)  # windows; shorter runs go to a neighbour, before and after phases are joined
 SHORT_SHARE = 0.05  # of the demonstration, within `SHORT_JOINED`
-FEWEST_PER_PHASE = 4
 Labels = NDArray[np.intp]
 
 
@@ -115,6 +114,8 @@ def refitted(
     before = fit(data, prepared, phases, chosen)._replace(phase_of=np.array(document["phase_model"]["phase_of"]))
     found = _refit(data, prepared, before, rows, said, chosen)
     again = rows_of(prepared.cut, found.labels, [d.source for d in demonstrations])
+    for row, each in zip(again, rows, strict=True):
+        row |= {key: each[key] for key in ("found", "set") if key in each}
     for i in said:
         if len(again[i]["boundaries"]) != len(rows[i]["boundaries"]):
             where = again[i]["file"] or f"demonstration {i + 1}"

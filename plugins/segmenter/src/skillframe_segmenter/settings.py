@@ -11,6 +11,9 @@ from math import radians
 from skillframe.errors import InputError
 
 WINDOW_S = 0.05
+FEWEST_PER_PHASE = 4
+"""Windows without which nothing can be learned of a phase."""
+PHASE_MIN_S = FEWEST_PER_PHASE * WINDOW_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
