@@ -6,7 +6,6 @@ The document's own policy forbids every address: styles and scripts are inline, 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.resources import files
 from pathlib import Path
 
 from skillframe.errors import InputError
@@ -17,11 +16,11 @@ from skillframe.reports.learned import learned_section
 from skillframe.reports.markup import Markup, join, note, tag
 from skillframe.reports.provenance import provenance_section
 from skillframe.reports.runs import cover, demonstrations_section, runs_section
+from skillframe.reports.shell import asset, bar, head
 from skillframe.reports.sources import Chapter, read_chapters
 from skillframe.reports.trust import trust_section
 from skillframe.reports.verdict import banner, verdict_section
 
-POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 MOST_BYTES = 10_000_000
 RELOAD_S = 5
 LIVE = (
@@ -76,24 +75,16 @@ def render(chapters: Sequence[Chapter], *, live: bool = False) -> str:
     scenes: dict[str, Markup] = {}
     bodies = [_chapter(chapter, i, scenes, alone=len(chapters) == 1) for i, chapter in enumerate(chapters, start=1)]
     title = chapters[0].name if len(chapters) == 1 else "skillframe report"
-    head = tag(
-        "head", tag("meta", charset="utf-8"), tag("meta", http_equiv="Content-Security-Policy", content=POLICY),
-        tag("meta", name="viewport", content="width=device-width, initial-scale=1"), tag("title", title),
-        tag("style", _asset("page.css")), tag("meta", http_equiv="refresh", content=str(RELOAD_S)) if live else "",
-    )  # fmt: skip
+    again = tag("meta", http_equiv="refresh", content=str(RELOAD_S)) if live else ""
     body = tag(
         "body",
         _top(chapters),
         tag("main", note(LIVE, role="status") if live else "", *bodies),
         _foot(),
         *scenes.values(),
-        tag("script", _asset("viewer.js")),
+        tag("script", asset("theme.js"), asset("viewer.js")),
     )
-    return "<!DOCTYPE html>\n" + tag("html", head, body, lang="en")
-
-
-def _asset(name: str) -> Markup:
-    return Markup(files("skillframe.reports").joinpath("assets", name).read_text(encoding="utf-8"))
+    return "<!DOCTYPE html>\n" + tag("html", head(title, again), body, lang="en")
 
 
 SECTIONS = (
@@ -113,8 +104,7 @@ def _top(chapters: Sequence[Chapter]) -> Markup:
         links = [tag("a", title, href=f"#c1-{name}") for name, title in _sections(chapters[0])]
     else:
         links = [tag("a", chapter.name, href=f"#c{i}") for i, chapter in enumerate(chapters, start=1)]
-    toggle = tag("button", "Light / dark", id="theme", type="button")
-    return tag("nav", tag("span", "skillframe", class_="brand"), tag("div", *links, class_="links"), toggle)
+    return bar(links)
 
 
 def _sections(chapter: Chapter) -> list[tuple[str, str]]:

@@ -320,9 +320,4 @@
   const viewers = Array.from(document.querySelectorAll(".viewer"));
   const startNext = () => { if (viewers.length) { new Viewer(viewers.shift()); setTimeout(startNext, 0); } };
   startNext();
-  const toggle = document.getElementById("theme");
-  toggle.addEventListener("click", () => {
-    const root = document.documentElement, dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
-    root.dataset.theme = dark ? "light" : "dark";
-  });
 })();

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from skillframe.reports.markup import Markup, data_uri, join, note, table, tag
-from skillframe.reports.page import POLICY
+from skillframe.reports.shell import POLICY
 from skillframe_benchmarks.assembly import Level, Plan
 from skillframe_benchmarks.assets import DEVELOPED
 from skillframe_benchmarks.counts import OFTEN, Found, Share, share
