@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from skillframe.cli import names
-from skillframe.cli.endings import SKILL
+from skillframe.cli.endings import PAGE, SKILL
 from skillframe.cli.numbers import WHOLE
 from skillframe.cli.output import emit_json
 from skillframe.cli.words import tell
@@ -17,6 +19,7 @@ from skillframe.cli.words import tell
 @click.command()
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--out", required=True, type=SKILL, help="Policy file to write (.json).")
+@click.option("--page", type=PAGE, help="HTML file to write: drag a boundary there, and it gives the line.")
 @click.option("--phases", type=WHOLE, help="Number of phases; default: it is found.")
 @click.option(
     "--segmenter", default="wrench_hmm", show_default=True, shell_complete=names.segmenters,
@@ -41,31 +44,56 @@ from skillframe.cli.words import tell
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A setting of segmenter or learner.")
 @click.option("--json", "as_json", is_flag=True, help="Print the policy document as JSON on stdout as well.")
 def command(
-    files: tuple[Path, ...], out: Path, phases: int | None, segmenter: str, skill: str, boundaries: tuple[str, ...],
-    at: str | None, hand: str | None, axes: str, settings: tuple[str, ...], as_json: bool,
+    files: tuple[Path, ...], out: Path, page: Path | None, phases: int | None, segmenter: str, skill: str,
+    boundaries: tuple[str, ...], at: str | None, hand: str | None, axes: str, settings: tuple[str, ...], as_json: bool,
 ) -> int:  # fmt: skip
     """Cut FILES, demonstrations of a whole task, into phases, learn each phase, and write a policy.
 
     Phases that one motion explains get one label, so that sliding down either side of a valley is one phase. Where a
-    boundary is not where it should be, move it.
+    boundary is not where it should be, move it: on the page that --page writes, or by --set-boundary.
 
     \b
     Examples:
       skillframe segment left.npz right.npz --out valley.policy.json
       skillframe segment a.csv b.csv c.csv --phases 3 --at tip --out box.policy.json
+      skillframe segment left.npz right.npz --page cuts.html --out valley.policy.json
       skillframe segment left.npz right.npz --set-boundary 2:1=3.45 --out valley.policy.json
     """
+    from skillframe.api.inputs import demonstrations_of
     from skillframe.api.learning import segment_with
     from skillframe.config import parse_setting
     from skillframe.extend.records import LearnOptions
 
     values: dict[str, Any] = dict(parse_setting(text) for text in settings)
     values |= {"segmenter": segmenter, "skill": skill, "phases": phases, "set_boundary": list(boundaries)}
-    policy = segment_with(files, LearnOptions(at=at, hand=hand, axes=axes, settings=values))
+    demonstrations = demonstrations_of(files)
+    policy = segment_with(demonstrations, LearnOptions(at=at, hand=hand, axes=axes, settings=values))
     policy.save(out)
     count = len(policy.phases)
     made = f"{out}: {count} phase{'s' * (count != 1)} from {len(files)} demonstration{'s' * (len(files) != 1)}"
     tell([made, *policy.words], err=as_json)
+    if page is not None:
+        from skillframe.files import write_whole
+        from skillframe.reports.cuts import page as page_of
+
+        write_whole(page, page_of(policy.document, policy.words, demonstrations, _line()).encode("utf-8"))
+        click.echo(f"{page}: open it in a browser, drag a boundary, and run the line that it says", err=as_json)
     if as_json:
         emit_json(policy.document)
     return 0
+
+
+def _line() -> str:
+    """The command as it was typed, without its `--set-boundary`."""
+    context = click.get_current_context()
+    words = ["skillframe", "segment", *(str(file) for file in context.params["files"])]
+    for option in context.command.params:
+        typed = option.name and context.get_parameter_source(option.name) is ParameterSource.COMMANDLINE
+        if not typed or not isinstance(option, click.Option) or option.name == "boundaries":
+            continue
+        value, name = context.params[option.name], max(option.opts, key=len)
+        if option.is_flag:
+            words.append(name)
+        else:
+            words += [word for each in (value if option.multiple else [value]) for word in (name, str(each))]
+    return shlex.join(words)

@@ -70,7 +70,7 @@ def time_plot(
     names = [(c.name, c.stroke) for c in curves if c.name]
     content = [
         axes.frame(),
-        _shades(axes, time, shaded),
+        shades(axes, time, shaded),
         *(axes.line(*envelope(time, c.values), c.stroke) for c in curves),
     ]
     content += [legend(axes, names), _limit_line(axes, limit, unit), _event_marks(axes, events), _cursor(axes)]
@@ -95,7 +95,7 @@ def _value_range(curves: Sequence[Curve], unit: str, limit: float | None) -> tup
     return low, high + HEADROOM * (high - low)
 
 
-def _shades(axes: Axes, time: Float, shaded: NDArray[np.bool_] | None) -> Markup:
+def shades(axes: Axes, time: Float, shaded: NDArray[np.bool_] | None) -> Markup:
     """A band over every stretch of samples that are to be shaded, each as long as its samples last."""
     if shaded is None or not np.any(shaded):
         return Markup("")
@@ -180,12 +180,12 @@ def run_plots(trace: Trace, force_limit: float | None = None) -> list[Markup]:
     moved = _pairs(1e3 * (trace.desired_position - origin), 1e3 * (trace.position - origin))
     turns = _pairs(turned(trace.desired_quaternion, first), turned(trace.quaternion, first))
     plots = [
-        time_plot("Contact force", "N", time, [true_size, *_components(trace.wrench[:, :3], "thin"), size],
+        time_plot("Contact force", "N", time, [true_size, *components(trace.wrench[:, :3], "thin"), size],
                   limit=None if limit is None else float(limit), events=events, shaded=doubted(trace.machine),
                   caption=(ESTIMATE_CAPTION if trace.estimated else FORCE_CAPTION) + _short_peak(trace)),
         time_plot("Position", "mm", time, moved, events=events, caption=POSITION_CAPTION),
         time_plot("Attitude", "°", time, turns, events=events, caption=ATTITUDE_CAPTION),
-        time_plot("Contact torque", "Nm", time, _components(trace.wrench[:, 3:], ""), events=events,
+        time_plot("Contact torque", "Nm", time, components(trace.wrench[:, 3:], ""), events=events,
                   caption=TORQUE_CAPTION),
     ]  # fmt: skip
     return plots[:2] if trace.estimated else plots
@@ -210,10 +210,10 @@ def demonstration_plots(demonstration: Demonstration) -> Markup:
     force, extra = demonstration.wrench[:, :3], demonstration.extra
     size = Curve(name="|F|", values=norm(force), stroke="line ink")
     return join([
-        time_plot("Force", "N", time, [*_components(force, "thin"), size], width=350, shaded=(unsure := doubted(extra)),
+        time_plot("Force", "N", time, [*components(force, "thin"), size], width=350, shaded=(unsure := doubted(extra)),
                   caption=DOUBT_CAPTION if unsure is not None and np.any(unsure) else ""),
-        time_plot("Position", "mm", time, _components(moved, ""), width=350),
-        time_plot("Attitude", "°", time, _components(turn, ""), width=350),
+        time_plot("Position", "mm", time, components(moved, ""), width=350),
+        time_plot("Attitude", "°", time, components(turn, ""), width=350),
     ])  # fmt: skip
 
 
@@ -224,10 +224,11 @@ def turned(quaternion: Float, first: Float) -> Float:
     return result
 
 
-def _components(values: Float, style: str) -> list[Curve]:
+def components(values: Float, style: str) -> list[Curve]:
+    """Curves of the components of vectors (T, 3), in the colours of x, y and z and in a further style."""
     return [Curve(name=n, values=values[:, i], stroke=f"line c{i + 1} {style}".strip()) for i, n in enumerate(AXES)]
 
 
 def _pairs(wanted: Float, measured: Float) -> list[Curve]:
     dashed = [Curve(name="", values=wanted[:, i], stroke=f"line c{i + 1} dashed") for i in range(3)]
-    return [*dashed, *_components(measured, "")]
+    return [*dashed, *components(measured, "")]

@@ -10,7 +10,7 @@ from importlib.resources import files
 from typing import Any
 
 from skillframe.reports.markup import Markup, data_uri, figure, join, note, table, tag
-from skillframe.reports.page import POLICY
+from skillframe.reports.shell import POLICY
 from skillframe_papers.counts import SAID, with_intervals
 from skillframe_papers.document import origin, threshold
 
