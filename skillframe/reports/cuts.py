@@ -139,7 +139,7 @@ def _chip(label: int) -> Markup:
 def _phases(words: Sequence[str]) -> Markup:
     """The phases in words, each with its colour, and folded what else the segmentation says."""
     found = [(line, PHASE.match(line)) for line in words]
-    items = [tag("li", _chip(int(m[1]) - 1), f"{m[2].strip()} ".lstrip(), m[3]) for _, m in found if m is not None]
+    items = [tag("li", _chip(int(m[1]) - 1), f"{m[2].strip()}: " if m[2] else "", m[3]) for _, m in found if m is not None]
     rest = [tag("li", line) for line, m in found if m is None]
     return join([
         tag("ul", *items, class_="phases") if items else "",
@@ -160,7 +160,8 @@ def _recording(number: int, name: str, row: Mapping[str, Any], cut: Cut, demonst
         for (start, stop), label in zip(pairwise([first, *cut.shown, last]), row["labels"], strict=True)
     ]  # fmt: skip
     handles = [_handle(number, k, time, share(time), cut.movable) for k, time in enumerate(cut.shown, start=1)]
-    drawn = tag("div", *bands, *lanes_of(demonstration), axis(first, last), *handles, class_="lanes")
+    ghosts = [tag("div", class_="ghost") for _ in cut.shown] if cut.movable else []
+    drawn = tag("div", *bands, *lanes_of(demonstration), axis(first, last), *ghosts, *handles, class_="lanes")
     figures = [_figure(k, time, row["labels"]) for k, time in enumerate(cut.shown, start=1)] if cut.movable else []
     length = tag("span", f"{last - first:.2f} s", class_="badge")
     title = tag("h2", f"{number}. ", name, " ", length)

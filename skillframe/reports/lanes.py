@@ -98,7 +98,7 @@ def _share(axes: Axes, value: float) -> float:
 def axis(first: float, last: float) -> Markup:
     """The time axis below the lanes, in seconds as they stand in the recording."""
     marks = [
-        tag("span", f"{t:.12g}", style=f"left:{100.0 * (t - first) / (last - first):.3f}%")
+        tag("span", f"{t + 0.0:.12g}", style=f"left:{100.0 * (t - first) / (last - first):.3f}%")
         for t in ticks(first, last, 7)
     ]
-    return tag("div", join(marks), tag("em", "time [s]"), class_="axis")
+    return tag("div", join(marks), tag("em", "[s]"), class_="axis")

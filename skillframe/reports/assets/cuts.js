@@ -7,12 +7,20 @@
   const onGrid = (time) => Number((Math.round(time / STEP) * STEP).toFixed(2));
   const written = (time) => String(Number(time.toFixed(6)));
 
+  function element(name, text) {
+    const made = document.createElement(name);
+    made.className = "word";
+    made.textContent = text;
+    return made;
+  }
+
   class Recording {
     constructor(element, row, number) {
       Object.assign(this, row, { number, at: row.shown.slice(), touched: row.set.slice() });
       this.lanes = element.querySelector(".lanes");
       this.bands = Array.from(element.querySelectorAll(".band"));
       this.handles = Array.from(element.querySelectorAll(".handle"));
+      this.ghosts = Array.from(element.querySelectorAll(".ghost"));
       this.figures = Array.from(element.querySelectorAll(".boundaries li"));
       if (!this.movable) return;
       this.lanes.addEventListener("pointerdown", (e) => this.grab(e));
@@ -106,7 +114,8 @@
         handle.style.setProperty("--share", share(this.at[k]));
         handle.querySelector("i").textContent = text;
         if (!this.movable) return;
-        handle.classList.toggle("moved", this.touched[k]);
+        for (const each of [handle, this.ghosts[k]]) each.classList.toggle("moved", this.touched[k]);
+        this.ghosts[k].style.left = `${100 * share(this.rest[k])}%`;
         for (const [name, value] of [["now", this.at[k].toFixed(2)], ["text", text], ["min", low.toFixed(2)], ["max", high.toFixed(2)]]) handle.setAttribute(`aria-value${name}`, value);
         const figure = this.figures[k], entry = figure.querySelector("input");
         figure.classList.toggle("moved", this.touched[k]);
@@ -123,12 +132,8 @@
   function show() {
     recordings.forEach((each) => each.show());
     const moves = recordings.flatMap((each) => each.moves()), all = recordings.reduce((sum, each) => sum + each.at.length, 0);
-    line.textContent = data.line;
-    for (const move of moves) {
-      const mark = document.createElement("mark");
-      mark.textContent = `--set-boundary ${move}`;
-      line.append(" ", mark);
-    }
+    line.replaceChildren(...data.line.split(" ").flatMap((word, i) => [i ? " " : "", element("span", word)]));
+    for (const move of moves) line.append(" ", element("mark", `--set-boundary ${move}`));
     told.textContent = (moves.length ? `${moves.length} of ${all} boundaries moved.` : "Nothing is moved: the line repeats the cut as it was found.")
       + " Run it where segment was run.";
   }
