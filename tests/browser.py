@@ -11,6 +11,7 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -20,6 +21,13 @@ FLAGS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync",
     "--disable-background-networking", "--disable-component-update", "--remote-debugging-pipe",
 )  # fmt: skip
+
+
+HAND_OVER = (
+    "import fcntl, os, sys; a, b = (fcntl.fcntl(int(x), fcntl.F_DUPFD, 10) for x in sys.argv[1:3]); "
+    "os.dup2(a, 3); os.dup2(b, 4); os.execv(sys.argv[3], sys.argv[3:])"
+)
+"""Python that puts two file descriptors where the browser looks for them, and becomes the browser."""
 
 
 class Tab:
@@ -39,7 +47,7 @@ class Tab:
         self._count, self._text = 0, b""
         to_read, self._write = os.pipe()
         self._read, to_write = os.pipe()
-        command = ["sh", "-c", f'exec "$@" 3<&{to_read} 4>&{to_write}', "sh", str(BROWSER), *FLAGS,
+        command = [sys.executable, "-ESc", HAND_OVER, str(to_read), str(to_write), str(BROWSER), *FLAGS,
                    f"--user-data-dir={profile}", "about:blank"]  # fmt: skip
         self._process = subprocess.Popen(
             command, pass_fds=(to_read, to_write), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
@@ -47,6 +55,13 @@ class Tab:
         os.close(to_read)
         os.close(to_write)
         self._session: str | None = None
+        try:
+            self._open(page, width, height, dark, touch)
+        except BaseException:
+            self.__exit__(None, None, None)
+            raise
+
+    def _open(self, page: Path, width: int, height: int, dark: bool, touch: bool) -> None:
         target = next(t for t in self.call("Target.getTargets")["targetInfos"] if t["type"] == "page")["targetId"]
         self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):

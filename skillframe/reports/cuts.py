@@ -139,7 +139,9 @@ def _chip(label: int) -> Markup:
 def _phases(words: Sequence[str]) -> Markup:
     """The phases in words, each with its colour, and folded what else the segmentation says."""
     found = [(line, PHASE.match(line)) for line in words]
-    items = [tag("li", _chip(int(m[1]) - 1), f"{m[2].strip()}: " if m[2] else "", m[3]) for _, m in found if m is not None]
+    items = [
+        tag("li", _chip(int(m[1]) - 1), f"{m[2].strip()}: " if m[2] else "", m[3]) for _, m in found if m is not None
+    ]
     rest = [tag("li", line) for line, m in found if m is None]
     return join([
         tag("ul", *items, class_="phases") if items else "",
