@@ -8,6 +8,7 @@ import pytest
 
 from skillframe.cli.main import run
 from skillframe.extend.reading import write_demonstration
+from skillframe.reports.cuts import page as page_of
 from tests.browser import BROWSER, Tab
 from tests.figures import quasistatic as made
 
@@ -72,7 +73,8 @@ def test_a_boundary_dragged_with_the_mouse_is_where_the_line_puts_it(page, folde
             "--page",
             "p.html",
         ]
-        start, stop = grip(window, 2, 1, by=40.0)
+        (x, y), _ = grip(window, 2, 1)
+        start, stop = (x + 6.0, y), (x + 46.0, y)  # beside the line: it must not jump to the pointer
         window.mouse("mousePressed", *start)
         window.mouse("mouseMoved", *stop)
         shown = window.value(f'document.querySelector("{handle(2, 1)} i").innerText')
@@ -142,6 +144,23 @@ def test_on_a_phone_a_finger_drags_a_boundary_and_scrolls_the_page_beside_it(pag
         window.swipe(start, (start[0], start[1] - 150.0))
         assert window.value("new Promise(done => setTimeout(() => done(scrollY), 300))") > scrolled + 50.0
         assert len(moves(window)) == 1
+
+
+def test_moving_one_boundary_of_a_recording_that_followed_holds_the_others_where_they_are_seen(page, folder, tmp_path):
+    policy = json.loads((folder / "p.json").read_text())
+    found = policy["demonstrations"][0]
+    followed = {**found, "boundaries": [found["boundaries"][0] + 0.5, found["boundaries"][1]], "found": found}
+    policy["demonstrations"][0] = followed
+    demonstrations = [each.demonstration for each in made.demonstrations("wipe", 21)]
+    (tmp_path / "f.html").write_text(page_of(policy, [], demonstrations, "skillframe segment"), encoding="utf-8")
+    with tab(tmp_path / "f.html", tmp_path) as window:
+        assert moves(window) == []
+        window.value(f'document.querySelector("{handle(1, 2)}").focus()')
+        window.key("PageDown")
+        assert moves(window) == [f"1:1={at(window, 1, 1):g}", f"1:2={at(window, 1, 2):g}"]
+        assert at(window, 1, 1) == pytest.approx(found["boundaries"][0] + 0.5, abs=0.005)
+        window.key("Escape")
+        assert moves(window) == []
 
 
 def test_the_line_is_copied(page, tmp_path):
