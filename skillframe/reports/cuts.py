@@ -198,7 +198,7 @@ def _figure(boundary: int, time: float, labels: Sequence[int]) -> Markup:
 
 
 def _line(line: str, movable: bool) -> Markup:
-    """The command that repeats the cut; the script keeps it."""
+    """The command that repeats the cut, which the script keeps up to date."""
     buttons = [
         tag("button", "Copy", type="button", id="copy"),
         tag("button", "Put all back", type="button", id="reset") if movable else "",
