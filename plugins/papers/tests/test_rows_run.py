@@ -1,0 +1,41 @@
+"""Verdicts on whole tasks run by an arm, from successes made up here."""
+
+import numpy as np
+import pytest
+from skillframe_papers.rows import whole_tasks
+from skillframe_papers.rows.skills import Ran
+
+from skillframe.execution.prepare import load_world
+from skillframe.extend.records import RowRun
+
+
+def ran(hits, count=24):
+    return Ran(np.arange(count).reshape(4, -1) < hits)
+
+
+@pytest.mark.parametrize(
+    ("policy", "one", "shifted", "placed", "expected"),
+    [
+        (24, 0, 3, 2, "pass"),
+        (24, 24, 3, 2, "fail"),  # one phase does as well
+        (24, 0, 3, 20, "fail"),  # and so does a replay
+        (20, 0, 3, 2, "reported"),
+        (12, 0, 0, 0, "fail"),
+    ],
+)
+def test_a_policy_is_worth_something_only_if_one_phase_and_replays_do_less(policy, one, shifted, placed, expected):
+    names = ("policy", *whole_tasks.NULLS, whole_tasks.HALVES)
+    counts = dict(zip(names, (policy, one, shifted, placed, policy), strict=True))
+    row = whole_tasks._told(RowRun(settings={}), {name: ran(hits) for name, hits in counts.items()})
+    assert row.verdict == expected
+    assert row.ours.endswith(f"cut in the middle {policy}") and "are not behind" in row.difference
+
+
+def test_whole_tasks_start_as_shown_and_their_fixtures_stand_elsewhere_within_what_is_said():
+    task = whole_tasks.TASKS["hose coupler"]
+    scene = load_world(task.world, dict(task.params))
+    draws = whole_tasks._draws(task, scene, 6, 1)
+    shown = [start["start.tilt_y"] for start in scene.task.starts]
+    assert draws["start.tilt_y"].tolist() == [shown[i % len(shown)] for i in range(6)]
+    for key, most in task.moved.items():
+        assert 0.0 < np.abs(draws[key]).max() <= most and len(set(draws[key])) == 6
