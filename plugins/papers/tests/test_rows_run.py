@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from skillframe_papers.rows import whole_tasks
+from skillframe_papers.rows import screws, whole_tasks
 from skillframe_papers.rows.skills import Ran
 
 from skillframe.execution.prepare import load_world
@@ -39,3 +39,40 @@ def test_whole_tasks_start_as_shown_and_their_fixtures_stand_elsewhere_within_wh
     assert draws["start.tilt_y"].tolist() == [shown[i % len(shown)] for i in range(6)]
     for key, most in task.moved.items():
         assert 0.0 < np.abs(draws[key]).max() <= most and len(set(draws[key])) == 6
+
+
+SCREW = {
+    "phases": [
+        {
+            "translation": {"desired_direction": [0.0, 0.0, -1.0], "speed": 0.004},
+            "rotation": {"desired_direction": [0.0, 0.0, 1.0], "speed": 0.08},
+            "pitch": 0.05,
+        }
+    ]
+}
+
+
+def test_a_screw_motion_pushes_and_turns_as_its_pitch_says_and_its_nulls_lack_one_of_them():
+    assert screws.says(SCREW)
+    assert not screws.says(screws.without(SCREW, "rotation")) and not screws.says(screws.without(SCREW, "translation"))
+    assert not screws.says(screws.paced(SCREW)) and screws.says(SCREW)  # what is made of it leaves it as it is
+    assert not screws.says({"phases": [{**SCREW["phases"][0], "pitch": 0.04}]})
+
+
+@pytest.mark.parametrize(
+    ("ours", "push", "turn", "told", "expected"),
+    [
+        (24, 2, 2, 4, "pass"),
+        (24, 24, 2, 4, "fail"),
+        (24, 2, 24, 4, "fail"),
+        (24, 2, 2, 0, "fail"),
+        (8, 0, 0, 4, "fail"),
+    ],
+)
+def test_a_screw_s_row_fails_if_the_push_or_the_turn_does_it_alone_or_if_it_is_not_told(
+    ours, push, turn, told, expected
+):
+    found = {screws.OURS: ran(ours), screws.PUSH: ran(push), screws.TURN: ran(turn), screws.HAND: ran(24)}
+    row = screws._told(RowRun(settings={}), found, told, 0)
+    assert row.verdict == expected
+    assert ("by hand" in row.difference) or ours < 24
