@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from skillframe_papers.rows import screws, whole_tasks
+from skillframe_papers.rows import exceptions, screws, whole_tasks
 from skillframe_papers.rows.skills import Ran
 
 from skillframe.execution.prepare import load_world
@@ -76,3 +76,23 @@ def test_a_screw_s_row_fails_if_the_push_or_the_turn_does_it_alone_or_if_it_is_n
     row = screws._told(RowRun(settings={}), found, told, 0)
     assert row.verdict == expected
     assert ("by hand" in row.difference) or ours < 24
+
+
+@pytest.mark.parametrize(
+    ("ours", "alone", "spiral", "expected"),
+    [(24, 0, 12, "pass"), (24, 24, 12, "fail"), (24, 0, 24, "pass"), (20, 0, 0, "reported"), (10, 0, 0, "fail")],
+)
+def test_a_search_on_a_stall_is_judged_beside_the_push_alone_and_says_whether_an_untaught_spiral_does_less(
+    ours, alone, spiral, expected
+):
+    found = {exceptions.OURS: ran(ours), exceptions.NULL: ran(alone), exceptions.SPIRAL: ran(spiral)}
+    row = exceptions._told(RowRun(settings={}), found, {exceptions.OURS: [5.0]})
+    assert row.verdict == expected
+    assert ("not behind" in row.difference) == (spiral == 24)
+    assert row.rows[0][3] == "5.0 s" and row.rows[1][3] == "-"
+
+
+def test_the_fixture_of_the_search_stands_3_to_5_mm_beside_its_place():
+    off = exceptions.draws(50, 1)
+    length = np.hypot(off["fixture.offset_x"], off["fixture.offset_y"])
+    assert 0.003 <= length.min() < length.max() <= 0.005
