@@ -6,8 +6,9 @@ Labels y are 1 and -1. With the Matern covariance of order 5/2, one length l_i p
     k(r) = (1 + sqrt(5) r + 5 r^2 / 3) exp(-sqrt(5) r),      r^2 = sum ((x_i - x'_i) / l_i)^2,
 
 and noise variance s^2 on the labels, the mean at x is k(x, X) (K + s^2 I)^-1 y. Lengths and noise maximise the marginal
-likelihood (their equation 2.30) over a fixed ladder, one coordinate after the other. Prior mean 0, that is "unknown",
-and variance 1 are our choice. Nothing that is claimed rests on it: it proposes, fresh trials decide.
+likelihood (their equation 2.30) over a fixed ladder, one coordinate after the other, from two noises: from one alone
+the climb may end on a lower hill, where lengths are so short that no trial tells of its neighbours. Prior mean 0, that
+is "unknown", and variance 1 are our choice. Nothing that is claimed rests on it: it proposes, fresh trials decide.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from skillframe.frames import Float
 LENGTHS = tuple(float(v) for v in np.geomspace(0.05, 4.0, 13))
 NOISES = (1e-3, 1e-2, 0.1, 0.5)
 """Of the labels' variance."""
+FROM = (NOISES[1], NOISES[-1])
+"""Where the climbs to the largest likelihood begin."""
 MOST_ROWS = 320
 """Rows by which lengths and noise are chosen; more hardly change them, and cost their third power."""
 ROUNDS = 3
@@ -99,8 +102,15 @@ def covariance(first: Float, second: Float, lengths: Float) -> Float:
 
 
 def _chosen(points: Float, labels: Float) -> tuple[Float, float]:
-    """Lengths (d,) and noise of the largest marginal likelihood on the ladder."""
-    places, noise = [LENGTHS.index(min(LENGTHS, key=lambda v: abs(v - 1.0)))] * points.shape[1], NOISES[2]
+    """Lengths (d,) and noise of the largest marginal likelihood on the ladder, of climbs from little and much noise."""
+    found = (_climbed(points, labels, noise) for noise in FROM)
+    _, lengths, noise = max(found, key=lambda one: one[0])
+    return lengths, noise
+
+
+def _climbed(points: Float, labels: Float, noise: float) -> tuple[float, Float, float]:
+    """A local maximum of the likelihood, its lengths (d,) and its noise, one coordinate after the other."""
+    places = [LENGTHS.index(min(LENGTHS, key=lambda v: abs(v - 1.0)))] * points.shape[1]
 
     def lengths(at: list[int]) -> Float:
         return np.array([LENGTHS[i] for i in at])
@@ -120,7 +130,7 @@ def _chosen(points: Float, labels: Float) -> tuple[Float, float]:
                 best, noise = found, tried_noise
         if best == before:
             break
-    return lengths(places), noise
+    return best, lengths(places), noise
 
 
 def _likelihood(points: Float, labels: Float, lengths: Float, noise: float) -> float:

@@ -85,15 +85,15 @@ def batch_share(left):
     return [-(-size // 4) for size in sizes]
 
 
-def test_batches_grow_and_stay_below_an_eighth_of_the_budget():
-    assert [border.batch_size(n, 2048) for n in range(1, 9)] == [32, 32, 64, 64, 128, 128, 256, 256]
-    assert border.batch_size(9, 1024) == 128
+def test_batches_stay_below_an_eighth_of_the_budget():
+    assert [border.batch_size(d, border.BUDGET[d]) for d in (1, 2, 3, 4)] == [16, 32, 64, 128]
+    assert border.batch_size(3, 192) == 24
 
 
 def test_trials_to_go_never_pass_the_budget_and_end_with_the_search():
-    assert border.to_go(0.5, 0, 64, 1, 416) == 416 - 64
-    assert border.to_go(0.01, 2, 200, 4, 416) == 0
-    assert border.to_go(0.01, 1, 160, 3, 1024) == border.batch_size(4, 1024)
+    assert border.to_go(0.5, 0, 64, 32, 416) == 416 - 64
+    assert border.to_go(0.01, 2, 200, 32, 416) == 0
+    assert border.to_go(0.01, 1, 160, 64, 1024) == 64
 
 
 def test_the_smallest_disturbance_of_two_planes_is_the_nearer_one():
