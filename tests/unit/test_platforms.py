@@ -18,7 +18,7 @@ from skillframe.fmu import child
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = [
     "skillframe",
-    *(f"skillframe_{p.name}" for p in sorted((ROOT / "plugins").glob("*/")) if (p / "src").is_dir()),
+    *(p.name for p in sorted((ROOT / "plugins").glob("*/src/skillframe_*"))),  # lerobot_policy_... needs LeRobot
 ]
 ELSEWHERE = f"""
 import importlib, os, pkgutil, signal, sys
