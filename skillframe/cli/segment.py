@@ -63,7 +63,9 @@ def command(
     from skillframe.api.learning import segment_with
     from skillframe.config import parse_setting
     from skillframe.extend.records import LearnOptions
+    from skillframe.extend.registry import registry
 
+    registry().segmenter(segmenter)  # what is not installed is said before recordings are read
     values: dict[str, Any] = dict(parse_setting(text) for text in settings)
     values |= {"segmenter": segmenter, "skill": skill, "phases": phases, "set_boundary": list(boundaries)}
     demonstrations = demonstrations_of(files)
