@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -12,10 +13,10 @@ from skillframe.conditioning.contact import first_free_air
 from skillframe.conditioning.cored import cored
 from skillframe.conditioning.noise import LEAST_SAMPLES, model_of, noise_figures
 from skillframe.conditioning.payload import Payload, gravity_in_tool, identify_payload, refuse_absurd
-from skillframe.demonstration.faults.fault import COPY, SATURATED
-from skillframe.demonstration.faults.find import alive, faults, remembered
+from skillframe.demonstration.faults.fault import COPY, SATURATED, Flaw, kept
+from skillframe.demonstration.faults.find import alive, faults, with_named
 from skillframe.demonstration.record import Demonstration
-from skillframe.demonstration.stalls import stalls
+from skillframe.demonstration.stalls import Stall, kept_stalls, stalls
 from skillframe.errors import InputError
 from skillframe.frames import Float, norm, rotate_spatial
 from skillframe.signals.kalman import WrenchFilter, WrenchModel
@@ -23,6 +24,8 @@ from skillframe.signals.kalman import WrenchFilter, WrenchModel
 METHODS = ("smoother", "filter", "none")
 LEAST_STRETCH = 0.2
 LEAST_DOUBT = 0.5
+CONDITIONING = "conditioning"
+"""Metadata key of what was done to a wrench here."""
 VERBS = {COPY: "is copied", SATURATED: "saturates"}
 
 
@@ -33,11 +36,32 @@ class Removed(NamedTuple):
         demonstration: what remains.
         payload: what was identified; `mass` is 0 where only the bias was removed.
         stretch: the free-air stretch that was used [s].
+        live: (T,) samples whose wrench is what the sensor measured.
     """
 
     demonstration: Demonstration
     payload: Payload
     stretch: tuple[float, float]
+    live: NDArray[np.bool_]
+
+
+class _Scanned(NamedTuple):
+    """What is wrong with a demonstration, and which of its (T,) samples are what the sensor measured."""
+
+    held: list[Stall]
+    found: list[Flaw]
+    live: NDArray[np.bool_]
+
+
+def _scanned(demonstration: Demonstration) -> _Scanned:
+    """A wrench that was conditioned here hides its faults, and its metadata name them: it is not looked at again."""
+    d = demonstration
+    if CONDITIONING in d.meta:
+        held, found = kept_stalls(d.meta, d.source), kept(d.meta, d.source)
+    else:
+        held = stalls(d)
+        found = faults(d, held)
+    return _Scanned(held, found, alive(d, held, found))
 
 
 def smooth(demonstration: Demonstration, model: WrenchModel | None = None) -> Demonstration:
@@ -57,27 +81,20 @@ def filter_wrench(demonstration: Demonstration, model: WrenchModel | None = None
 
 
 def _with_filter(demonstration: Demonstration, model: WrenchModel | None, method: str) -> Demonstration:
-    d, dt = demonstration, 1.0 / demonstration.rate
+    d, dt, scanned = demonstration, 1.0 / demonstration.rate, _scanned(demonstration)
     if model is None:
-        live = alive(d)
-        model = model_of(d, live)
-        wrench, chosen = cored(d.time, d.wrench, model, causal=method == "filter", alive=live)
+        model = model_of(d, scanned.live)
+        wrench, chosen = cored(d.time, d.wrench, model, causal=method == "filter", alive=scanned.live)
     else:
         design = WrenchFilter(model, dt)
         wrench = (design.smooth if method == "smoother" else design.filter)(d.time, d.wrench)
         chosen = {"corner_hz": model.corner(dt).tolist()}
     said = {"method": method, "noise": model.noise.tolist(), **chosen}
-    return replace(d, wrench=wrench, meta=_noted(with_faults(d), said))
-
-
-def with_faults(demonstration: Demonstration) -> dict[str, Any]:
-    """Metadata that name stalls and faults: a wrench that was turned or smoothed shows them no longer."""
-    d = demonstration
-    return remembered(d.time, np.concatenate([d.position, d.quaternion], axis=1), d.wrench, d.meta, d.source)
+    return replace(d, wrench=wrench, meta=_noted(with_named(d.meta, scanned.held, scanned.found), said))
 
 
 def _noted(meta: dict[str, Any], said: dict[str, Any]) -> dict[str, Any]:
-    return {**meta, "conditioning": {**meta.get("conditioning", {}), **said}}
+    return {**meta, CONDITIONING: {**meta.get(CONDITIONING, {}), **said}}
 
 
 def remove_bias(
@@ -96,14 +113,14 @@ def remove_bias(
             identified cannot be a tool.
     """
     d = demonstration
-    live = alive(d)
+    held, found, live = _scanned(d)
     stretch = stretch or _free_air(d, live)
     inside = (d.time >= stretch[0]) & (d.time <= stretch[1])
     if not np.all(live[inside]):
         raise InputError(
             d.source or "demonstration",
-            f"the wrench {_fault_within(d, stretch)} within {stretch[0]:.3g} to {stretch[1]:.3g} s, so that it shows "
-            "no free air there",
+            f"the wrench {_fault_within(held, found, stretch)} within {stretch[0]:.3g} to {stretch[1]:.3g} s, so that "
+            "it shows no free air there",
             "name a sound stretch (skillframe demonstration check shows what is wrong), or leave the bias (--no-bias)",
         )  # fmt: skip
     if stretch[1] - stretch[0] < LEAST_STRETCH or inside.sum() < 2:
@@ -120,20 +137,19 @@ def remove_bias(
     else:
         payload = _without_mass(d, inside, payload)
     wrench = d.wrench - payload.wrench(d.pose.rotation)
-    meta = _noted(with_faults(d), {"free_air_s": list(stretch), "payload": payload.as_meta()})
+    meta = _noted(with_named(d.meta, held, found), {"free_air_s": list(stretch), "payload": payload.as_meta()})
     if weight and not payload.mass:
         meta = {**meta, "wrench": {**said, "includes_tool_weight": True}}
     elif "includes_tool_weight" in said or weight:
         meta = {**meta, "wrench": {**said, "includes_tool_weight": False}}
-    return Removed(replace(d, wrench=wrench, meta=meta), payload, stretch)
+    return Removed(replace(d, wrench=wrench, meta=meta), payload, stretch, live)
 
 
-def _fault_within(demonstration: Demonstration, stretch: tuple[float, float]) -> str:
+def _fault_within(held: Sequence[Stall], found: Sequence[Flaw], stretch: tuple[float, float]) -> str:
     """What is wrong with the wrench in a stretch, as a verb."""
-    held = stalls(demonstration)
     if any(s.start <= stretch[1] and stretch[0] <= s.stop for s in held):
         return "stalls"
-    kinds = {f.kind for f in faults(demonstration, held) if f.start <= stretch[1] and stretch[0] <= f.stop}
+    kinds = {f.kind for f in found if f.start <= stretch[1] and stretch[0] <= f.stop}
     return next(verb for kind, verb in VERBS.items() if kind in kinds)
 
 
@@ -150,7 +166,7 @@ def doubtful_bias(demonstration: Demonstration, removed: Removed) -> float | Non
     d, force = demonstration, float(norm(removed.payload.bias[:3]))
     if d.meta.get("contact") is False or force <= LEAST_DOUBT:
         return None
-    noise = float(np.sqrt((noise_figures(d.time, d.wrench, alive(d)).quiet[:3] ** 2).mean()))
+    noise = float(np.sqrt((noise_figures(d.time, d.wrench, removed.live).quiet[:3] ** 2).mean()))
     steady = removed.payload.residual_force <= 2.0 * noise and removed.stretch[1] < d.time[-1]
     return None if steady else force
 

@@ -75,7 +75,11 @@ def _touch(one: Stall | Flaw, other: Flaw) -> bool:
 def remembered(time: Float, pose: Float, wrench: Float, meta: Mapping[str, Any], source: str = "") -> dict[str, Any]:
     """Metadata with the stalls and faults of a wrench that is turned, or smoothed, later, and then hides them."""
     held = every_stall(time, pose, wrench, meta, source)
-    found = every_fault(time, pose, wrench, meta, held, source)
+    return with_named(meta, held, every_fault(time, pose, wrench, meta, held, source))
+
+
+def with_named(meta: Mapping[str, Any], held: Sequence[Stall], found: Sequence[Flaw]) -> dict[str, Any]:
+    """Metadata that name these stalls and faults, and no others."""
     return {
         **{name: value for name, value in meta.items() if name not in (STALLS, record.KEY)},
         **({STALLS: as_meta(held)} if held else {}), **({record.KEY: record.as_meta(found)} if found else {}),
