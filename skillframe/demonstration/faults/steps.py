@@ -35,6 +35,8 @@ SIGMAS, LEAST = 12.0, np.repeat([0.5, 0.05], 3)
 AROUND_S, FEWEST = 0.05, 8
 ISOLATED, SAME, USUAL = 0.25, 0.25, 3.0
 LEFT, LONGEST_PERIOD, GROWS = 0.01, 0.02, 0.5  # m, s, share of J
+BLOCK = 4096
+"""Samples that are looked at together."""
 MOST = 1000
 """Differences that are looked at: a channel with more is no channel with steps."""
 
@@ -93,16 +95,24 @@ def _outlasts_contact(pose: Float, wrench: Float, k: int, width: int, which: NDA
     if not size > 0.0:
         return False
     along = change / size
-    gone = np.flatnonzero((pose[k + 1 :, :3] - pose[k, :3]) @ along > LEFT)
-    if not gone.size:
+    end = _first_gone(pose, k, along)
+    if end is None:
         return False
-    end = k + 1 + int(gone[0])
     before = float(np.median(wrench[k + 1 - width : k + 1, :3] @ along))
     free = float(np.median(wrench[:width, :3] @ along))
     if abs(before + size - free) < abs(before - free) + GROWS * size:
         return False
     parts = (wrench[k + 1 : end + 1, :3], wrench[max(k + 1, end - width) : end + width, :3])
     return all(abs(float(np.median(part @ along)) - before - size) <= SAME * size for part in parts)
+
+
+def _first_gone(pose: Float, k: int, along: Float) -> int | None:
+    """The first sample after k at which the tool is `LEFT` further along a direction (3,)."""
+    for start in range(k + 1, len(pose), BLOCK):
+        gone = (pose[start : start + BLOCK, :3] - pose[k, :3]) @ along > LEFT
+        if gone.any():
+            return start + int(np.argmax(gone))
+    return None
 
 
 def _lasting(time: Float, jump: Float, found: list[tuple[int, NDArray[np.bool_]]], sure: list[bool]) -> list[Flaw]:
