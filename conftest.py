@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Iterator
 
 import hypothesis
@@ -13,6 +14,10 @@ from skillframe.extend.registry import registry
 # A law that holds slowly on a loaded machine still holds; speed has its benchmarks.
 hypothesis.settings.register_profile("skillframe", deadline=None)
 hypothesis.settings.load_profile("skillframe")
+
+# A shell starts what runs in the background deaf to Ctrl-C, and the programs that tests interrupt would inherit that.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
