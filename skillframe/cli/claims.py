@@ -228,11 +228,13 @@ def check(folder: Path, replays: int) -> int:
     from skillframe.campaign.claims import procedure
     from skillframe.campaign.claims.certificate import CERTIFICATE, check_certificate
     from skillframe.campaign.claims.plan import PLAN
-    from skillframe.campaign.claims.searches import check_plan
+    from skillframe.campaign.claims.searches import check_plan, other_methods
     from skillframe.campaign.replay import replay_trial
 
     planned = (folder / PLAN).is_file()
     wrong = check_plan(folder) if planned else []
+    if planned and (other := other_methods(folder)) is not None:
+        click.echo(other, err=True)
     if planned and not (folder / CERTIFICATE).is_file():
         for text in wrong:
             click.echo(f"does not fit: {text}", err=True)

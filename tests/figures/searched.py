@@ -1,10 +1,13 @@
 """A skill's border, boxes and breaking point by the campaign's commands, beside Sobol, grid and random trials.
 
-    python -m tests.figures.searched peg --out FOLDER --trials 1000
+    python -m tests.figures.searched peg --out FOLDER
+    python -m tests.figures.searched valley --out FOLDER --seeds 10
 
 Each step is a command, timed in processor seconds, and kept: the same line goes on where it was ended. Beside: as many
 trials as the border took, by Sobol points, a grid and at random. From each the same surrogate predicts 512 fresh
-random trials. What breaks the skill is the nearest failure to what is nominal, of the ranges' half widths.
+random trials. What breaks the skill is the nearest failure to what is nominal, of the ranges' half widths. With
+`--seeds` the border alone is looked for so many times, beside as many Sobol sequences, and what is told is from how
+many trials on the surrogate stays within 5 % of the true set.
 """
 
 from __future__ import annotations
@@ -24,6 +27,13 @@ from skillframe.campaign.claims.surrogate import Surrogate
 from skillframe.cli.main import run
 
 HELD_OUT = 512
+SEQUENCE = 768
+"""Sobol points beside each border."""
+CLOSE = 0.05
+
+
+Tried = tuple[np.ndarray, np.ndarray]
+"""Points (n, d), each range from -1 to 1, and success (n,)."""
 
 
 class Asked(NamedTuple):
@@ -101,6 +111,7 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("task", choices=ASKED)
     parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--seeds", type=int, default=0)
     chosen = parser.parse_args()
     asked, folder = ASKED[chosen.task], chosen.out
     folder.mkdir(parents=True, exist_ok=True)
@@ -110,6 +121,8 @@ def main() -> None:
                                       "--out", str(folder / "fresh"), "--traces", "0"])  # fmt: skip
     points, works = rows_of(asked, folder / "fresh" / "results.csv")
     told("fresh, at random", HELD_OUT, f"{works.mean():.3f} succeed", f"{seconds:.0f} s")
+    if chosen.seeds:
+        return repeated(asked, folder, (points, works), range(100, 100 + chosen.seeds))
 
     border = folder / "border"
     go_on = (
@@ -142,6 +155,32 @@ def main() -> None:
     told("break", (border / "breaking.json").read_text(), f"{seconds:.0f} s")
 
 
+def repeated(asked: Asked, folder: Path, fresh: Tried, seeds: range) -> None:
+    """The border by so many seeds, each beside a Sobol sequence of its own."""
+    for seed in seeds:
+        out, beside = folder / f"border{seed}", folder / f"sobol{seed}"
+        path = campaign(asked, folder, out.name, 1, seed, uniform)
+        timed(folder, out.name, ["campaign", "map", *([str(out)] if out.exists() else [str(path), "--out", str(out)])])
+        rounds = sorted(out.glob("border/*/results.csv"), key=lambda table: int(table.parent.name))
+        seen = rows_of(asked, out / "look" / "results.csv", *rounds)
+        path = campaign(asked, folder, beside.name, SEQUENCE, seed, sobol)
+        timed(folder, beside.name, ["campaign", "run", str(path), "--out", str(beside), "--traces", "0"])
+        found = [stays(tried, fresh) for tried in (seen, rows_of(asked, beside / "results.csv"))]
+        told(f"seed {seed}", *(f"within 5 % from {first}, {last:.3f} after {count}" for first, last, count in found))
+
+
+def stays(seen: Tried, fresh: Tried) -> tuple[float, float, int]:
+    """Trials from which on the error stays within `CLOSE`, the error after all, and how many those are."""
+    (points, works), (there, truth) = seen, fresh
+    counts = range(128, len(works) + 1, 32)
+    wrong = [
+        float((((Surrogate(points[:n], works[:n]).mean(there)) > 0.0) != truth).sum() / truth.sum()) for n in counts
+    ]
+    late = [n for n, share in zip(counts, wrong, strict=True) if share > CLOSE]
+    first = counts[0] if not late else late[-1] + 32
+    return (first if first <= counts[-1] else np.inf), wrong[-1], counts[-1]
+
+
 def grid(low: float, high: float, count: int) -> str:
     return f"{{ grid = {{ from = {low}, to = {high}, count = {count} }} }}"
 
@@ -154,8 +193,8 @@ def rows_nominal(asked: Asked) -> np.ndarray:
 
 def predicted(
     name: str,
-    seen: tuple[np.ndarray, np.ndarray],
-    fresh: tuple[np.ndarray, np.ndarray],
+    seen: Tried,
+    fresh: Tried,
     nominal: np.ndarray,
     cpu: float,
 ) -> None:

@@ -1,6 +1,7 @@
 """`plan.jsonl`: what a folder's searches were about to run, written before it ran.
 
-    {"stream": "border", "round": 3, "names": [...], "points": [[...]], "explored": 8, "rows": ..., "previous": ...}
+    {"stream": "border", "round": 3, "names": [...], "points": [[...]], "explored": 8, "rows": ..., "method": 2,
+     "previous": ...}
 
 A line holds a round's points in SI, the hash of the rows they were computed from, and the hash of the line before, so
 that neither a point nor the order of lines can be changed unseen. Whoever resumes, replays or reports reads the plan;
@@ -24,6 +25,8 @@ from skillframe.files.documents import parse_json
 from skillframe.frames import Float
 
 PLAN = "plan.jsonl"
+METHOD = 2
+"""How searches pick. 1, before the surrogate climbed from two noises, was not written down."""
 FIX = "a plan cannot be repaired: start again in another folder"
 BEGIN = ""
 """What the first line says of the one before."""
@@ -38,6 +41,7 @@ class Round(NamedTuple):
         points: (n, d) in SI.
         explored: how many of them, the first, are even over the ranges.
         rows: hash of the rows that they were computed from.
+        method: how they were picked; another method than `METHOD` cannot be computed again.
     """
 
     stream: str
@@ -45,6 +49,7 @@ class Round(NamedTuple):
     points: Float
     explored: int
     rows: str
+    method: int = METHOD
 
 
 class RoundPlan:
@@ -84,7 +89,8 @@ class RoundPlan:
             stream, number = str(record["stream"]), int(record["round"])
             if number != len(self.of(stream)) + 1:
                 raise ValueError
-            return Round(stream, number, points, int(record["explored"]), str(record["rows"]))
+            method = int(record.get("method", 1))
+            return Round(stream, number, points, int(record["explored"]), str(record["rows"]), method)
         except (KeyError, TypeError, ValueError):
             raise InputError(where, "is damaged", FIX) from None
 
@@ -93,7 +99,7 @@ class RoundPlan:
         entry = Round(stream, len(self.of(stream)) + 1, points, explored, rows)
         record = {
             "stream": stream, "round": entry.round, "names": self._names, "points": points.tolist(),
-            "explored": explored, "rows": rows, "previous": self._head,
+            "explored": explored, "rows": rows, "method": METHOD, "previous": self._head,
         }  # fmt: skip
         line = json.dumps(record, allow_nan=False).encode()
         repair_tail(self._path)

@@ -16,7 +16,7 @@ from skillframe.campaign.claims.engine import Looked
 from skillframe.campaign.claims.plan import PLAN, RoundPlan
 from skillframe.campaign.claims.question import ask_again, begin, read_question
 from skillframe.campaign.claims.rounds import looked
-from skillframe.campaign.claims.searches import check_plan, find_break, nominal, rank
+from skillframe.campaign.claims.searches import check_plan, find_break, nominal, other_methods, rank
 from skillframe.campaign.claims.surrogate import Surrogate, covariance
 from skillframe.cli.searches import _tell_border, _tell_matter
 from skillframe.errors import InputError
@@ -231,7 +231,7 @@ def test_another_rate_may_be_asked_of_the_same_trials(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_four_commands_in_one_folder_agree_with_the_truth_and_with_the_plan(tmp_path):
+def test_the_four_commands_in_one_folder_agree_with_the_truth_and_with_the_plan(tmp_path, monkeypatch):
     """Works in (tilt / 0.32)^2 + (offset / 0.018)^2 < 1, in half ranges 0.8 and 0.9."""
     out = asked(tmp_path)
     procedure.look(out, ENGINE)
@@ -247,6 +247,13 @@ def test_the_four_commands_in_one_folder_agree_with_the_truth_and_with_the_plan(
     assert predicate["looked_at"]["border_rounds"] > 1
     assert predicate["break"] == found["breaking"]
     assert check_plan(out, ValleyParams) == []
+    assert other_methods(out) is None
+    with monkeypatch.context() as otherwise:  # a version that picks otherwise
+        otherwise.setattr(border, "CANDIDATES", 1024)
+        assert any("is not what follows" in text for text in check_plan(out, ValleyParams))
+        otherwise.setattr("skillframe.campaign.claims.searches.METHOD", 99)
+        assert check_plan(out, ValleyParams) == []
+        assert "picked by another version of skillframe" in str(other_methods(out))
     (out / "look" / "results.csv").write_bytes((out / "look" / "results.csv").read_bytes() + b"\n")
     assert any("computed from other tables" in text for text in check_plan(out, ValleyParams))
 
