@@ -54,3 +54,11 @@ def test_chance_is_told_in_words():
     for changes in (4, 12):  # four a recording are a person who touches twice
         assert words({**found, "cuts": 0, "touches": {**touches, "changes": changes}}) == []
     assert "one recording" in words({**found, "recordings": 1})[0]
+
+
+def test_a_share_that_rounds_to_nothing_has_no_sign_and_one_change_is_once():
+    touches = {"changes": 1, "near": 0, "chance": 0.1, "within_s": 0.25}
+    found = {"share": -0.004, "chance": -0.06, "p": 0.1, "shifts": 199, "recordings": 3, "cuts": 3, "touches": touches}
+    share, contact = words(found)
+    assert share.startswith("phases explain 0% of") and "turned round in time -6% (p = 0.1" in share
+    assert contact.startswith("contact begins or ends once, 0 of them")

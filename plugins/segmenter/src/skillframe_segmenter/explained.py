@@ -122,16 +122,25 @@ def words(found: Mapping[str, Any]) -> list[str]:
     alone = " (of one recording by itself, which flatters)" if found["recordings"] == 1 else ""
     verdict = "" if found["p"] <= 0.05 else "; no better than chance: look at the cuts"
     lines = [
-        f"phases explain {found['share']:.0%} of how the tool moved and felt{alone}; turned round in time "
-        f"{found['chance']:.0%} (p = {found['p']:.2g}, {found['shifts']} shifts){verdict}"
+        f"phases explain {_percent(found['share'])} of how the tool moved and felt{alone}; turned round in time "
+        f"{_percent(found['chance'])} (p = {found['p']:.2g}, {found['shifts']} shifts){verdict}"
     ]
     touches = found["touches"]
     if not found["cuts"]:
         many = touches["changes"] > MANY * found["recordings"]
-        return [f"nothing is cut, though contact begins or ends {touches['changes']} times"] if many else []
+        return [f"nothing is cut, though contact begins or ends {_times(touches['changes'])}"] if many else []
     if touches["changes"]:
         lines.append(
-            f"contact begins or ends {touches['changes']} times, {touches['near']} of them within "
+            f"contact begins or ends {_times(touches['changes'])}, {touches['near']} of them within "
             f"{touches['within_s']:g} s of a cut; by chance {touches['chance']:.1f}"
         )
     return lines
+
+
+def _percent(share: float) -> str:
+    """In whole percent, a share that rounds to nothing without a sign."""
+    return f"{round(100.0 * share)}%"
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
