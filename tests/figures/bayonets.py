@@ -2,7 +2,7 @@
 
     python -m tests.figures.bayonets --sets 10 --first 9200
 
-Sets, draws and counting are those of `tests.figures.worth`. The people press with 8 N at most, and every push does.
+Sets, draws and counting are those of `tests.figures.worth`. The people press with 5 N at most, and every push does.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from skillframe_lmc.settings import Settings
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.frames import Float, unit
-from tests.figures.worth import EACH, executed, table
 from tests.figures.worth_families import GENTLE_N, demonstrations, drawn
 from tests.figures.worth_methods import averages, lmc_row, played
+from tests.figures.worth_runs import EACH, executed, table
 from tests.figures.worth_skills import STIFF_NM_RAD, Row, push_along
 
 PERSON, LONGEST, LIKE = "noise 8", 14.0, Row(lead=GENTLE_N["bayonet"], twist=2.0)
