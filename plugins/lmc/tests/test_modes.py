@@ -111,8 +111,8 @@ def test_a_tool_that_turned_keeps_its_votes() -> None:
 
 
 def test_the_outlier_share_is_what_lets_a_short_wrong_way_be_forgotten() -> None:
-    """6 of 50 mm up in the air: without outliers no push explains it, with them it is as if it were not there."""
-    shown = [legs((-40.0, 0.044), (110.0, 0.006), free=1)] * 2
+    """6 of 50 mm up along a wall: without outliers no push explains it, with them it is as if it were not there."""
+    shown = [legs((-40.0, 0.044), (110.0, 0.006))] * 2
     assert part(shown, contact_modes=False)["desired_direction"] is not None
     assert part(shown, contact_modes=False, quantile=1.0)["desired_direction"] is None
 

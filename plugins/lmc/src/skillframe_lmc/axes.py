@@ -30,10 +30,21 @@ from skillframe.frames import Float
 
 
 class CompliantAxes(NamedTuple):
-    """Axes (d, 3), orthonormal and square to the desired direction, and the criterion for 0, 1, 2 (, 3) axes."""
+    """The compliant axes of one part.
+
+    Attributes:
+        axes: (d, 3), orthonormal and square to the desired direction.
+        criterion: what the motion says of 0, 1, 2 (, 3) axes.
+        by_faces: whether the axes are those of faces (`faces`) and not of the motion.
+    """
 
     axes: Float
     criterion: list[float]
+    by_faces: bool = False
+
+    def unless(self, faces: Float) -> CompliantAxes:
+        """These, or axes (d, 3) of faces if there are any."""
+        return CompliantAxes(np.array([_signed(v) for v in faces]), self.criterion, True) if len(faces) else self
 
 
 SPREAD, LEAST = 0.3, 0.08
@@ -59,7 +70,7 @@ def straightness(path: float, correlation: float, pyramid: float | None = None, 
 
 
 def compliant_axes(means: Float, direction: Float | None, sigma: float) -> CompliantAxes:
-    """The compliant axes of one part.
+    """The compliant axes of one part, by its motion.
 
     Args:
         means: (n, 3) mean unit direction of motion of each demonstration.

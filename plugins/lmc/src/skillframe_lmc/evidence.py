@@ -44,6 +44,7 @@ def as_document(part: Learned, settings: Settings) -> dict[str, Any]:
         "work_environment_j": 0.0 if done is None else done.environment,
         "work_fraction": 0.0 if done is None else done.fraction,
         "criterion": [] if part.axes is None else part.axes.criterion,
+        "axes_by_faces": part.axes is not None and part.axes.by_faces,
         "mean_speed": part.speed,
         "demonstrations": [_drawable(m) for m in part.motions],
     }

@@ -78,13 +78,17 @@ def _directions(name: str, part: Part, axes: str) -> Illustration:
 def _axes(name: str, part: Part, axes: str) -> Illustration:
     drawing = _svg(lambda: pictures.axes(name, part, axes))
     count = len(part.compliant_axes)
+    axes_are = f"{count} compliant {'axis' if count == 1 else 'axes'}"
     without = "" if part.desired_direction is None else ", less what the desired direction explains (green)"
     caption = (
         f"Left: the mean direction of motion of each demonstration (blue){without}, and the principal axes (red, those "
         "that became compliant drawn strong). What remains was caused by the environment, so the tool gives way there. "
-        f"Right: the criterion weighs what stays unexplained against the number of axes; the lowest bar wins: "
-        f"{count} compliant {'axis' if count == 1 else 'axes'}."
+        "Right: the criterion weighs what stays unexplained against the number of axes; the lowest bar wins"
     )
+    if part.evidence.get("axes_by_faces"):
+        caption += f", but faces were touched, and they decide: they turned the push aside along {axes_are}."
+    else:
+        caption += f": {axes_are}."
     return Illustration(f"Along which axes must the {name} give way?", caption, drawing)
 
 

@@ -6,7 +6,8 @@ First the pitch, then for translation and rotation alike
     who moved it?      W = F_m . dx, or T_m . dbeta at the hand                     (3)        [work]
                        the environment, if W > 0 prevails: three compliant degrees of freedom
     where to push?     intersection of the pyramids; may not exist                     [sectors, directions, heading]
-    where to give?     principal axes of the motion that the push does not explain              [axes]
+    where to give?     where faces turned the push aside; where none did, or the tool turned,
+                       principal axes of the motion that the push does not explain              [faces, axes]
     how stiff?         zero along compliant axes, k elsewhere                                   [gains]
 
 and if both directions exist, their speeds are coupled by the pitch, lambda = nu / p. The wrench and the position are
@@ -32,10 +33,11 @@ from skillframe.frames import Float, norm, unit
 from skillframe_lmc import evidence, intervals
 from skillframe_lmc.axes import CompliantAxes, compliant_axes, straightness
 from skillframe_lmc.directions import Choice, choose
+from skillframe_lmc.faces import face_axes
 from skillframe_lmc.gains import gains
 from skillframe_lmc.heading import heading
 from skillframe_lmc.intervals import Motion, Track
-from skillframe_lmc.modes import contact_modes, mean_pushes, one_sided
+from skillframe_lmc.modes import choose_of, contact_modes, mean_pushes, one_sided
 from skillframe_lmc.phase import Stop
 from skillframe_lmc.press import Press, presses
 from skillframe_lmc.sectors import Sectors, sectors
@@ -119,27 +121,63 @@ def _learn_part(
         motions = [intervals.touching(motion) for motion in motions]
     least = settings.moving_m if name == "translation" else settings.moving_rad
     moving = [m for m in motions if m.excursion >= least and len(m.displacement)]
-    means = np.array([unit(m.displacement).mean(axis=0) for m in moving]).reshape(-1, 3)
     done = work(moving) if moving else None
-    choice, given, modes, axes = None, [sectors(m) for m in moving], list[Sectors](), None
+    votes = _Votes(None, [sectors(m) for m in moving])
     if done is not None and not done.environment_drove:
-        given = [sectors(m, teacher_driven_only=name == "rotation") for m in moving]
-        if all(len(g.contact) >= min(FEWEST_INTERVALS, len(m.work)) for g, m in zip(given, moving, strict=True)):
-            choice = choose(given, settings, heading(moving, turned and name == "translation"))
-            modes = _modes(moving, choice) if settings.contact_modes and not turned else []
-            choice = choose(modes, settings) if modes else choice
-    stood = _standing(name, tracks, motions, moving, choice, settings)
+        votes = _voted(name, moving, settings, turned)
+    stood = _standing(name, tracks, motions, moving, votes.choice, settings)
     if stood is not None:
-        done, given, choice = stood.work, [p.sectors for p in stood.presses], stood.choice
+        done, votes = stood.work, _Votes(stood.choice, [p.sectors for p in stood.presses])
+    elif votes.choice is not None and votes.choice.direction is None and not turned:
+        moving, votes = _touched(name, moving, votes, settings)
+    choice, means, axes = votes.choice, _means(moving), None
     if done is not None and not done.environment_drove:
         direction = None if choice is None else choice.direction
-        rows = np.concatenate([means, mean_pushes(modes)]) if stood is None else stood.means(least)
+        rows = np.concatenate([means, mean_pushes(votes.modes)]) if stood is None else stood.means(least)
         axes = compliant_axes(rows, direction, _straightness(name, moving, means, choice, settings))
+        if settings.faces and direction is not None and stood is None and not turned:
+            axes = axes.unless(face_axes(moving, direction))
     path, time = sum(m.path for m in moving), sum(m.duration for m in moving)
     return Learned(
-        name=name, motions=motions, moving=moving, given=given, work=done, choice=choice, axes=axes, means=means,
+        name=name, motions=motions, moving=moving, given=votes.given, work=done, choice=choice, axes=axes, means=means,
         speed=path / time if time > 0.0 else 0.0, pressed=() if stood is None else stood.presses,
     )  # fmt: skip
+
+
+class _Votes(NamedTuple):
+    """The direction that intervals chose, the sectors that voted, and the contact modes where these decided."""
+
+    choice: Choice | None
+    given: Sequence[Sectors]
+    modes: Sequence[Sectors] = ()
+
+
+def _voted(name: Name, moving: Sequence[Motion], settings: Settings, turned: bool) -> _Votes:
+    """The votes of motions that the teacher drove. There is no choice where one of them has too few intervals."""
+    given = [sectors(m, teacher_driven_only=name == "rotation") for m in moving]
+    if any(len(g.contact) < min(FEWEST_INTERVALS, len(m.work)) for g, m in zip(given, moving, strict=True)):
+        return _Votes(None, given)
+    choice = choose(given, settings, heading(moving, turned and name == "translation"))
+    modes = _modes(moving, choice) if settings.contact_modes and not turned else []
+    return _Votes(choose_of(modes, settings) if modes else choice, given, modes)
+
+
+def _touched(name: Name, moving: list[Motion], votes: _Votes, settings: Settings) -> tuple[list[Motion], _Votes]:
+    """The motion in contact and its votes, if these agree on a push where all intervals together do not.
+
+    A hand that lets go lets the tool spring back and takes it up from elsewhere: what it does in the air is no push.
+    """
+    touched = [intervals.touching(motion) for motion in moving]
+    if all(len(motion.work) >= FEWEST_INTERVALS for motion in touched):
+        again = _voted(name, touched, settings, turned=False)
+        if again.choice is not None and again.choice.direction is not None:
+            return touched, again
+    return moving, votes
+
+
+def _means(motions: Sequence[Motion]) -> Float:
+    """Mean unit direction of motion (n, 3) of each."""
+    return np.array([unit(m.displacement).mean(axis=0) for m in motions]).reshape(-1, 3)
 
 
 def _modes(moving: Sequence[Motion], choice: Choice) -> list[Sectors]:

@@ -6,12 +6,14 @@ the floor holds 60 to 80 % of the intervals, draws the choice towards the middle
 than 20 % is thrown out as outliers (`directions`, which treats each demonstration as one vote). So intervals in contact
 are counted here as modes: with m the push edge and v the motion of an interval,
 
-    N(k) = { j : angle(m_j, m_k) <= 25 degrees  and  angle(v_j, v_k) <= 40 degrees }
+    N(k) = { j : angle(m_j, m_k) <= 20 degrees  and  angle(v_j, v_k) <= 40 degrees }
 
 the largest N(k) is a mode, and is taken away; the next largest of what is left is the next, while it has 5 intervals or
 more. The modes that hold the first 85 % vote, each as a demonstration of its own in A(D) and M(D), where the largest
 counts for no more than twice the second: so the result does not depend on how long a floor was slid on. What is left
-out is rolling over an edge: 5 to 8 intervals whose force turns from one face to the next, which contradict both. What
+out is rolling over an edge: 5 to 8 intervals whose force turns from one face to the next, which contradict both. Where
+a third mode or a later one still leaves no push inside all sectors (a mean depth under 0), it is left out as well, the
+smallest first, as long as those that are left hold the share of intervals that must agree (`quantile`). What
 came before the farthest-back point along a demonstration's chord is a wrong first try and does not vote. The rule and
 its constants are our choice, because the directions learned on simulated humps then lay inside the pushes that pass (28
 of 28 against 8 by intervals); the papers do not say how intervals are weighed.
@@ -34,10 +36,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float, norm, unit
+from skillframe_lmc.directions import Choice, choose
 from skillframe_lmc.intervals import Motion
-from skillframe_lmc.sectors import Sectors, sectors
+from skillframe_lmc.sectors import Sectors, misses, sectors
+from skillframe_lmc.settings import Settings
 
-SAME_PUSH, SAME_MOTION = cos(radians(25.0)), cos(radians(40.0))
+SAME_PUSH, SAME_MOTION = cos(radians(20.0)), cos(radians(40.0))
 FEWEST = 5
 SHARE = 0.85
 MOST = 2  # times the second largest mode is what the largest counts for
@@ -51,6 +55,23 @@ def contact_modes(motions: Sequence[Motion]) -> list[Sectors]:
     push = np.concatenate([each.push for each in pooled])
     alike = (push @ push.T >= SAME_PUSH) & (motion @ motion.T >= SAME_MOTION)
     return [_some(motion, push, rows) for rows in _largest(alike)]
+
+
+def choose_of(modes: Sequence[Sectors], settings: Settings) -> Choice:
+    """The push inside the sectors of all modes, or without the smallest, as far as they are outliers by their share."""
+    left, whole = list(modes), sum(len(mode.contact) for mode in modes)
+    while True:
+        choice = choose(left, settings)
+        held = sum(len(mode.contact) for mode in left[:-1])
+        inside = choice.direction is not None and depth(choice.direction, left) >= 0.0
+        if inside or len(left) < 3 or held < settings.quantile * whole:
+            return choice
+        left.pop()
+
+
+def depth(direction: Float, modes: Sequence[Sectors]) -> float:
+    """How deep a push (3,) lies in the sectors of the mode that it lies in least, a mean over its intervals [rad]."""
+    return min(float(misses(direction[None], mode)[1].mean()) for mode in modes)
 
 
 def mean_pushes(modes: Sequence[Sectors]) -> Float:

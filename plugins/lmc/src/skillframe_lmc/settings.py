@@ -25,6 +25,7 @@ class Settings:
             only an estimate and whose approach says little about the push.
         contact_modes: count contact modes for the translation, whatever the time that each was slid on; false weighs by
             intervals, demonstration by demonstration.
+        faces: give way in translation where faces turned a quarter of the push aside; false goes by the motion alone.
         quantile: share of a demonstration's intervals that must accept a direction; the rest may be outliers.
         pyramid_min_rad, pyramid_max_rad: least half-opening of the pyramids, and the largest at which a direction is
             still said to exist.
@@ -49,6 +50,7 @@ class Settings:
     torque_min_nm: float = 0.08
     contact_only: bool = False
     contact_modes: bool = True
+    faces: bool = True
     quantile: float = 0.8
     pyramid_min_rad: float = radians(8.0)
     pyramid_max_rad: float = radians(25.0)
