@@ -5,7 +5,7 @@ First the pitch, then for translation and rotation alike
     moved at all?      no: held stiff
     who moved it?      W = F_m . dx, or T_m . dbeta at the hand                     (3)        [work]
                        the environment, if W > 0 prevails: three compliant degrees of freedom
-    where to push?     intersection of the pyramids; may not exist                     [sectors, directions, heading]
+    where to push?     intersection of the pyramids; may not exist      [sectors, directions, heading, modes, votes]
     where to give?     where faces turned the push aside; where none did, or the tool turned,
                        principal axes of the motion that the push does not explain              [faces, axes]
     how stiff?         zero along compliant axes, k elsewhere                                   [gains]
@@ -37,15 +37,15 @@ from skillframe_lmc.faces import face_axes
 from skillframe_lmc.gains import gains
 from skillframe_lmc.heading import heading
 from skillframe_lmc.intervals import Motion, Track
-from skillframe_lmc.modes import choose_of, contact_modes, mean_pushes, one_sided
+from skillframe_lmc.modes import mean_pushes
 from skillframe_lmc.phase import Stop
 from skillframe_lmc.press import Press, presses
 from skillframe_lmc.sectors import Sectors, sectors
 from skillframe_lmc.settings import Settings
+from skillframe_lmc.votes import Votes, touched, voted
 from skillframe_lmc.work import Work, work
 
 Name = Literal["translation", "rotation"]
-FEWEST_INTERVALS = 3  # fewer say nothing about an intersection
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,14 +122,14 @@ def _learn_part(
     least = settings.moving_m if name == "translation" else settings.moving_rad
     moving = [m for m in motions if m.excursion >= least and len(m.displacement)]
     done = work(moving) if moving else None
-    votes = _Votes(None, [sectors(m) for m in moving])
+    votes = Votes(None, [sectors(m) for m in moving])
     if done is not None and not done.environment_drove:
-        votes = _voted(name, moving, settings, turned)
+        votes = voted(name, moving, settings, turned)
     stood = _standing(name, tracks, motions, moving, votes.choice, settings)
     if stood is not None:
-        done, votes = stood.work, _Votes(stood.choice, [p.sectors for p in stood.presses])
+        done, votes = stood.work, Votes(stood.choice, [p.sectors for p in stood.presses])
     elif votes.choice is not None and votes.choice.direction is None and not turned:
-        moving, votes = _touched(name, moving, votes, settings)
+        moving, votes = touched(name, moving, votes, settings)
     choice, means, axes = votes.choice, _means(moving), None
     if done is not None and not done.environment_drove:
         direction = None if choice is None else choice.direction
@@ -144,47 +144,9 @@ def _learn_part(
     )  # fmt: skip
 
 
-class _Votes(NamedTuple):
-    """The direction that intervals chose, the sectors that voted, and the contact modes where these decided."""
-
-    choice: Choice | None
-    given: Sequence[Sectors]
-    modes: Sequence[Sectors] = ()
-
-
-def _voted(name: Name, moving: Sequence[Motion], settings: Settings, turned: bool) -> _Votes:
-    """The votes of motions that the teacher drove. There is no choice where one of them has too few intervals."""
-    given = [sectors(m, teacher_driven_only=name == "rotation") for m in moving]
-    if any(len(g.contact) < min(FEWEST_INTERVALS, len(m.work)) for g, m in zip(given, moving, strict=True)):
-        return _Votes(None, given)
-    choice = choose(given, settings, heading(moving, turned and name == "translation"))
-    modes = _modes(moving, choice) if settings.contact_modes and not turned else []
-    return _Votes(choose_of(modes, settings) if modes else choice, given, modes)
-
-
-def _touched(name: Name, moving: list[Motion], votes: _Votes, settings: Settings) -> tuple[list[Motion], _Votes]:
-    """The motion in contact and its votes, if these agree on a push where all intervals together do not.
-
-    A hand that lets go lets the tool spring back and takes it up from elsewhere: what it does in the air is no push.
-    """
-    touched = [intervals.touching(motion) for motion in moving]
-    if all(len(motion.work) >= FEWEST_INTERVALS for motion in touched):
-        again = _voted(name, touched, settings, turned=False)
-        if again.choice is not None and again.choice.direction is not None:
-            return touched, again
-    return moving, votes
-
-
 def _means(motions: Sequence[Motion]) -> Float:
     """Mean unit direction of motion (n, 3) of each."""
     return np.array([unit(m.displacement).mean(axis=0) for m in motions]).reshape(-1, 3)
-
-
-def _modes(moving: Sequence[Motion], choice: Choice) -> list[Sectors]:
-    """The contact modes, if they are to choose the direction in place of the intervals: faces of one side."""
-    modes = contact_modes(moving)
-    way = sum(unit(m.displacement.sum(axis=0)) for m in moving) if choice.direction is None else choice.direction
-    return modes if one_sided(modes, unit(np.asarray(way))) else []
 
 
 class _Standing(NamedTuple):

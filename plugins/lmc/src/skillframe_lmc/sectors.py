@@ -19,6 +19,7 @@ went: the cone angle(D, v) <= alpha + beta.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import radians
 from typing import NamedTuple
 
@@ -68,6 +69,12 @@ def sectors(motion: Motion, *, teacher_driven_only: bool = False) -> Sectors:
     push = -unit(load)
     contact = (size >= motion.load_min) & (norm(cross(v, push)) >= 0.05)
     return Sectors(v, np.where(contact[:, None], push, 0.0), contact)
+
+
+def concatenated(demonstrations: Sequence[Sectors]) -> Sectors:
+    """Sectors of several demonstrations as if one had shown them all, one after another."""
+    motion, push, contact = (np.concatenate(parts) for parts in zip(*demonstrations, strict=True))
+    return Sectors(motion, push, contact)
 
 
 def misses(directions: Float, given: Sectors) -> tuple[Float32, Float32]:

@@ -26,6 +26,9 @@ class Settings:
         contact_modes: count contact modes for the translation, whatever the time that each was slid on; false weighs by
             intervals, demonstration by demonstration.
         faces: give way in translation where faces turned a quarter of the push aside; false goes by the motion alone.
+        concatenated: the papers' way of taking several demonstrations together, without what we put in its place: all
+            intervals vote as those of one demonstration. No contact modes, no heading of the demonstrations, no second
+            vote of the contact alone.
         quantile: share of a demonstration's intervals that must accept a direction; the rest may be outliers.
         pyramid_min_rad, pyramid_max_rad: least half-opening of the pyramids, and the largest at which a direction is
             still said to exist.
@@ -51,6 +54,7 @@ class Settings:
     contact_only: bool = False
     contact_modes: bool = True
     faces: bool = True
+    concatenated: bool = False
     quantile: float = 0.8
     pyramid_min_rad: float = radians(8.0)
     pyramid_max_rad: float = radians(25.0)
