@@ -7,11 +7,13 @@ was, pushes on as hard as it did, and keeps the person's aim, tremor and randomn
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skillframe.frames import Float, Pose, move_wrench, rotate, rotate_spatial
-from skillframe.skill import Command, Observation, Skill, row, stack_commands
+from skillframe.skill import Command, Impedance, Observation, Skill, no_reasons, rows_of
 from skillframe.teaching.teacher import HANDS, Hand, Teacher, TeacherSettings, firm
 from skillframe.world.scene import REACTION_S, Scene, State, Task
 
@@ -29,7 +31,7 @@ def hand_of(task: Task, firmly: bool) -> Hand | None:
 
 
 class StagedTeacher(Skill):
-    """The person's hand on N tools, each in its own stage.
+    """The person's hand on N tools, each in its own stage. Tools in one stage are held together.
 
     Args:
         scene: its task says what follows what.
@@ -40,66 +42,92 @@ class StagedTeacher(Skill):
 
     def __init__(self, scene: Scene, fixture: Pose, settings: TeacherSettings, firmly: bool = False) -> None:
         frames = scene.tool.frames
-        reach: Float = np.array(frames["tip"]) - np.array(frames[scene.tool.hand])
-        self._hands = [
-            _StagedHand((scene.task, *scene.task.then), Pose(*(v[i : i + 1] for v in fixture)), settings, reach, firmly)
-            for i in range(len(fixture.position))
-        ]
+        self._hand_to_tip: Float = np.array(frames["tip"]) - np.array(frames[scene.tool.hand])
+        self._stages = (scene.task, *scene.task.then)
+        self._fixture, self._settings, self._firmly = fixture, settings, firmly
 
     def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
         """Take hold of every tool."""
-        for i, (hand, rng) in enumerate(zip(self._hands, rngs, strict=True)):
-            hand.start(row(observation, i), [rng])
+        count = len(rngs)
+        self._held, self._changes = np.zeros(count), [list[float]() for _ in rngs]
+        everyone = np.arange(count)
+        first = self._hand(0, everyone)
+        first.start(observation, rngs)
+        self._groups = {0: _Group(everyone, first)}
+        self._hold_as_now()
 
     def step(self, observation: Observation) -> Command:
         """Move every hand one tick on."""
-        return stack_commands([hand.step(row(observation, i)) for i, hand in enumerate(self._hands)])
+        for stage in sorted(self._groups, reverse=True):  # the last first: nobody goes through two stages in a tick
+            self._look(stage, observation)
+        count = len(self._held)
+        position, rotation = np.empty((count, 3)), np.empty((count, 3, 3))
+        twist, tremor, status = np.empty((count, 6)), np.empty((count, 6)), np.empty(count, dtype=np.int64)
+        for rows, teacher in self._groups.values():
+            command = teacher.step(rows_of(observation, rows))
+            position[rows], rotation[rows] = command.pose
+            twist[rows], tremor[rows], status[rows] = command.twist, command.feedforward, command.status
+        return Command(Pose(position, rotation), twist, self._impedance, tremor, status, no_reasons(count))
 
     def journal(self, trial: int) -> list[tuple[float, str]]:
         """When the person went over to the next stage."""
-        return self._hands[trial].journal(0)
+        return [(time, f"stage {i} begins") for i, time in enumerate(self._changes[trial], start=2)]
 
+    def _look(self, stage: int, observation: Observation) -> None:
+        """Let those go over to the next stage who have seen for long enough that theirs is done."""
+        done = self._stages[stage].done
+        if done is None or stage + 1 == len(self._stages):
+            return
+        rows, teacher = self._groups[stage]
+        seen = done(self._seen(rows, rows_of(observation, rows)))
+        self._held[rows] = np.where(seen, self._held[rows] + observation.dt, 0.0)
+        over = self._held[rows] >= REACTION_S
+        if not over.any():
+            return
+        going, staying = np.flatnonzero(over), np.flatnonzero(~over)
+        self._enter(stage + 1, rows[going], teacher.some(going), observation)
+        if len(staying):
+            self._groups[stage] = _Group(rows[staying], teacher.some(staying))
+        else:
+            del self._groups[stage]
+        self._hold_as_now()
 
-class _StagedHand(Skill):
-    """One hand, stage by stage (N = 1)."""
+    def _enter(self, stage: int, rows: NDArray[np.intp], leaving: Teacher, observation: Observation) -> None:
+        self._held[rows] = 0.0
+        for trial in rows.tolist():
+            self._changes[trial].append(float(observation.time[trial]))
+        follower = self._hand(stage, rows)
+        follower.take_over(leaving, rows_of(observation, rows))
+        there = self._groups.get(stage)
+        self._groups[stage] = (
+            _Group(rows, follower)
+            if there is None
+            else _Group(np.concatenate([there.rows, rows]), there.teacher.beside(follower))
+        )
 
-    def __init__(
-        self, stages: Sequence[Task], fixture: Pose, settings: TeacherSettings, hand_to_tip: Float, firmly: bool
-    ) -> None:  # fmt: skip
-        self._stages, self._fixture, self._settings, self._hand_to_tip = stages, fixture, settings, hand_to_tip
-        self._firmly = firmly
+    def _hold_as_now(self) -> None:
+        """Put together how stiffly each tool is held."""
+        stiffness, damping = np.empty((2, len(self._held), 6, 6))
+        for rows, teacher in self._groups.values():
+            stiffness[rows], damping[rows] = teacher.impedance.stiffness, teacher.impedance.damping
+        self._impedance = Impedance(stiffness, damping)
 
-    def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
-        self._stage, self._held, self._changes = 0, 0.0, list[float]()
-        self._teacher = self._hand(0)
-        self._teacher.start(observation, rngs)
-
-    def step(self, observation: Observation) -> Command:
-        done = self._stages[self._stage].done
-        if done is not None and self._stage + 1 < len(self._stages):
-            self._held = self._held + observation.dt if bool(done(self._seen(observation))[0]) else 0.0
-            if self._held >= REACTION_S:
-                self._next_stage(observation)
-        return self._teacher.step(observation)
-
-    def _next_stage(self, observation: Observation) -> None:
-        self._stage, self._held = self._stage + 1, 0.0
-        self._changes.append(float(observation.time[0]))
-        follower = self._hand(self._stage)
-        follower.take_over(self._teacher, observation)
-        self._teacher = follower
-
-    def _hand(self, stage: int) -> Teacher:
+    def _hand(self, stage: int, rows: NDArray[np.intp]) -> Teacher:
         task = self._stages[stage]
-        return Teacher(task, self._fixture, self._settings, hand_of(task, self._firmly))
+        fixture = Pose(*(value[rows] for value in self._fixture))
+        return Teacher(task, fixture, self._settings, hand_of(task, self._firmly))
 
-    def journal(self, trial: int) -> list[tuple[float, str]]:
-        return [(time, f"stage {i} begins") for i, time in enumerate(self._changes, start=2)]
-
-    def _seen(self, observation: Observation) -> State:
-        """What the person sees and feels of the tip, in the fixture's frame."""
-        back = np.swapaxes(self._fixture.rotation, -1, -2)
+    def _seen(self, rows: NDArray[np.intp], observation: Observation) -> State:
+        """What the person sees and feels of some tips, in the fixture's frame."""
+        back = np.swapaxes(self._fixture.rotation[rows], -1, -2)
         tip = observation.pose.at(self._hand_to_tip)
         shift = rotate(observation.pose.rotation, self._hand_to_tip)
-        pose = Pose(rotate(back, tip.position - self._fixture.position), back @ tip.rotation)
+        pose = Pose(rotate(back, tip.position - self._fixture.position[rows]), back @ tip.rotation)
         return State(pose, rotate_spatial(back, move_wrench(observation.wrench, shift)))
+
+
+class _Group(NamedTuple):
+    """Trials (M,) in one stage, and the hands on their tools."""
+
+    rows: NDArray[np.intp]
+    teacher: Teacher

@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skillframe.errors import UnknownName
 from skillframe.frames import Float, Pose, matrix_from_quaternion, norm, rotate, rotation_matrix, rotation_vector, unit
@@ -28,6 +29,8 @@ from skillframe.world.scene import Task
 AIM_TIME, TREMOR_TIME = 0.5, 0.1  # correlation times of aim and tremor [s]
 SLOWING_S = 0.2  # a hand that carries something to a place slows down by so much before it
 BLOCK = 500
+BY_ROW = ("_noise", "_aim", "_tremor", "_position", "_rotation", "_direction", "_goal", "_aligned", "_turn")
+"""What a teacher keeps of each trial, beside its generator and its delays."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,6 +160,32 @@ class Teacher(Skill):
         scale = other._hand.turn_stiffness / self._hand.turn_stiffness
         self._rotation = rotation_matrix(scale * turned) @ observation.pose.rotation
 
+    @property
+    def impedance(self) -> Impedance:
+        """How stiffly the tools are held: (6, 6) each."""
+        return self._impedance
+
+    def some(self, rows: NDArray[np.intp]) -> Teacher:
+        """The hands on some of the tools, as they are now. They go on for themselves."""
+        part = Teacher(self._task, Pose(*(v[rows] for v in self._fixture)), self._settings, self._hand)
+        part._rngs, part._next, part._impedance = [self._rngs[i] for i in rows], self._next, self._impedance
+        for name in BY_ROW:
+            value = getattr(self, name)
+            setattr(part, name, None if value is None else value[rows])
+        part._delay, part._arrival = self._delay.some(rows), self._arrival.some(rows)
+        return part
+
+    def beside(self, other: Teacher) -> Teacher:
+        """These hands and those of another teacher of the same task, in this order."""
+        places = zip(self._fixture, other._fixture, strict=True)
+        both = Teacher(self._task, Pose(*map(np.concatenate, places)), self._settings, self._hand)
+        both._rngs, both._next, both._impedance = [*self._rngs, *other._rngs], self._next, self._impedance
+        for name in BY_ROW:
+            mine, theirs = getattr(self, name), getattr(other, name)
+            setattr(both, name, None if mine is None else np.concatenate([mine, theirs]))
+        both._delay, both._arrival = self._delay.beside(other._delay), self._arrival.beside(other._arrival)
+        return both
+
     def step(self, observation: Observation) -> Command:
         """Move the hand one tick on and hold the tool with it."""
         noise = self._draw()
@@ -251,6 +280,17 @@ class _Delay:
 
     def __init__(self, ticks: int) -> None:
         self._ticks, self._line = ticks, list[tuple[Float, ...]]()
+
+    def some(self, rows: NDArray[np.intp]) -> _Delay:
+        part = _Delay(self._ticks)
+        part._line = [tuple(value[rows] for value in values) for values in self._line]
+        return part
+
+    def beside(self, other: _Delay) -> _Delay:
+        both = _Delay(self._ticks)
+        lines = zip(self._line, other._line, strict=True)
+        both._line = [tuple(map(np.concatenate, zip(*pair, strict=True))) for pair in lines]
+        return both
 
     def push(self, *values: Float) -> tuple[Float, ...]:
         if not self._ticks:
