@@ -109,6 +109,31 @@ def _executed() -> Iterable[RowType]:
         "count), by 95 % intervals more often than by the same phase without its turn, and without its push",
         settings=NOISE, run=Lazy("skillframe_papers.rows.screws:screw"),
     )  # fmt: skip
+    yield from _more_from_force()
+
+
+def _more_from_force() -> Iterable[RowType]:
+    def row(name: str, summary: str, published: str, source: str, bar: str, run: str) -> RowType:
+        return RowType(
+            name=name, summary=summary, published=published, source=source, bar=bar, settings=NOISE,
+            topic="learning from force", run=Lazy(f"skillframe_papers.rows.{run}"),
+        )  # fmt: skip
+
+    yield row("36", "statics tell from which starts a learned push converges", "a convergence region of starts",
+              OVERVIEW, "valleys tilted to within 10 degrees of what a push straight down bears: right about 90 % of "
+              "the starts (by count), and by 95 % intervals more often than the region of a push straight down, than "
+              "that all converge, and than that none does", "region:region")  # fmt: skip
+    yield row("37", "one demonstration is enough for the valley and for the hose coupler", "one or more demonstrations",
+              PHASES, "starts within 60 mm, tilts within 8 degrees, each world: reached from 90 % (by count), and by "
+              "95 % intervals more often than by the same push, stiff", "alone:one")  # fmt: skip
+    yield row("38", "several demonstrations are concatenated", "simply concatenated", OVERVIEW,
+              "valley, peg and coupler, two demonstrations from anywhere on either side: as published from their "
+              "concatenation in 90 % of 20 sets each (by count), and by 95 % intervals more often, all worlds "
+              "together, than from the first alone", "concatenated:concatenated")  # fmt: skip
+    yield row("39", "a skill is learned in several coordinate systems", "learned in different coordinate systems",
+              OVERVIEW, "valley and peg, fixture and starts turned by 40 to 80 degrees: learned in the tool's axes, 90 "
+              "% of the runs succeed (by count), by 95 % intervals more than learned in base axes; in place 90 % in "
+              "either", "coordinates:frames")  # fmt: skip
 
 
 def _two_arms() -> Iterable[RowType]:

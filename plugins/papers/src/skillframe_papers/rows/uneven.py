@@ -97,9 +97,10 @@ def _turned(rng: np.random.Generator) -> tuple[RobotModel, Float]:
     return replace(robot, spec=replace(robot.spec, workspace=place)), turn
 
 
-def _aimed(scene: Scene, direction: Float, starts: tuple[dict[str, float], ...]) -> Scene:
+def aimed(scene: Scene, direction: Float, starts: Sequence[dict[str, float]]) -> Scene:
+    """The scene with a person who believes in another direction (3,) of the fixture, from some starts."""
     x, y, z = (float(value) for value in direction)
-    return replace(scene, task=replace(scene.task, direction=(x, y, z), starts=starts))
+    return replace(scene, task=replace(scene.task, direction=(x, y, z), starts=tuple(starts)))
 
 
 def _off(job: RowRun, rng: np.random.Generator) -> float:
@@ -152,7 +153,7 @@ def _valley_set(job: RowRun, index: int) -> tuple[Set, Valley]:
     for side, chosen in ((most, ways[:2]), (-most, ways[2:])):
         level = np.cos(valley.steep if side > 0.0 else valley.flat)
         starts = tuple({"start.offset_x": float(side * valley.side * way * level)} for way in chosen)
-        scene = _aimed(valley_scene(valley), direction, starts)
+        scene = aimed(valley_scene(valley), direction, starts)
         friction = valley.rough_steep if side > 0.0 else valley.rough_flat
         seed = VALLEY_SEED + 1000 * job.seed + 2 * index + int(side > 0.0)
         given = {"world.friction": friction}
@@ -214,7 +215,7 @@ def _peg_set(job: RowRun, index: int) -> Set:
     tilts = np.radians([*rng.uniform(5.0, 8.0, 2), -rng.uniform(3.0, 8.0)]) * most
     starts = tuple({"start.tilt_y": float(tilt)} for tilt in tilts)
     world = load_world("peg_in_hole", {"friction": job.settings["world.friction"]})
-    scene = _aimed(world, np.array([np.sin(off), 0.0, -np.cos(off)]), starts)
+    scene = aimed(world, np.array([np.sin(off), 0.0, -np.cos(off)]), starts)
     shown = record(robot, scene, _person(job), count=3, seed=PEG_SEED + 1000 * job.seed + index, duration_s=20.0)
     return Set(shown.demonstrations, turn, len(shown.rejected), _learn(shown.demonstrations))
 

@@ -1,0 +1,107 @@
+"""Several skills run side by side in one simulation, each in trials of its own: what takes the time is the ticks.
+
+A trial does not know of its neighbours, so every result is, to the last bit, that of a simulation of one skill alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.execution.executor import simulate
+from skillframe.execution.prepare import prepare
+from skillframe.extend.records import Document
+from skillframe.frames import Float, Pose
+from skillframe.robot.model import RobotModel
+from skillframe.skill import Command, Impedance, Observation, Skill, rows_of
+from skillframe.world.scene import Scene
+
+
+class Trials(NamedTuple):
+    """Trials of one document: quantities drawn, each (N,), and a generator for each trial."""
+
+    document: Document
+    draws: Mapping[str, Float]
+    rngs: Sequence[np.random.Generator]
+
+
+def successes(
+    robot: RobotModel, scene: Scene, trials: Sequence[Trials], *, duration_s: float, center: str | None = None
+) -> list[NDArray[np.bool_]]:
+    """Run documents side by side.
+
+    Args:
+        robot: who runs them.
+        scene: where.
+        trials: of each document; all draw the same quantities.
+        duration_s: simulated seconds after which a trial is stopped.
+        center: of compliance, the same for all; None: where each was learned; one simulation for each such point.
+
+    Returns:
+        by document, which trials (N,) succeeded.
+    """
+    made = [prepare(robot, scene, each.document, center) for each in trials]
+    alike: dict[bytes, list[int]] = {}
+    for i, (_, setup) in enumerate(made):
+        alike.setdefault(setup.center_of_compliance.tobytes(), []).append(i)
+    found = [np.zeros(0, dtype=bool)] * len(trials)
+    for which in alike.values():
+        some, sizes = [trials[i] for i in which], [len(trials[i].rngs) for i in which]
+        draws = {key: np.concatenate([each.draws[key] for each in some]) for key in some[0].draws}
+        rngs = [rng for each in some for rng in each.rngs]
+        skill = Blocks([made[i][0] for i in which], sizes)
+        done = simulate(skill, made[which[0]][1], draws, rngs, duration_s=duration_s).success
+        for i, success in zip(which, np.split(done, np.cumsum(sizes)[:-1]), strict=True):
+            found[i] = success
+    return found
+
+
+class Blocks(Skill):
+    """Skills, each of a block of trials.
+
+    Args:
+        skills: in the order of the trials.
+        sizes: how many trials each has.
+    """
+
+    def __init__(self, skills: Sequence[Skill], sizes: Sequence[int]) -> None:
+        ends = np.cumsum(sizes).tolist()
+        self._blocks = [
+            (skill, slice(end - size, end)) for skill, size, end in zip(skills, sizes, ends, strict=True)
+        ]  # fmt: skip
+
+    def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
+        """Start each in its trials."""
+        for skill, rows in self._blocks:
+            skill.start(rows_of(observation, rows), rngs[rows])
+
+    def step(self, observation: Observation) -> Command:
+        """What each says of its trials."""
+        said = [(skill.step(rows_of(observation, rows)), rows.stop - rows.start) for skill, rows in self._blocks]
+        commands = [command for command, _ in said]
+        damping = [_each(c.impedance.damping, n) for c, n in said if c.impedance.damping is not None]
+        if damping and len(damping) < len(said):
+            raise ValueError("skills that run side by side must all say their damping, or none of them")
+        return Command(
+            Pose(*(np.concatenate(values) for values in zip(*(c.pose for c in commands), strict=True))),
+            np.concatenate([c.twist for c in commands]),
+            Impedance(
+                np.concatenate([_each(c.impedance.stiffness, n) for c, n in said]),
+                np.concatenate(damping) if damping else None,
+            ),
+            np.concatenate([c.feedforward for c in commands]),
+            np.concatenate([c.status for c in commands]),
+            np.concatenate([c.reason for c in commands]),
+        )  # fmt: skip
+
+    def journal(self, trial: int) -> list[tuple[float, str]]:
+        """What the trial's own skill says."""
+        skill, rows = next((s, r) for s, r in self._blocks if r.start <= trial < r.stop)
+        return skill.journal(trial - rows.start)
+
+
+def _each(matrix: Float, count: int) -> Float:
+    return np.broadcast_to(matrix, (count, 6, 6))
