@@ -48,7 +48,7 @@ def one(job: RowRun) -> RowResult:
     """Row 37: both worlds, each from one demonstration."""
     couplers = skills_of(job, "hose_coupler", 1, SEED)
     turns = sum(each["phases"][0]["rotation"]["desired_direction"] is not None for each in couplers)
-    said = f" Of {len(couplers)} sets of the coupler {turns} learn a direction of turning, as if a person had to turn it."
+    said = f" Of {len(couplers)} sets of the coupler {turns} learn a direction of turning, as if it had to be turned."
     return _told(job, {"valley": _valley(job), "hose coupler": _coupler(job, couplers)}, said)
 
 
