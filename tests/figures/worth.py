@@ -135,7 +135,7 @@ def main(given: Sequence[str]) -> None:
             print("\n".join(directions(seed, args.family, args.kinds)), flush=True)
         return
     runs = sets_of(list(FAMILIES) if args.family == "all" else [args.family], args)
-    print("\n".join(side_by_side(runs) if args.family == "all" else table(runs)))
+    print("\n".join(side_by_side(runs, args.kinds) if args.family == "all" else table(runs)))
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -53,18 +53,42 @@ def table(runs: Sequence[dict[str, Any]]) -> list[str]:
     return lines
 
 
-def side_by_side(runs: Sequence[dict[str, Any]]) -> list[str]:
-    """A table in Markdown: sets passed of those run, one column a task, and below it where LMC leads or is led."""
-    families = list(dict.fromkeys(run["family"] for run in runs))
-    by = {family: [run["results"] for run in runs if run["family"] == family and run["results"]] for family in families}
+NOT_NULLS = ("true push", "axis, push and turn", "LMC", "LMC, free across")
+"""Rows that no null is: what is known to be right, and what LMC learned."""
+
+
+WHOEVER = "whoever shows it"
+
+
+def whoever(results: dict[str, Any], people: Sequence[str]) -> dict[str, Any]:
+    """A set's results, and those of methods that several people taught: runs that pass if all the people's sets do."""
+    names = [{key.split("|")[1] for key in results if key.split("|")[0] == person} for person in people]
+    common = set.intersection(*names) if len(people) > 1 else set()
+    passed = {name: all(_whole([results[f"{person}|{name}"]]) for person in people) for name in sorted(common)}
+    return {**results, **{f"{WHOEVER}|{name}": [good] * (MOVED + 1) for name, good in passed.items()}}
+
+
+def side_by_side(runs: Sequence[dict[str, Any]], people: Sequence[str]) -> list[str]:
+    """Tables in Markdown, a column a task: LMC beside its best null, then sets and runs of every method by person.
+
+    A last person is all of them: an instance passes if the sets of all do.
+    """
+    by: dict[str, list[dict[str, Any]]] = {}
+    for run in runs:
+        by.setdefault(run["family"], []).append(whoever(run["results"], people))
     keys = list(dict.fromkeys(key for results in by.values() for each in results for key in each))
-    lines = ["| person | method | " + " | ".join(f"`{family}`" for family in families) + " |"]
-    lines.append("|---" * (2 + len(families)) + "|")
-    for key in keys:
-        cells = [_cell([each[key] for each in by[family] if key in each]) for family in families]
-        lines.append("| " + " | ".join([*key.split("|"), *cells]) + " |")
-    people = dict.fromkeys(key.split("|")[0] for key in keys if key.endswith("|LMC") and " shown" not in key)
-    return [*lines, "", *(line for family in families for line in _led(family, by[family], people))]
+    shown = list(dict.fromkeys(key.split("|")[0] for key in keys))
+    lines = ["| sets passed | " + " | ".join(["task", "LMC", "best of all others", "apart"]) + " |", "|---" * 5 + "|"]
+    lines += [line for person in shown for task in by for line in _led(task, by[task], person)]
+    for person in shown:
+        mine = [key for key in keys if key.split("|")[0] == person]
+        tasks = [task for task in by if any(key in each for each in by[task] for key in mine)]
+        lines += ["", f"| {person or 'nothing learned'} | " + " | ".join(f"`{task}`" for task in tasks) + " |"]
+        lines.append("|---" * (1 + len(tasks)) + "|")
+        for key in mine:
+            cells = [_cell([each[key] for each in by[task] if key in each]) for task in tasks]
+            lines.append("| " + " | ".join([key.split("|")[1], *cells]) + " |")
+    return lines
 
 
 def _whole(sets: Sequence[Sequence[bool]]) -> int:
@@ -72,33 +96,28 @@ def _whole(sets: Sequence[Sequence[bool]]) -> int:
 
 
 def _cell(sets: Sequence[Sequence[bool]]) -> str:
+    """Sets passed of those shown, and runs."""
     if not sets:
-        return "-"
+        return ""
+    of = "" if len(sets) == 20 else f" of {len(sets)}"
+    return f"{_whole(sets)}{of}, {sum(sum(each[:MOVED]) for each in sets)}"
+
+
+def _interval(sets: Sequence[Sequence[bool]]) -> str:
     low, high = clopper_pearson(_whole(sets), len(sets))
-    return f"{_whole(sets)} of {len(sets)} ({100 * low:.0f}-{100 * high:.0f})"
+    return f"{_whole(sets)} of {len(sets)} ({100 * low:.0f}-{100 * high:.0f} %)"
 
 
-NOT_NULLS = ("true push", "axis, push and turn", "LMC", "LMC, free across")
-"""Rows that no null is: what is known to be right, and what LMC learned."""
-
-
-def _led(family: str, results: Sequence[dict[str, Any]], people: Iterable[str]) -> list[str]:
-    """For each person: LMC's interval beside that of the best of all nulls, and whether they are apart."""
-    lines = []
-    for person in people:
-        sets = {
-            key.split("|")[1]: [each[key] for each in results if key in each]
-            for key in dict.fromkeys(k for each in results for k in each)
-            if key.split("|")[0] in ("", person)
-        }
-        nulls = {name: given for name, given in sets.items() if name not in NOT_NULLS}
-        if not sets.get("LMC") or not nulls:
-            continue
-        best = max(nulls, key=lambda name: _whole(nulls[name]) / len(nulls[name]))
-        low, _ = clopper_pearson(_whole(sets["LMC"]), len(sets["LMC"]))
-        _, high = clopper_pearson(_whole(nulls[best]), len(nulls[best]))
-        said = "above" if low > high else "not above"
-        lines.append(
-            f"{family}, {person}: LMC {_cell(sets['LMC'])} is {said} its best null, {best} {_cell(nulls[best])}"
-        )
-    return lines
+def _led(task: str, results: Sequence[dict[str, Any]], person: str) -> list[str]:
+    """A line of the table, if this person showed this task: LMC's interval beside that of the best of all others."""
+    keys = dict.fromkeys(key for each in results for key in each if key.split("|")[0] in ("", person))
+    sets = {key.split("|")[1]: [each[key] for each in results if key in each] for key in keys}
+    if not person or "LMC" not in sets:
+        return []
+    nulls = {name: given for name, given in sets.items() if name not in NOT_NULLS}
+    best = max(nulls, key=lambda name: _whole(nulls[name]) / len(nulls[name]))
+    low, high = clopper_pearson(_whole(sets["LMC"]), len(sets["LMC"]))
+    least, most = clopper_pearson(_whole(nulls[best]), len(nulls[best]))
+    apart = "above" if low > most else "below" if high < least else ""
+    cells = [person, f"`{task}`", _interval(sets["LMC"]), f"{best}: {_interval(nulls[best])}", apart]
+    return ["| " + " | ".join(cells) + " |"]
