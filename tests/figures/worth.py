@@ -28,7 +28,7 @@ from skillframe.demonstration.record import Demonstration
 from skillframe.frames import Float
 from skillframe.world.scene import Scene
 from tests.figures import bayonets
-from tests.figures.worth_families import FAMILIES, KINDS, demonstrations, drawn
+from tests.figures.worth_families import FAMILIES, FLOORS, KINDS, SHORT, demonstrations, drawn
 from tests.figures.worth_methods import document_of, hand_written, lmc_row, played, pushes
 from tests.figures.worth_runs import EACH, executed, side_by_side, table
 from tests.figures.worth_skills import Row
@@ -71,9 +71,11 @@ def tuning_rows(shown: dict[str, list[Demonstration]]) -> dict[str, Row]:
 def run_set(family: str, seed: int, kinds: Sequence[str], learners: Sequence[str], tune: bool = False) -> Any:
     """One instance: for each person and method, whether each run reached the goal, the run in place last."""
     scene, turn, rng = drawn(family, seed)
-    shown, failed = demonstrations(scene, turn, rng, kinds, EACH)
+    floors = FLOORS.get(family, SHORT)
+    shown, failed = demonstrations(scene, turn, rng, kinds, EACH, floors)
     rows = tuning_rows(shown) if tune else rows_of_set(shown, turn, scene, learners)
-    return {"family": family, "seed": seed, "failed": failed, "results": executed(scene, rows, turn, rng, seed)}
+    done = executed(scene, rows, turn, rng, seed, floors=floors)
+    return {"family": family, "seed": seed, "failed": failed, "results": done}
 
 
 def directions(seed: int, family: str, kinds: Sequence[str]) -> list[str]:
@@ -81,7 +83,7 @@ def directions(seed: int, family: str, kinds: Sequence[str]) -> list[str]:
     scene, turn, rng = drawn(family, seed)
     low = np.degrees(np.arctan(scene.friction))
     high, lines = 90.0 - low - np.degrees(scene.params["slope"]), []
-    for kind, shown in demonstrations(scene, turn, rng, kinds, EACH)[0].items():
+    for kind, shown in demonstrations(scene, turn, rng, kinds, EACH, FLOORS.get(family, SHORT))[0].items():
         for name, row in (("LMC", lmc_row(shown)), ("LMC, old rule", lmc_row(shown, contact_modes=False))):
             x, _, z = turn.T @ row.push
             below = np.degrees(np.arctan2(-z, x)) if row.push.any() else np.nan

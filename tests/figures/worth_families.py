@@ -49,6 +49,7 @@ def _slide(rng: np.random.Generator) -> Any:
 FAMILIES: dict[str, Callable[[np.random.Generator], Any]] = {
     "hump_low": lambda rng: _hump(rng, (51, 55), (0.08, 0.12)),
     "hump": lambda rng: _hump(rng, (46, 51), (0.16, 0.24)),
+    "hump_long": lambda rng: _hump(rng, (46, 51), (0.16, 0.24)),
     "steps": _steps,
     "skew": lambda rng: _hump(rng, (45, 50), (0.12, 0.20), skew=radians(rng.uniform(12, 20))),
     "slide": _slide,
@@ -61,7 +62,12 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Any]] = {
 GENTLE_N = {"bayonet": 5.0}
 """How hard people and pushes press where the tool drops, in place of 15 and 20 N: 8 N and 8 mm end most demonstrations
 by their limit of 80 N, 5 N and 4 mm 3 of 48."""
-NUMBERS = {"corner": 0, "hump": 1, "hump_low": 2, "skew": 3, "slide": 4, "steps": 5, "valley": 6, "bayonet": 7}
+FLOORS = {"hump_long": (0.070, 0.085, 0.100, 0.110)}
+"""How far before the ramp people begin, in place of `SHORT`. The longer, the more the floor weighs in means."""
+SHORT = (0.012, 0.030, 0.040, 0.055)
+NUMBERS = {
+    "corner": 0, "hump": 1, "hump_low": 2, "skew": 3, "slide": 4, "steps": 5, "valley": 6, "bayonet": 7, "hump_long": 8,
+}  # fmt: skip
 """What a family adds to the seeds of its instances; a new family takes the next number."""
 
 
@@ -73,10 +79,12 @@ def drawn(family: str, seed: int) -> tuple[Scene, Float, np.random.Generator]:
     return load_world(world, {**params, "turn": tuple(turn.tolist())}), rotation_matrix(turn), rng
 
 
-def starts(scene: Scene, turn: Float, rng: np.random.Generator, count: int, lift: float) -> Float:
-    """Offsets (count, 3) of starts, in the turned fixture's axes."""
+def starts(
+    scene: Scene, turn: Float, rng: np.random.Generator, count: int, lift: float, floors: Sequence[float] = SHORT
+) -> Float:  # fmt: skip
+    """Offsets (count, 3) of starts, in the turned fixture's axes. `floors` are those of a hump [m]."""
     if scene.name == "hump":
-        before = rng.choice([0.012, 0.030, 0.040, 0.055], count) if not lift else rng.uniform(0.012, 0.055, count)
+        before = rng.choice(floors, count) if not lift else rng.uniform(min(floors), max(floors), count)
         return np.column_stack([0.03 - before, np.zeros(count), np.full(count, lift)]) @ turn.T
     if scene.name == "bayonet":
         return np.tile(-lift * np.array(scene.task.direction), (count, 1))
@@ -102,11 +110,12 @@ def _person(kind: str, scene: Scene, turn: Float, rng: np.random.Generator) -> P
 
 
 def demonstrations(
-    scene: Scene, turn: Float, rng: np.random.Generator, kinds: Sequence[str], count: int
+    scene: Scene, turn: Float, rng: np.random.Generator, kinds: Sequence[str], count: int,
+    floors: Sequence[float] = SHORT,
 ) -> tuple[dict[str, list[Demonstration]], int]:  # fmt: skip
     """`count` demonstrations of a person of each kind, and how many failed. A person whose all fail is left out."""
     people = {kind: _person(kind, scene, turn, rng) for kind in kinds}
-    begin = {kind: starts(scene, turn, rng, count, 0.0) for kind in kinds}
+    begin = {kind: starts(scene, turn, rng, count, 0.0, floors) for kind in kinds}
     got: dict[tuple[str, int], Demonstration] = {}
     failed = 0
     for attempt in range(ATTEMPTS):

@@ -12,19 +12,20 @@ from skillframe.execution.executor import Setup, simulate
 from skillframe.execution.prepare import load_robot_model
 from skillframe.frames import Float
 from skillframe.world.scene import Scene
-from tests.figures.worth_families import starts
+from tests.figures.worth_families import SHORT, starts
 from tests.figures.worth_skills import LONGEST, Row, Rows
 
 EACH, MOVED, ENOUGH = 3, 5, 4
 
 
 def executed(
-    scene: Scene, rows: dict[str, Row], turn: Float, rng: np.random.Generator, seed: int, longest: float = LONGEST
+    scene: Scene, rows: dict[str, Row], turn: Float, rng: np.random.Generator, seed: int, longest: float = LONGEST,
+    floors: Sequence[float] = SHORT,
 ) -> Any:  # fmt: skip
     """Whether each method's moved runs, and its run in place, reached the goal: lists by key."""
     count = MOVED + 1
     moved = np.arange(count) < MOVED
-    offsets = starts(scene, turn, rng, count, 0.003)
+    offsets = starts(scene, turn, rng, count, 0.003, floors)
     draws = {f"start.offset_{a}": offsets[:, i] for i, a in enumerate("xyz")}
     draws |= {f"fixture.offset_{a}": moved * rng.uniform(-0.002, 0.002, count) for a in "xyz"}
     draws |= {f"fixture.tilt_{a}": moved * np.radians(rng.uniform(-2.0, 2.0, count)) for a in "xyz"}
