@@ -80,10 +80,10 @@ class CampaignResults:
         self.folder = Path(folder)
         self.spec = load(self.folder)
         self.summary = read_summary(self.folder)
-        done = read_content(self.folder, campaign_hash(self.spec), self.spec).done.values()
+        done = read_content(self.folder, campaign_hash(self.spec), self.spec).done
         told = self.summary["skills"]
         left = {label: told[label][LEFT_OUT] for label in told if LEFT_OUT in told[label]}
-        self.rows = ordered(self.spec, done, self.summary["stopped_after_trial"], left)
+        self.rows = list(ordered(self.spec, done, self.summary["stopped_after_trial"], left))
 
     @property
     def skills(self) -> dict[str, SkillRate]:

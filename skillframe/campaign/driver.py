@@ -89,18 +89,20 @@ class Driver:
         Raises:
             CampaignError: nothing but losses from the start, or trouble of the environment.
         """
-        queue, suspects, flying = deque(jobs), list[ChunkJob](), 0
-        while flying or (queue and not self.enough()):
-            while queue and flying < self.pool.size and not self.enough():
-                job = queue.popleft()
+        source, queue, suspects, flying = iter(jobs), deque[ChunkJob](), list[ChunkJob](), 0
+        while True:
+            while flying < self.pool.size and not self.enough():
+                job = queue.popleft() if queue else next(source, None)
+                if job is None:
+                    break
                 if self.wanted(job):
                     self.pool.submit(job)
                     flying += 1
             if not flying:
                 break
-            job, answer = self.pool.next()
+            ended, answer = self.pool.next()
             flying -= 1
-            self._handle(job, answer, queue, suspects)
+            self._handle(ended, answer, queue, suspects)
         for job in suspects:
             if self.wanted(job) and not self.enough():
                 self.pool.submit(job)

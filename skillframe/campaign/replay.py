@@ -73,7 +73,7 @@ def replay_trial(
 
 def _ran_on(found: Content, trial: int, label: str) -> Mapping[str, str]:
     """Where a trial's row ran. For a row that does not say, where the campaign last ran."""
-    (number,) = (x.ran_on for x in found.lines if (x.row["trial"], x.row["skill"]) == (trial, label))
+    number = found.done.ran_on((trial, label))
     if number is not None and number < len(found.environments):
         return found.environments[number]
     ran_on = [session["environment"] for session in found.sessions if "environment" in session]

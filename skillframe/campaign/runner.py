@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import re
 import time
-from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from functools import partial
@@ -132,6 +132,7 @@ class _Session:
         self.rule = StopRule(spec)
         self.rule.add(log.done.values())
         self.furthest = 0.0
+        self._plain, self._folder = spec.plain(), str(spec.folder.resolve())
 
     def run(self, evaluate: Evaluate) -> dict[str, Any]:
         """Run, store, and write the tables whatever happens."""
@@ -225,8 +226,7 @@ class _Session:
                     yield self._job(skill, missing)
 
     def _job(self, skill: int, trials: tuple[int, ...], traces: bool = False) -> ChunkJob:
-        folder = str(self.spec.folder.resolve())
-        return ChunkJob(spec=self.spec.plain(), folder=folder, skill=skill, trials=trials, traces=traces)
+        return ChunkJob(spec=self._plain, folder=self._folder, skill=skill, trials=trials, traces=traces)
 
     def _keep(self, rows: list[Row], environment: Mapping[str, str]) -> None:
         self.rule.add(self.log.append(rows, environment))
@@ -248,14 +248,20 @@ class _Session:
 
     def _untraced(self) -> list[ChunkJob]:
         """A job per skill for the traces that are wanted and not there yet."""
-        jobs = []
+        jobs: list[ChunkJob] = []
+        if not self.options.traces:
+            return jobs
+        ran_by = defaultdict[str, list[tuple[int, float, bool]]](list)
+        for row in self._rows():
+            if row["duration_s"] == row["duration_s"]:
+                ran_by[row["skill"]].append((row["trial"], row["duration_s"], row["success"]))
         for skill, label in enumerate(self.spec.labels):
-            ran = [row for row in self._rows() if row["skill"] == label and row["duration_s"] == row["duration_s"]]
-            picked = [row["trial"] for row in ran[: min(SAMPLE, self.options.traces)]]
-            typical = nearest_to_median({row["trial"]: row["duration_s"] for row in ran if row["success"]})
+            ran = ran_by[label]
+            picked = [trial for trial, _, _ in ran[: min(SAMPLE, self.options.traces)]]
+            typical = nearest_to_median({trial: seconds for trial, seconds, success in ran if success})
             if typical is not None and typical not in picked and len(picked) < self.options.traces:
                 picked.append(typical)
-            failed = [row["trial"] for row in ran if not row["success"] and row["trial"] not in picked]
+            failed = [trial for trial, _, success in ran if not success and trial not in picked]
             picked += failed[: self.options.traces - len(picked)]
             missing = tuple(t for t in picked if not trace_path(self.spec.folder, t, label).exists())
             if missing:
@@ -271,12 +277,12 @@ class _Session:
             if changed:
                 self._tell(f"trial {row['trial']} of {row['skill']} came out differently when run again: {changed}")
 
-    def _rows(self) -> list[Row]:
-        return ordered(self.spec, self.log.done.values(), self.rule.after, self.rule.left)
+    def _rows(self) -> Sequence[Row]:
+        return ordered(self.spec, self.log.done, self.rule.after, self.rule.left)
 
-    def _environments(self, rows: list[Row]) -> list[dict[str, Any]]:
+    def _environments(self, rows: Sequence[Row]) -> list[dict[str, Any]]:
         """Where rows ran, and how many. Those of skillframe 0.1 do not say."""
-        counts = Counter(self.log.ran_on.get((row["trial"], row["skill"])) for row in rows)
+        counts = Counter(self.log.done.ran_on((row["trial"], row["skill"])) for row in rows)
         noted = enumerate(self.log.environments)
         return [{"rows": counts[n], "versions": dict(environment)} for n, environment in noted if counts[n]]
 

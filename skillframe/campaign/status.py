@@ -34,7 +34,7 @@ def status_of(folder: Path, params: type | None = None) -> dict[str, Any]:
     rule = StopRule(spec)
     rule.add(done.values())
     complete = rule.after is not None or len(done) == rule.total(len(done))
-    rows, owner = ordered(spec, done.values(), rule.after, rule.left), holder(folder)
+    rows, owner = ordered(spec, done, rule.after, rule.left), holder(folder)
     return {
         "name": spec.name,
         "robot": spec.robot_name,

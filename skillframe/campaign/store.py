@@ -2,40 +2,46 @@
 
 `rows.jsonl` is written by one process, a line per row; the rows of a chunk go to the disk in one write and are synced
 (a power cut loses no more than that chunk). Its first line names the campaign by its hash, and every line ends with the
-CRC-32 of what stands before it, which catches damage and careless edits, not a forger. A torn last line is cut off
-when the file is opened. `results.csv` is written from it, sorted by trial and skill, so it does not depend on the order
-in which chunks end; whole or not at all.
+CRC-32 of what stands before it, which catches damage and careless edits, not a forger. What many rows share stands in a
+line of its own before them (`packed`), so that a row takes less than 300 bytes. A torn last line is cut off when the
+file is opened. Files of older versions hold rows as JSON objects; they are read, and go on in their own version.
+`results.csv` is written from it, sorted by trial and skill, so it does not depend on the order in which chunks end;
+whole or not at all.
 """
 
 from __future__ import annotations
 
 import csv
-import io
 import json
 import os
 import re
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from skillframe.campaign.packed import LAYOUT, Key, Layout, PackedRows, RowView, line_of, row_of
 from skillframe.campaign.rows import LEFT_OUT, Row, absent, cell, columns, decode, encode
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.verify import FIX, KEYS, KINDS, Line, check_rows, check_shape
 from skillframe.errors import InputError
-from skillframe.files import write_whole
+from skillframe.files import writing_whole
 from skillframe.files.documents import parse_json
 
 ROWS, RESULTS = "rows.jsonl", "results.csv"
 FORMAT, VERSION = "skillframe.campaign", 1
-ROWS_VERSION = 2
+ROWS_VERSION = 3
+"""1 had no checksums, which is said of its files; 2 had a JSON object with all columns per row."""
+SIGNED, PACKED = 2, 3
+"""First versions with checksums and with layouts."""
 BINARY = getattr(os, "O_BINARY", 0)  # Windows would turn line ends into two bytes otherwise
-"""1 had no checksums; its files are read, and said to be so."""
+BLOCK = 4096
+"""Rows that are held against the campaign's draws at a time: each time, a Sobol sequence is made anew."""
 RAN_ON = "ran_on"
 """Key of a line that says in which of the noted environments its row ran."""
-Done = dict[tuple[int, str], Row]
+Done = Mapping[Key, Row]
 Environment = Mapping[str, str]
 
 
@@ -44,19 +50,18 @@ class Content:
     """What `rows.jsonl` holds.
 
     Attributes:
-        lines: the stored rows.
+        done: the stored rows by (trial, skill).
         sessions: what was noted about each process that wrote here.
         unchecked: how many lines carry no checksum, as in files of skillframe 0.1.
+        version: of the file.
+        layouts: one more than the largest number of a layout.
     """
 
-    lines: tuple[Line, ...] = ()
+    done: PackedRows = field(default_factory=PackedRows)
     sessions: tuple[dict[str, Any], ...] = ()
     unchecked: int = 0
-
-    @property
-    def done(self) -> Done:
-        """The stored rows by (trial, skill)."""
-        return {(line.row["trial"], line.row["skill"]): line.row for line in self.lines}
+    version: int = ROWS_VERSION
+    layouts: int = 0
 
     @property
     def environments(self) -> list[Environment]:
@@ -69,7 +74,6 @@ class RowLog:
 
     Attributes:
         done: the stored rows by (trial, skill).
-        ran_on: the number of the environment in which a row ran, as far as it is known.
         sessions: what was noted about each process that wrote here.
         unchecked: lines without a checksum that were read.
 
@@ -82,7 +86,7 @@ class RowLog:
         repair_tail(self._path)
         found = read_content(folder, campaign, spec)
         self.done, self.sessions, self.unchecked = found.done, list(found.sessions), found.unchecked
-        self.ran_on = {(x.row["trial"], x.row["skill"]): x.ran_on for x in found.lines if x.ran_on is not None}
+        self._version, self._next, self._stated = found.version, found.layouts, dict[Layout, int]()
         self.environments = found.environments
         self._descriptor = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | BINARY, 0o666)
         if os.fstat(self._descriptor).st_size == 0:
@@ -91,13 +95,26 @@ class RowLog:
     def append(self, rows: Iterable[Row], environment: Environment | None = None) -> list[Row]:
         """Store rows, and where they ran. Returns those that are new (a stored trial keeps its first row)."""
         fresh = [row for row in rows if (row["trial"], row["skill"]) not in self.done]
-        where = {} if environment is None or not fresh else {RAN_ON: self._number(environment)}
-        self._write([{key: encode(value) for key, value in row.items()} | where for row in fresh])
-        self.done |= {(row["trial"], row["skill"]): row for row in fresh}  # before the sync, where Ctrl-C may come
-        if where:
-            self.ran_on |= {(row["trial"], row["skill"]): where[RAN_ON] for row in fresh}
+        ran_on = None if environment is None or not fresh else self._number(environment)
+        self._write(self._records(fresh, ran_on))
+        for row in fresh:  # before the sync, where Ctrl-C may come
+            self.done.add(row, ran_on)
         self._sync()
         return fresh
+
+    def _records(self, rows: Sequence[Row], ran_on: int | None) -> Iterator[Mapping[str, Any]]:
+        """Rows as lines of the file's version, each layout stated before its first row."""
+        for row in rows:
+            if self._version < PACKED:
+                where = {} if ran_on is None else {RAN_ON: ran_on}
+                yield {key: encode(value) for key, value in row.items()} | where
+                continue
+            layout = self.done.layout(row, ran_on)
+            if layout not in self._stated:
+                self._stated[layout] = self._next
+                self._next += 1
+                yield layout.record(self._stated[layout])
+            yield line_of(self._stated[layout], layout, row)
 
     def _number(self, environment: Environment) -> int:
         """The number under which an environment is noted. A new one is noted now."""
@@ -112,7 +129,7 @@ class RowLog:
         self.sessions.append(dict(session))
         self._sync()
 
-    def _write(self, records: Sequence[Mapping[str, Any]]) -> None:
+    def _write(self, records: Iterable[Mapping[str, Any]]) -> None:
         """Append lines. Where that fails, the file is as it was.
 
         Raises:
@@ -127,6 +144,7 @@ class RowLog:
         except OSError as error:
             with suppress(OSError):
                 os.ftruncate(self._descriptor, size)
+            self._stated.clear()
             raise type(error)(error.errno, error.strerror, str(self._path)) from None
 
     def _sync(self) -> None:
@@ -174,35 +192,97 @@ def read_content(folder: Path, campaign: str | None = None, spec: CampaignSpec |
     """
     path = folder / ROWS
     try:
-        content = path.read_bytes()
+        with path.open("rb") as file:
+            return _Reader(path, campaign, spec).read(text[:-1] for text in file if text.endswith(b"\n"))
     except FileNotFoundError:
         return Content()
-    texts = content.split(b"\n")[:-1]
-    signed = [_is_intact(text) for text in texts]
-    records = [
-        _record(path, number, text, intact)
-        for number, (text, intact) in enumerate(zip(texts, signed, strict=True), start=1)
-    ]
-    if not records:
-        return Content()
-    unchecked = signed.count(None)
-    if _check_header(path, records[0], campaign) >= ROWS_VERSION and unchecked:
-        raise InputError(f"{path}: line {1 + signed.index(None)}", "has lost its checksum", FIX)
-    lines = tuple(
-        _row(path, n, record, spec) for n, record in enumerate(records[1:], start=2) if "session" not in record
-    )
-    _check_twice(path, lines)
-    if spec is not None:
-        check_rows(path, spec, lines)
-    return Content(
-        lines=lines, sessions=tuple(_session(path, n, r) for n, r in enumerate(records, 1) if "session" in r),
-        unchecked=unchecked,
-    )  # fmt: skip
+
+
+class _Reader:
+    """Reads the lines of a file one by one, so that no more than some of them are held at a time."""
+
+    def __init__(self, path: Path, campaign: str | None, spec: CampaignSpec | None) -> None:
+        self._path, self._campaign, self._spec = path, campaign, spec
+        self._done, self._numbers = PackedRows(), list[int]()
+        self._sessions: list[dict[str, Any]] = []
+        self._layouts: dict[int, Layout] = {}
+        self._early: list[tuple[int, Row]] = []
+        self._block: list[Line] = []
+
+    def read(self, texts: Iterable[bytes]) -> Content:
+        """All there is."""
+        version, unchecked = ROWS_VERSION, 0
+        for number, text in enumerate(texts, start=1):
+            intact = _is_intact(text)
+            record = _record(self._path, number, text, intact)
+            if number == 1:
+                version = _check_header(self._path, record, self._campaign)
+            if intact is None:
+                if version >= SIGNED:
+                    raise InputError(f"{self._path}: line {number}", "has lost its checksum", FIX)
+                unchecked += 1
+            if number > 1:
+                self._take(number, record)
+        for number, record in self._early:
+            self._add(number, *self._unpacked(number, record))
+        self._check_block()
+        return Content(
+            done=self._done, sessions=tuple(self._sessions), unchecked=unchecked, version=version,
+            layouts=1 + max(self._layouts, default=-1),
+        )  # fmt: skip
+
+    def _take(self, number: int, record: Row) -> None:
+        if "session" in record:
+            self._sessions.append(_session(self._path, number, record))
+        elif LAYOUT not in record:
+            self._add(number, *_plain(self._path, number, record))
+        elif "columns" in record:
+            self._state(number, record)
+        elif type(record[LAYOUT]) is int and record[LAYOUT] in self._layouts:
+            self._add(number, *self._unpacked(number, record))
+        else:  # lines may have been put into another order
+            self._early.append((number, record))
+
+    def _state(self, number: int, record: Row) -> None:
+        where, layout = f"{self._path}: line {number}", record[LAYOUT]
+        if type(layout) is not int or layout < 0 or layout in self._layouts:
+            raise InputError(where, f"states layout {layout!r}, which is no number or stated before", FIX)
+        try:
+            self._layouts[record[LAYOUT]] = Layout.from_record(record)
+        except ValueError as error:
+            raise InputError(where, str(error), FIX) from None
+
+    def _unpacked(self, number: int, record: Row) -> tuple[Row, int | None]:
+        where = f"{self._path}: line {number}"
+        check_shape(where, record, {"trial": int})
+        try:
+            return row_of(record, self._layouts)
+        except ValueError as error:
+            raise InputError(where, str(error), FIX) from None
+
+    def _add(self, number: int, row: Row, ran_on: int | None) -> None:
+        """Take a row, after it was held against the campaign."""
+        where = f"{self._path}: line {number}"
+        check_shape(where, row, KINDS if self._spec is not None else KEYS)
+        if (row["trial"], row["skill"]) in self._done:
+            first = self._numbers[list(self._done).index((row["trial"], row["skill"]))]
+            problem = f"is a second row of trial {row['trial']} of {row['skill']} (the first is line {first})"
+            raise InputError(where, problem, FIX)
+        self._done.add(row, ran_on)
+        self._numbers.append(number)
+        self._block.append(Line(number, row))
+        if len(self._block) == BLOCK:
+            self._check_block()
+
+    def _check_block(self) -> None:
+        if self._spec is not None:
+            check_rows(self._path, self._spec, self._block)
+        self._block.clear()
 
 
 def _line(record: Mapping[str, Any]) -> bytes:
     """A record as a line that ends with the checksum of what stands before it."""
-    text = json.dumps(record, allow_nan=False, ensure_ascii=False).encode()[:-1]
+    text = json.dumps(record, allow_nan=False, ensure_ascii=False, separators=(",", ":")).encode()[:-1]
     return b'%s, "crc32": "%08x"}\n' % (text, zlib.crc32(text))
 
 
@@ -226,24 +306,13 @@ def _record(path: Path, number: int, line: bytes, intact: bool | None) -> Row:
     return record
 
 
-def _row(path: Path, number: int, record: Row, spec: CampaignSpec | None) -> Line:
+def _plain(path: Path, number: int, record: Row) -> tuple[Row, int | None]:
+    """A row as versions before `PACKED` stored it, and where it ran."""
     ran_on = record.pop(RAN_ON, None)
-    where = f"{path}: line {number}"
     try:
-        row = decode(record)
+        return decode(record), ran_on if isinstance(ran_on, int) else None
     except ValueError as error:
-        raise InputError(where, str(error), FIX) from None
-    check_shape(where, row, KINDS if spec is not None else KEYS)
-    return Line(number, row, ran_on if isinstance(ran_on, int) else None)
-
-
-def _check_twice(path: Path, lines: Sequence[Line]) -> None:
-    seen: dict[tuple[int, str], int] = {}
-    for line in lines:
-        first = seen.setdefault((line.row["trial"], line.row["skill"]), line.number)
-        if first != line.number:
-            problem = f"is a second row of trial {line.row['trial']} of {line.row['skill']} (the first is line {first})"
-            raise InputError(f"{path}: line {line.number}", problem, FIX)
+        raise InputError(f"{path}: line {number}", str(error), FIX) from None
 
 
 def _session(path: Path, number: int, record: Row) -> dict[str, Any]:
@@ -272,28 +341,33 @@ def _check_header(path: Path, header: Row, campaign: str | None) -> int:
 
 
 def ordered(
-    spec: CampaignSpec, rows: Iterable[Row], stop_after: int | None = None, left: Mapping[str, int] | None = None
-) -> list[Row]:
+    spec: CampaignSpec, done: Done, stop_after: int | None = None, left: Mapping[str, int] | None = None
+) -> Sequence[Row]:
     """Rows by trial, then by skill, without those after the trial at which the campaign stopped.
 
     Args:
         spec: the campaign.
-        rows: all there are.
+        done: all there are.
         stop_after: the last trial of a campaign that stopped early.
         left: trials of the skills that a race left out. Their rows beyond are dropped, and the others say so.
     """
     order, gone = {label: i for i, label in enumerate(spec.labels)}, left or {}
-    kept = (row for row in rows if stop_after is None or row["trial"] <= stop_after)
-    raced = (row for row in kept if row["trial"] < gone.get(row["skill"], spec.trials))
-    marked = (row | {LEFT_OUT: gone[row["skill"]]} if row["skill"] in gone else row for row in raced)
-    return sorted(marked, key=lambda row: (row["trial"], order[row["skill"]]))
+    kept = (key for key in done if stop_after is None or key[0] <= stop_after)
+    raced = (key for key in kept if key[0] < gone.get(key[1], spec.trials))
+
+    def at(key: Key) -> Row:
+        return done[key] | {LEFT_OUT: gone[key[1]]} if key[1] in gone else done[key]
+
+    return RowView(at, sorted(raced, key=lambda key: (key[0], order[key[1]])))
 
 
 def write_results(folder: Path, spec: CampaignSpec, rows: Sequence[Row]) -> None:
     """Write results.csv from ordered rows."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
     names = columns(spec, rows)
-    writer.writerow(names)
-    writer.writerows([cell(row.get(name, absent(name))) for name in names] for row in rows)
-    write_whole(folder / RESULTS, text.getvalue().encode())
+    with (
+        writing_whole(folder / RESULTS) as temporary,
+        temporary.open("w", encoding="utf-8", newline="") as file,
+    ):
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(names)
+        writer.writerows([cell(row.get(name, absent(name))) for name in names] for row in rows)

@@ -10,6 +10,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from skillframe.campaign.packed import RowView
 from skillframe.campaign.race import Race
 from skillframe.campaign.rows import LEFT_OUT, SCORE, Row
 from skillframe.campaign.spec import CampaignSpec
@@ -41,11 +42,11 @@ def rates(spec: CampaignSpec, rows: Sequence[Row], complete: bool) -> dict[str, 
     return {label: _rate(_of(rows, label, complete), rows, label, validity) for label in spec.labels}
 
 
-def _of(rows: Sequence[Row], label: str, complete: bool) -> list[Row]:
+def _of(rows: Sequence[Row], label: str, complete: bool) -> Sequence[Row]:
     """The rows of a skill that count."""
-    mine = [row for row in rows if row["skill"] == label]
-    reach = unbroken(row["trial"] for row in mine)
-    return [row for row in mine if complete or row["trial"] < reach]
+    mine = {place: row["trial"] for place, row in enumerate(rows) if row["skill"] == label}
+    reach = unbroken(mine.values())
+    return RowView(rows.__getitem__, [place for place, trial in mine.items() if complete or trial < reach])
 
 
 def _rate(counted: Sequence[Row], rows: Sequence[Row], label: str, validity: Validity) -> dict[str, Any]:

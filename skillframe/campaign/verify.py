@@ -30,12 +30,10 @@ class Line(NamedTuple):
     Attributes:
         number: of its line in the file, from 1.
         row: the row.
-        ran_on: index of the environment that it ran in; None if unknown.
     """
 
     number: int
     row: Row
-    ran_on: int | None
 
 
 def check_shape(where: str, row: Row, kinds: Mapping[str, type | tuple[type, ...]] = KINDS) -> None:

@@ -57,7 +57,7 @@ def rows_of_campaign(folder: Path, params: type | None = None) -> list[Row]:
         InputError: rows are missing, damaged or another campaign's.
     """
     spec = load(folder, params)
-    rows = ordered(spec, read_content(folder, campaign_hash(spec), spec).done.values(), None)
+    rows = list(ordered(spec, read_content(folder, campaign_hash(spec), spec).done))
     if len(rows) != spec.trials:
         raise InputError(folder, f"has {len(rows)} of {spec.trials} trials", "go on with the command that began it")
     return rows

@@ -1,10 +1,12 @@
 """A campaign without a simulator: success inside a closed-form region, and trials that kill, hang, hoard and raise."""
 
+import base64
 import ctypes
 import json
 import math
 import os
 import signal
+import struct
 import sys
 import time
 import zlib
@@ -114,22 +116,42 @@ def tells(job):
     return good(job)
 
 
+def unpacked(records):
+    """The records of a rows.jsonl, its rows as the versions before 3 wrote them: one JSON object with all columns."""
+    layouts, plain = {r["layout"]: r for r in records if "columns" in r}, []
+    for record in (r for r in records if "columns" not in r):
+        if "layout" in record:
+            layout = layouts[record["layout"]]
+            bits = base64.b64decode(record["bits"] + "=" * (-len(record["bits"]) % 4))
+            floats = struct.unpack(f"<{len(layout['floats'])}d", bits)
+            said = {n: x if math.isfinite(x) else repr(x) for n, x in zip(layout["floats"], floats, strict=True)}
+            said |= layout["shared"]
+            rest = iter(record["rest"])
+            row = {name: said[name] if name in said else next(rest) for name in layout["columns"]}
+            where = {"ran_on": layout["ran_on"]} if "ran_on" in layout else {}
+            record = {"trial": record["trial"], **row, **where}
+        plain.append(record)
+    return plain
+
+
 def edit_rows(folder, change, old=False):
-    """Rewrite rows.jsonl through a function of its list of records, with checksums that fit, or as skillframe 0.1 did.
+    """Rewrite rows.jsonl through a function of its list of records, as version 2, or as skillframe 0.1 did.
 
     A line ends with `, "crc32": "%08x"}`, the CRC-32 of all that stands before it; 0.1's version was 1 and had none.
     """
     path = folder / "rows.jsonl"
     records = [json.loads(line) for line in path.read_text().splitlines()]
-    signed = [record.pop("crc32", None) is not None for record in records]
+    for record in records:
+        record.pop("crc32", None)
+    records = unpacked(records)
+    records[0]["version"] = 1 if old else 2
     if old:
-        records[0]["version"] = 1
         for record in records:
             record.pop("ran_on", None)
     content = b""
     for record in change(records):
         text = json.dumps(record, ensure_ascii=False).encode()[:-1]
-        content += text + (b"}\n" if old or not any(signed) else b', "crc32": "%08x"}\n' % zlib.crc32(text))
+        content += text + (b"}\n" if old else b', "crc32": "%08x"}\n' % zlib.crc32(text))
     path.write_bytes(content)
 
 

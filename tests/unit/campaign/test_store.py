@@ -116,7 +116,7 @@ def test_rows_of_another_campaign_are_refused(out, file):
 
 def test_rows_of_a_newer_version_and_foreign_files_are_refused(out):
     (out / "rows.jsonl").write_text('{"format": "skillframe.campaign", "version": 99}\n')
-    with pytest.raises(InputError, match="newer than 2"):
+    with pytest.raises(InputError, match="newer than 3"):
         read_content(out)
     (out / "rows.jsonl").write_text('{"trial": 0}\n')
     with pytest.raises(InputError, match="not the head"):

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from campaign_fakes import TEXT, FakeParams, good, run, start, write_campaign
+from campaign_fakes import TEXT, FakeParams, edit_rows, good, run, start, write_campaign
 
 from skillframe.campaign import evaluate
 from skillframe.campaign.folder import prepare
@@ -67,9 +67,7 @@ def test_a_grid_that_has_run_to_its_end_has_its_interval_again(part_of_a_grid):
 def out_of_order(folder, keep):
     """An interrupted campaign that has the rows of some trials only: (label, trial) decides."""
     run(folder, traces=0)
-    lines = (folder / "rows.jsonl").read_text().splitlines(keepends=True)
-    rows = [line for line in lines[1:] if '"trial"' not in line or keep(json.loads(line))]
-    (folder / "rows.jsonl").write_text("".join([lines[0], *rows]))
+    edit_rows(folder, lambda records: [r for r in records if "trial" not in r or keep(r)])
     return status_of(folder, FakeParams)
 
 
