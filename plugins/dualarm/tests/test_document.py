@@ -101,7 +101,7 @@ def test_a_peg_that_cannot_be_is_refused(words, value):
 
 
 def test_the_two_arms_peg_is_in_once_its_tip_is_50_of_60_millimetres_deep_and_in_the_hole():
-    """Beside the hole, or past what holds it, a tip may be as deep. The hole's radius is 16.75 mm."""
+    """Beside the hole, or past what holds it, a tip may be as deep, or below it. The hole's radius is 16.75 mm."""
 
     def done(x, z):
         tip = Pose(np.array([[x, 0.0, z]]), np.eye(3)[None])
@@ -109,3 +109,4 @@ def test_the_two_arms_peg_is_in_once_its_tip_is_50_of_60_millimetres_deep_and_in
 
     assert not done(0.0, -0.0499) and done(0.0, -0.0501)
     assert done(0.016, -0.055) and not done(0.017, -0.055) and not done(0.1, -0.055)
+    assert done(0.0, -0.0619) and not done(0.0, -0.0621) and not done(0.0, -0.2)

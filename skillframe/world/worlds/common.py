@@ -18,7 +18,10 @@ TOOL_DOWN = (1.0, 0.0, 0.0, 0.0)
 WRIST_TO_TIP = 0.2
 TOOL_MASS = 0.6
 FLOOR = 0.002
-"""[m] further below the floor of a hole nothing is in it: contacts give way less within a robot's limits (ours)."""
+"""[m] further below the floor of a hole nothing is in it, and further from an edge nothing lies on it.
+
+Contacts give way less within a robot's limits (ours).
+"""
 
 
 def tool(geoms: tuple[Geom, ...], tip: float = WRIST_TO_TIP, hand: str = "wrist") -> Tool:

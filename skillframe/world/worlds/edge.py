@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skillframe.frames import Float
 from skillframe.world.scene import Geom, Scene, State, Task
 from skillframe.world.shapes import FIXTURE_COLOUR, TOOL_COLOUR, quaternion_about
-from skillframe.world.worlds.common import WRIST_TO_TIP, require, tool
+from skillframe.world.worlds.common import FLOOR, WRIST_TO_TIP, require, tool
+
+TABLE = 0.1  # half the length and width of the table [m]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,10 +37,11 @@ class EdgeParams:
 def build(params: EdgeParams) -> Scene:
     """A table that fills x < 0, z < 0. Its edge is the y axis. The wrist is at x > 0, below. The tip points up over it.
 
-    The rod is turned down about +y until it lies level on the edge.
+    The rod is turned down about +y until it lies level on the edge. The goal is a rod within 10 degrees of level that
+    crosses the edge between wrist and tip, within the table's width, and touches it to `FLOOR`.
     """
     require("edge", {}, params)
-    table = Geom(kind="box", size=(0.1, 0.1, 0.02), position=(-0.1, 0.0, -0.02), rgba=FIXTURE_COLOUR)
+    table = Geom(kind="box", size=(TABLE, TABLE, 0.02), position=(-TABLE, 0.0, -0.02), rgba=FIXTURE_COLOUR)
     rod = Geom(
         kind="capsule", size=(params.radius, 0.5 * WRIST_TO_TIP - 0.5 * params.radius), rgba=TOOL_COLOUR,
         position=(0.0, 0.0, 0.5 * WRIST_TO_TIP - 0.5 * params.radius),
@@ -49,11 +53,22 @@ def build(params: EdgeParams) -> Scene:
     def level(state: State) -> Float:
         return np.arcsin(np.clip(state.tip.rotation[..., 2, 2], -1.0, 1.0))
 
+    def on_edge(state: State) -> NDArray[np.bool_]:
+        end, along = state.tip.position, state.tip.rotation[..., :, 2]
+        wrist = end - WRIST_TO_TIP * along
+        across = (end[..., 0] < 0.0) & (wrist[..., 0] > 0.0)
+        share = np.where(across, end[..., 0], 0.0) / np.where(across, end[..., 0] - wrist[..., 0], 1.0)
+        crossing = end + share[..., None] * (wrist - end)  # where the rod's axis is right above the edge
+        steep = np.hypot(along[..., 0], along[..., 2])
+        gap = crossing[..., 2] * np.abs(along[..., 0]) / np.where(across, steep, 1.0) - params.radius
+        lies: NDArray[np.bool_] = across & (np.abs(gap) < FLOOR) & (np.abs(crossing[..., 1]) < TABLE)
+        return lies
+
     return Scene(
         name="edge", fixture=(table,), tool=tool((rod,)), friction=params.friction,
         start_tip=(float(tip[0]), 0.0, float(tip[2])),
         start_quaternion=quaternion_about("y", params.tilt - 0.5 * np.pi),
-        goal=lambda state: np.abs(level(state)) < np.deg2rad(10.0),
+        goal=lambda state: (np.abs(level(state)) < np.deg2rad(10.0)) & on_edge(state),
         goal_error=lambda state: (np.zeros(len(state.tip.position)), np.abs(level(state))),
         task=Task(direction=None, turn=(0.0, -1.0, 0.0), hand="lever"),
     )  # fmt: skip

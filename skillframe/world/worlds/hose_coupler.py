@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.frames import Float
+from skillframe.frames import Float, norm
 from skillframe.world.scene import Geom, Scene, State, Task, Vector
 from skillframe.world.shapes import FIXTURE_COLOUR, TOOL_COLOUR, filleted_peg, quaternion_about, shaft
 from skillframe.world.worlds.common import TOOL_DOWN, require, tilt_lift, tilt_of, tool
@@ -23,6 +23,7 @@ LUG, LUG_HEIGHT, REACH = 0.008, 0.006, 0.028  # a lug's width, height and length
 ABOVE, PLAY, CLEAR = 0.006, 0.0015, 0.0135  # lug over face, room over lug, claw from face [m]
 TURN_TOLERANCE, TILT_UNDER_CLAWS = 0.035, 0.026  # [rad]; the lugs' room under the claws allows about 2 degrees
 COLLAR_PLAY, COLLAR_WALL, COLLAR_HEIGHT = 0.009, 0.003, 0.003  # [m]
+SEAT = 0.07  # half the seat's width [m]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,9 +53,11 @@ class HoseParams:
 
 
 def build(params: HoseParams) -> Scene:
-    """The fixture's face is the plane z = 0. The goal is a flush face (tilt below `tolerance`, within 1 mm).
+    """The fixture's face is the plane z = 0. The goal is a flush face on its seat.
 
-    With `interlock` the goal is lugs under the claws: turned to 2 degrees, within 1.5 mm and 1.5 degrees of flush.
+    Flush is a tilt below `tolerance`, within 1 mm. On its seat is a face whose middle is above the plate; past the
+    plate's side it would tip over. With `interlock` the goal is lugs under the claws: turned to 2 degrees, within
+    1.5 mm and 1.5 degrees of flush, and inside the collar: no farther off its axis than its play and its wall.
     """
     require(
         "hose_coupler",
@@ -65,13 +68,14 @@ def build(params: HoseParams) -> Scene:
         params,
     )
     face = filleted_peg(params.radius, params.length, params.fillet, params.segments, FACE)
-    seat = Geom(kind="box", size=(0.07, 0.07, 0.02), position=(0.0, 0.0, -0.02), rgba=FIXTURE_COLOUR)
+    seat = Geom(kind="box", size=(SEAT, SEAT, 0.02), position=(0.0, 0.0, -0.02), rgba=FIXTURE_COLOUR)
 
     def height(state: State) -> Float:
         return np.abs(state.tip.position[..., 2])
 
     def flush(state: State) -> NDArray[np.bool_]:
-        met: NDArray[np.bool_] = (tilt_of(state) < params.tolerance) & (height(state) < 0.001)
+        above_seat = np.all(np.abs(state.tip.position[..., :2]) < SEAT, axis=-1)
+        met: NDArray[np.bool_] = (tilt_of(state) < params.tolerance) & (height(state) < 0.001) & above_seat
         return met
 
     def unturned(state: State) -> Float:
@@ -79,7 +83,8 @@ def build(params: HoseParams) -> Scene:
 
     def locked(state: State) -> NDArray[np.bool_]:
         under = (height(state) < PLAY) & (tilt_of(state) < TILT_UNDER_CLAWS)
-        there: NDArray[np.bool_] = under & (unturned(state) < TURN_TOLERANCE)
+        inside = norm(state.tip.position[..., :2]) < COLLAR_PLAY + COLLAR_WALL
+        there: NDArray[np.bool_] = under & inside & (unturned(state) < TURN_TOLERANCE)
         return there
 
     locks = params.interlock > 0.0

@@ -16,6 +16,8 @@ from skillframe.world.scene import Geom, Scene, State, Task
 from skillframe.world.shapes import FIXTURE_COLOUR, TOOL_COLOUR, shaft, slope
 from skillframe.world.worlds.common import TOOL_DOWN, WRIST_TO_TIP, require, tool
 
+WIDTH = 0.16  # of both slopes along the valley's line [m]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValleyParams:
@@ -42,7 +44,10 @@ class ValleyParams:
 
 
 def build(params: ValleyParams) -> Scene:
-    """The valley with its line along y through the fixture's origin."""
+    """The valley with its line along y through the fixture's origin.
+
+    The goal is a ball at its bottom, between its ends, and with `along` at its wall.
+    """
     require("valley", {"along < 0.07 m": params.along < 0.07}, params)
     resting = params.radius / np.cos(params.slope)
     ball = Geom(kind="sphere", size=(params.radius,), position=(0.0, 0.0, WRIST_TO_TIP), rgba=TOOL_COLOUR)
@@ -53,7 +58,8 @@ def build(params: ValleyParams) -> Scene:
 
     def at_bottom(state: State) -> NDArray[np.bool_]:
         resting_on_both = np.abs(state.tip.position[..., 2] - resting) < 0.002
-        reached: NDArray[np.bool_] = (distance(state) < params.tolerance) & resting_on_both
+        between_ends = np.abs(state.tip.position[..., 1]) < 0.5 * WIDTH
+        reached: NDArray[np.bool_] = (distance(state) < params.tolerance) & resting_on_both & between_ends
         return reached
 
     def remaining(state: State) -> Float:
@@ -68,8 +74,8 @@ def build(params: ValleyParams) -> Scene:
     return Scene(
         name="valley",
         fixture=(
-            slope(params.slope, 0.0, params.length, 0.16),
-            slope(params.slope, np.pi, params.length, 0.16),
+            slope(params.slope, 0.0, params.length, WIDTH),
+            slope(params.slope, np.pi, params.length, WIDTH),
             *_wall(params),
         ),
         tool=tool((ball, shaft(0.004, 0.01, WRIST_TO_TIP - params.radius)), hand="grip"),

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from skillframe.frames import Float, norm
 from skillframe.world.scene import Geom, Holder, Scene, State, Task, Tool
 from skillframe.world.shapes import TOOL_COLOUR, hole, shaft
-from skillframe.world.worlds.common import TOOL_DOWN, insertion, require, tilt_of
+from skillframe.world.worlds.common import FLOOR, TOOL_DOWN, insertion, require, tilt_of
 
 REACH = 0.15  # from the flange to tip and mouth [m]
 MASSES = (0.6, 0.8)  # of peg and hole with their mounts [kg]
@@ -48,7 +48,7 @@ class DualPegParams:
 
 
 def build(params: DualPegParams) -> Scene:
-    """The hole opens along the fixture's z axis. The goal is the tip below `done_depth`."""
+    """The hole opens along the fixture's z axis. The goal is the tip in it, below `done_depth`, not below its floor."""
     require(
         "dual_peg",
         {
@@ -64,7 +64,8 @@ def build(params: DualPegParams) -> Scene:
 
     def inserted(state: State) -> NDArray[np.bool_]:
         tip = state.tip.position
-        return (tip[..., 2] < -params.done_depth) & (norm(tip[..., :2]) < params.radius)  # in the hole, not past it
+        above_floor = tip[..., 2] > -params.depth - FLOOR
+        return (tip[..., 2] < -params.done_depth) & (norm(tip[..., :2]) < params.radius) & above_floor
 
     return Scene(
         name="dual_peg",
