@@ -148,12 +148,16 @@ def _innovation_variance(corners: Float, wrench: Float, dt: float) -> Float:
     counted = (rows >= starts[:, None]) & (rows < starts[:, None] + CHUNK)
     value = np.broadcast_to(wrench[rows[:, 0], None], (len(rows), len(corners), 6)).copy()
     slope, total = np.zeros_like(value), np.zeros_like(value)
-    for i in range(1, rows.shape[1]):
-        value += dt * slope
-        error = wrench[rows[:, i], None] - value
-        total += error**2 if counted[:, i].all() else error**2 * counted[:, i, None, None]
-        value += gain.value * error
-        slope += gain.slope * error
+    error, scratch = np.empty_like(value), np.empty_like(value)
+    for i in range(1, rows.shape[1]):  # in place: new arrays cost more than the sums
+        value += np.multiply(dt, slope, out=scratch)
+        np.subtract(wrench[rows[:, i], None], value, out=error)
+        np.square(error, out=scratch)
+        if not counted[:, i].all():
+            scratch *= counted[:, i, None, None]
+        total += scratch
+        value += np.multiply(gain.value, error, out=scratch)
+        slope += np.multiply(gain.slope, error, out=scratch)
     result: Float = total.sum(axis=0) / max(1, len(wrench) - 1)
     return result
 

@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.demonstration.columns import WRENCH
+from skillframe.demonstration.once import Once
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
 from skillframe.frames import Float, matrix_from_quaternion, norm, rotation_vector
@@ -111,8 +112,12 @@ def find(time: Float, pose: Float, wrench: Float, meta: Mapping[str, Any]) -> li
         wrench: (T, 6) as the sensor gave it: a constant wrench in tool axes is none in base axes.
         meta: `contact`, and channels that nobody measured.
     """
+    return _FOUND(time, pose, wrench, without_contact=meta.get("contact") is False)
+
+
+def _find(time: Float, pose: Float, wrench: Float, *, without_contact: bool) -> list[Stall]:
     result = [Stall(POSE, *_span(time, run)) for run in _long(time, pose, LEAST_TIME) if _jumps(pose, run)]
-    if meta.get("contact") is False:
+    if without_contact:
         return result
     whole = _held(time, wrench, LEAST_TIME, LEAST_NOISE)
     result += [Stall("wrench", *_span(time, run)) for run in whole]
@@ -123,6 +128,9 @@ def find(time: Float, pose: Float, wrench: Float, meta: Mapping[str, Any]) -> li
         runs = _held(time, wrench[:, i : i + 1], LEAST_TIME_CHANNEL, LEAST_NOISE[i : i + 1])
         result += [Stall(name, *_span(time, (a, b))) for a, b in runs if free[a : b + 1].all()]
     return sorted(result, key=lambda s: (s.start, s.what))
+
+
+_FOUND = Once(_find)
 
 
 def _span(time: Float, run: tuple[int, int]) -> tuple[float, float]:

@@ -149,7 +149,7 @@ def _number(field: str) -> float | None:
 def _refuse_ragged(path: Path, names: list[str], lines: list[tuple[int, str]], delimiter: str | None) -> None:
     width = len(names) or len(_split(lines[0][1], delimiter))
     for row, line in lines:
-        count = len(_split(line, delimiter))
+        count = line.count(delimiter) + 1 if delimiter else len(line.split())
         if count != width:
             reference = "the header" if names else f"row {lines[0][0]}"
             raise InputError(

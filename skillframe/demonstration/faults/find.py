@@ -14,6 +14,7 @@ from skillframe.demonstration.faults.fault import COPY, JUMP, SATURATED, Flaw
 from skillframe.demonstration.faults.jumps import jumps
 from skillframe.demonstration.faults.saturated import saturated
 from skillframe.demonstration.faults.steps import steps
+from skillframe.demonstration.once import Once
 from skillframe.demonstration.record import Demonstration
 from skillframe.demonstration.stalls import KEY as STALLS
 from skillframe.demonstration.stalls import POSE, Stall, as_meta, every_stall, stalls
@@ -49,7 +50,7 @@ def every_fault(
         source: its name, for messages.
     """
     known = record.kept(meta, source)
-    shown = [f for f in _shown(time, pose, wrench, held) if not any(_same(f, k) for k in known)]
+    shown = [f for f in _SHOWN(time, pose, wrench, held=list(held)) if not any(_same(f, k) for k in known)]
     found = [f for f in [*known, *shown] if f.within(float(time[0]), float(time[-1]))]
     return sorted(found, key=lambda f: (f.start, f.kind, f.what))
 
@@ -66,6 +67,9 @@ def _shown(time: Float, pose: Float, wrench: Float, held: Sequence[Stall]) -> li
         skip |= (time >= span.start) & (time <= span.stop)
     found += [f for f in jumps(time, pose) if not any(s.what == POSE and _touch(s, f) for s in spans)]
     return found + steps(time, pose, wrench, skip)
+
+
+_SHOWN = Once(_shown)
 
 
 def _touch(one: Stall | Flaw, other: Flaw) -> bool:
