@@ -31,6 +31,29 @@ class Trials(NamedTuple):
 def successes(
     robot: RobotModel, scene: Scene, trials: Sequence[Trials], *, duration_s: float, center: str | None = None
 ) -> list[NDArray[np.bool_]]:
+    """Which trials of documents that run side by side succeed. Arguments as `ran`.
+
+    Returns:
+        by document, (N,) each.
+    """
+    return [each.success for each in ran(robot, scene, trials, duration_s=duration_s, center=center)]
+
+
+class Ended(NamedTuple):
+    """How the trials (N,) of a document ended: which succeeded, and after how long [s]."""
+
+    success: NDArray[np.bool_]
+    seconds: Float
+
+    @property
+    def found(self) -> Float:
+        """Seconds (N,) to the success, inf where there was none."""
+        return np.where(self.success, self.seconds, np.inf)
+
+
+def ran(
+    robot: RobotModel, scene: Scene, trials: Sequence[Trials], *, duration_s: float, center: str | None = None
+) -> list[Ended]:
     """Run documents side by side.
 
     Args:
@@ -41,22 +64,22 @@ def successes(
         center: of compliance, the same for all; None: where each was learned; one simulation for each such point.
 
     Returns:
-        by document, which trials (N,) succeeded.
+        by document, how its trials ended.
     """
     made = [prepare(robot, scene, each.document, center) for each in trials]
     alike: dict[bytes, list[int]] = {}
     for i, (_, setup) in enumerate(made):
         alike.setdefault(setup.center_of_compliance.tobytes(), []).append(i)
-    found = [np.zeros(0, dtype=bool)] * len(trials)
+    found = dict[int, Ended]()
     for which in alike.values():
         some, sizes = [trials[i] for i in which], [len(trials[i].rngs) for i in which]
         draws = {key: np.concatenate([each.draws[key] for each in some]) for key in some[0].draws}
         rngs = [rng for each in some for rng in each.rngs]
         skill = Blocks([made[i][0] for i in which], sizes)
-        done = simulate(skill, made[which[0]][1], draws, rngs, duration_s=duration_s).success
-        for i, success in zip(which, np.split(done, np.cumsum(sizes)[:-1]), strict=True):
-            found[i] = success
-    return found
+        done = simulate(skill, made[which[0]][1], draws, rngs, duration_s=duration_s)
+        parts = (np.split(values, np.cumsum(sizes)[:-1]) for values in (done.success, done.duration_s))
+        found |= {i: Ended(*each) for i, *each in zip(which, *parts, strict=True)}
+    return [found[i] for i in range(len(trials))]
 
 
 class Blocks(Skill):

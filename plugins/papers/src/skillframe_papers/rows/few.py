@@ -8,18 +8,18 @@ taught as often by somebody who believes that the hole lies at the start.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import cos, pi, sin
 from typing import NamedTuple
 
 import numpy as np
-from skillframe_search.trials import NOBODY_KNEW, Task, demonstrations, document, goals, search
+from skillframe_search.trials import NOBODY_KNEW, Task, demonstrations, document, goals
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.extend.records import RowResult, RowRun
 from skillframe.frames import Float
 from skillframe_papers.bars import ahead, counted, judged, together
-from skillframe_papers.rows.search import EARLY_S, GIVEN, SHIFT
+from skillframe_papers.rows.search import EARLY_S, GIVEN, SHIFT, searched
 
 PEOPLE, QUICK_PEOPLE = 5, 1
 GOALS, QUICK_GOALS = 20, 5
@@ -60,13 +60,13 @@ def _people(job: RowRun) -> list[Given]:
     ]
 
 
-def _found(job: RowRun, given: Given, taught: tuple[Demonstration, ...], where: Float) -> int:
-    """Goals that a search learned from some demonstrations finds in time."""
+def _found(job: RowRun, given: Given, taught: Sequence[tuple[Demonstration, ...]], where: Float) -> list[int]:
+    """Goals that searches find in time, each learned from some demonstrations."""
     settings = {key: job.settings[key] for key in ("push", "speed", "stiffness")}
     time = min(EARLY_S, float(job.settings["time"]))
-    learned = document("search", given.task, taught, time=time, algorithm="sampling", **settings)
-    _, seconds = search(learned, given.task.scene, where, duration_s=time, seed=5 + job.seed)
-    return int(np.isfinite(seconds).sum())
+    learned = [document("search", given.task, each, time=time, algorithm="sampling", **settings) for each in taught]
+    found = searched(learned, given.task, where, duration_s=time, seed=5 + job.seed)
+    return [int(np.isfinite(seconds).sum()) for seconds in found]
 
 
 def few(job: RowRun) -> RowResult:
@@ -76,9 +76,9 @@ def few(job: RowRun) -> RowResult:
     found = {name: list[int]() for name in (*(f"from {n}" for n in counts), NULL)}
     for k, given in enumerate(people):
         where = goals(each, given.task, GOAL_SEED + 1000 * job.seed + k)
-        for n in counts:
-            found[f"from {n}"].append(_found(job, given, given.own[:n], where))
-        found[NULL].append(_found(job, given, given.unknowing, where))
+        hits = _found(job, given, [*(given.own[:n] for n in counts), given.unknowing], where)
+        for own, each_found in zip(found.values(), hits, strict=True):
+            own.append(each_found)
         job.tell(f"person {k}: {', '.join(f'{name} {hits[-1]}' for name, hits in found.items())} of {each}")
     return _told(job, found, counts[-1], each * len(people))
 

@@ -133,13 +133,18 @@ def _gates(key: Key, seed: int, groups: int, name: str) -> Gates:
     return Gates(plain[0], other[0], plain[1], other[1])
 
 
+def _half(job: RowRun, groups: int) -> int:
+    """How many new demonstrations are of the first kind: half of them, in a quick run none."""
+    return 0 if job.quick else EACH * ((groups + 1) // 2)
+
+
 def moved(job: RowRun) -> RowResult:
     """Row 17: transitions when the table has moved."""
     groups, key, seed = groups_of(job), key_of(job), SEED + job.seed
     shift, rows, told = float(job.settings["table.moved"]), list[tuple[str, ...]](), list[str]()
     shares, beside = list[Verdict](), True
     for name in TASKS:
-        half = EACH * ((groups + 1) // 2)
+        half = _half(job, groups)
         up = demonstrated(key, seed + 1, half, name, shift)
         new = [*up, *demonstrated(key, seed + 2, groups * EACH - half, name, -shift)]
         gates = _gates(key, seed, groups, name)
@@ -175,7 +180,7 @@ def online(job: RowRun) -> RowResult:
     groups, key, seed = groups_of(job), key_of(job), SEED + job.seed
     rows, all_of, clock = list[tuple[str, ...]](), list[Followed](), 0
     for name in TASKS:
-        half = EACH * ((groups + 1) // 2)
+        half = _half(job, groups)
         new = demonstrated(key, seed + 3, half, name, 0.0, SLOW)
         new = (*new, *demonstrated(key, seed + 4, groups * EACH - half, name, 0.0, FAST))
         models = [from_document(p["phase_model"]) for p in policies_of(key, seed, groups, name)]
@@ -194,7 +199,7 @@ def online(job: RowRun) -> RowResult:
         rows=rows,
         head=("world", "followed by", "policies without a mistake", "changes within 0.3 s", "95 % are at most late by",
               "switches elsewhere"),
-        difference=f"Null: a clock. New people are {SLOW:g} or {FAST:g} times as fast. "
+        difference=f"Null: a clock. New people are {SLOW:g} or {FAST:g} times as fast (quick: {FAST:g}). "
         + undecided(good, count, MOST, quick=job.quick),
         values={"share": good / count, "elsewhere": float(false)},
     )  # fmt: skip

@@ -70,7 +70,7 @@ def _learned(key: Key, seed: int, sets: int, world: str, each: int) -> tuple[Doc
 
 
 def skills_of(job: RowRun, world: str, each: int = 2, first: int = SEED) -> tuple[Document, ...]:
-    """A skill from each set of demonstrations, `each` of two; those of seed `first` and on."""
+    """A skill from each set of demonstrations: `each` of two, with a seed from `first` on."""
     key = tuple(sorted(job.settings.items()))
     return _learned(key, first + job.seed, job.count(SETS, QUICK_SETS), world, each)
 

@@ -99,7 +99,7 @@ def _computed(settings: tuple[tuple[str, float], ...], seed: int, quick: bool) -
     stuck = {n: [r for r in rows[n, POSTURES[0]] if r.joint_friction > 0.0] for n in names}
     heights = {(n, HEIGHTS_M[1]): stuck[n] for n in names}
     parts = {(n, own): [r for r in stuck[n] if abs(r.tilt_deg) in PARTS_DEG] for n in names}
-    others = PARTS[:1] if quick else PARTS
+    others = () if quick else PARTS
     parts |= {(n, f): run(n, both(PARTS_DEG), [stiff], parts=f) for f in others for n in names}
     beyond: dict[str, list[Row]] = {}
     bottom: dict[str, list[Row]] = {}
