@@ -7,7 +7,7 @@ counted; the count is part of the result and of the file's metadata.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import overload
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from skillframe.demonstration.convention import STANDARD
 from skillframe.demonstration.places import KEY, as_plain
 from skillframe.demonstration.record import Demonstration
-from skillframe.errors import SkillframeError
+from skillframe.errors import InputError, SkillframeError
 from skillframe.execution.executor import Result, Setup, simulate
 from skillframe.execution.prepare import drive_maker
 from skillframe.execution.trace import Trace
@@ -105,6 +105,7 @@ def record(
     progress: Callable[[str], None] | None = None,
     watch: Watch | None = None,
     attempts: int = MOST_ATTEMPTS,
+    sensed: bool = True,
 ) -> Recording:
     """Demonstrate a scene `count` times. The starts of the scene's task are taken in turn.
 
@@ -121,10 +122,15 @@ def record(
         progress: told in words what happens.
         watch: told now and then how many seconds are simulated, and of how many at most.
         attempts: at a slot, at most.
+        sensed: False keeps, in place of the sensor's wrench, what the arm's own law exerts, reversed: all that an arm
+            without a wrench sensor knows. What accelerates the tool, and what rubs in the joints, is taken for contact.
 
     Raises:
+        InputError: not sensed, and not by teleoperation, where alone the law is the arm's and not the person's hand.
         SkillframeError: a slot still fails after all attempts; says with what.
     """
+    if not sensed and settings.kind != "teleoperation":
+        raise InputError("record: sensed", "a hand on the tool is no law of the arm's", "teach by teleoperation")
     longest = longest_s(scene) if duration_s is None else duration_s
     sensors = sensors or (ESTIMATED if settings.kind == "teleoperation" else SensorSettings())
 
@@ -132,6 +138,7 @@ def record(
         return _attempt(robot, scene, settings, slots, number, seed, draws or {}, rate_hz, longest, sensors, watch)
 
     def keep(trace: Trace, slot: int, number: int) -> Demonstration:
+        trace = trace if sensed else replace(trace, wrench=-trace.command_wrench)
         return demonstration_from(
             trace, scene, settings, sensors, places=places_in_base(robot, scene), seed=seed, slot=slot, attempt=number
         )  # fmt: skip

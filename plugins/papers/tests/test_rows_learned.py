@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from skillframe_papers.rows import alone, concatenated, coordinates, region
+from skillframe_papers.rows import alone, concatenated, coordinates, region, sensorless
 from skillframe_papers.rows.blocks import Trials, successes
 from skillframe_papers.rows.skills import Ran, by_hand, stiff
 
@@ -132,3 +132,22 @@ def test_all_is_turned_by_40_to_80_degrees():
         x, y, z, w = coordinates.turned(seed).spec.workspace.attitude
         angle = 2.0 * np.degrees(np.arctan2(np.linalg.norm([x, y, z]), abs(w)))
         assert coordinates.LEAST_DEG <= angle <= coordinates.MOST_DEG
+
+
+@pytest.mark.parametrize(
+    ("ours", "none", "motion", "expected"),
+    [(24, 0, 0, "pass"), (24, 24, 0, "fail"), (24, 0, 24, "fail"), (12, 0, 0, "fail"), (21, 0, 0, "reported")],
+)
+def test_a_commanded_wrench_must_do_where_none_and_on_the_hump_the_mean_motion_do_not(ours, none, motion, expected):
+    ways = {sensorless.OURS: ran(ours), sensorless.NONE: ran(none), sensorless.SENSED: ran(24)}
+    valley, hump = ({**ways, sensorless.MOTION: ran(n)} for n in (24, motion))
+    assert sensorless._told(JOB, dict(zip(sensorless.TASKS, (valley, hump), strict=True))).verdict == expected
+
+
+def test_a_push_put_in_another_s_place_is_stiff_along_itself_and_free_square_to_it():
+    push = np.array([0.6, 0.0, -0.8])
+    part = sensorless.along(by_hand(), push)["phases"][0]["translation"]
+    stiffness, (axis,) = np.array(part["stiffness"]), np.array(part["compliant_axes"])
+    np.testing.assert_allclose(stiffness @ push, 1000.0 * push)
+    np.testing.assert_allclose(stiffness @ axis, 0.0, atol=1e-9)
+    assert axis @ push == pytest.approx(0.0) and part["desired_direction"] == push.tolist()

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from skillframe.errors import SkillframeError, UnknownName
+from skillframe.errors import InputError, SkillframeError, UnknownName
 from skillframe.frames import Pose, cross, matrix_from_quaternion, norm, rotation_matrix, rotation_vector
 from skillframe.skill import Observation
 from skillframe.teaching.sessions import _held, record
@@ -221,3 +221,21 @@ def test_a_firm_hand_turns_harder_and_pushes_and_slides_as_before():
         hard = firm(hand)
         assert (hard.turn_stiffness, hard.turn_damping) == (4.0 * hand.turn_stiffness, 4.0 * hand.turn_damping)
         assert (hard.torque_max, hard.stiffness, hard.speed) == (2.0 * hand.torque_max, hand.stiffness, hand.speed)
+
+
+def test_without_a_sensor_the_wrench_is_what_the_arm_s_own_law_exerts_reversed():
+    """A ball slid slowly: what the law exerts is what the slope answers, to what accelerates the tool."""
+    person = TeacherSettings(kind="teleoperation", aim_noise=0.0, tremor_force=0.0, tremor_torque=0.0)
+    felt, commanded = (
+        record(robot("free_tool"), scene("valley"), person, count=1, seed=1, sensors=SILENT, sensed=sensed)[0]
+        for sensed in (True, False)
+    )
+    np.testing.assert_array_equal(commanded.position, felt.position)
+    late = felt.time > 1.0
+    assert norm(felt.wrench[late, :3]).mean() > 3.0
+    assert norm((commanded.wrench - felt.wrench)[late, :3]).mean() < 1.0
+
+
+def test_a_hand_on_the_tool_is_no_wrench_that_an_arm_commands():
+    with pytest.raises(InputError, match="teleoperation"):
+        record(robot("free_tool"), scene("valley"), TeacherSettings(), count=1, seed=1, sensed=False)
