@@ -139,7 +139,7 @@ def _more_from_force() -> Iterable[RowType]:
         published="wrench estimated from what the controller commands", source=TWO_ARMS,
         bar="taught by teleoperation, valley with 0.5 Nm of friction in a Panda's joints, and hump: reached in 90 % of "
         "the runs each (by count), by 95 % intervals more often than without a wrench, and on the hump than along the "
-        "mean motion",
+        "mean motion (quick: the hump alone)",
         settings={"teacher.delay_s": 0.02, "robot.joint_friction": 0.5},
         run=Lazy("skillframe_papers.rows.sensorless:commanded"),
     )  # fmt: skip

@@ -61,6 +61,8 @@ TASKS = {
     "hump, free tool": Task("hump", 0.1, "free_tool", False, (-0.025, -0.01, 0.0, 0.018), True),
 }
 
+QUICK_TASKS = ("hump, free tool",)
+
 
 def _taught(given: Sequence[Demonstration]) -> Document | None:
     """What is learned, or None where the learner refuses."""
@@ -128,7 +130,7 @@ def _executed(job: RowRun, name: str) -> dict[str, Ran]:
 
 def commanded(job: RowRun) -> RowResult:
     """Row 40: skills learned from the wrench that the arm's own law commands, run where they were taught."""
-    return _told(job, {name: _executed(job, name) for name in TASKS})
+    return _told(job, {name: _executed(job, name) for name in (QUICK_TASKS if job.quick else TASKS)})
 
 
 def _told(job: RowRun, found: Mapping[str, Mapping[str, Ran]]) -> RowResult:
