@@ -71,12 +71,25 @@ def lateness(demonstration: Demonstration, live: NDArray[np.bool_] | None = None
     clock_is_sound = LOWEST <= d.rate <= HIGHEST and d.duration * d.rate < MOST_GAPS * len(d)
     if not clock_is_sound or d.duration < LEAST_TIME or d.meta.get("contact") is False:
         return None
+    share = lateness_shares(d, live)
+    return _peak(share) if len(share) else None
+
+
+def lateness_shares(demonstration: Demonstration, live: NDArray[np.bool_] | None = None) -> Float:
+    """The share s(d) (71,) of the force's changes that the motion explains, for shifts d from -0.7 to 0.7 s.
+
+    Empty where nothing moves or no force changes.
+
+    Args:
+        demonstration: as read, 4 s or longer.
+        live: (T,) where its sensor is alive; looked for if not given.
+    """
+    d = demonstration
     time = np.arange(d.time[0], d.time[-1], 1.0 / RATE)
     motion, force = _motion(d, time), _force(d, time, alive(d) if live is None else live)
     if motion.shape[1] == 0 or not np.any(force):
-        return None
-    share = _shares(motion, force)
-    return _peak(share)
+        return np.zeros(0)
+    return _shares(motion, force)
 
 
 def _motion(d: Demonstration, time: Float) -> Float:
