@@ -155,7 +155,7 @@ class PackedRows(Mapping[Key, Row]):
         self._packed[row[TRIAL], label] = layout, kept, layout.bits(row)
 
     def ran_on(self, key: Key) -> int | None:
-        """Number of the environment in which a row ran; None if it is not known."""
+        """Number of the environment in which a row ran, None if it is not known."""
         return self._packed[key][0].ran_on
 
     def __getitem__(self, key: Key) -> Row:
