@@ -24,7 +24,7 @@ LAYOUT, BITS, REST = "layout", "bits", "rest"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Layout:
+class RowLayout:
     """What rows have in common.
 
     Attributes:
@@ -51,7 +51,7 @@ class Layout:
         object.__setattr__(self, "_blank", blank)
 
     @classmethod
-    def of(cls, row: Row, ran_on: int | None) -> Layout:
+    def of(cls, row: Row, ran_on: int | None) -> RowLayout:
         """The layout of a row."""
         columns = tuple(name for name in row if name != TRIAL)
         floats = tuple(name for name in columns if isinstance(row[name], float))
@@ -64,7 +64,7 @@ class Layout:
         return said if self.ran_on is None else {**said, "ran_on": self.ran_on}
 
     @classmethod
-    def from_record(cls, record: Mapping[str, Any]) -> Layout:
+    def from_record(cls, record: Mapping[str, Any]) -> RowLayout:
         """The inverse of `record`.
 
         Raises:
@@ -106,13 +106,13 @@ class Layout:
         return row
 
 
-def line_of(number: int, layout: Layout, row: Row) -> dict[str, Any]:
+def line_of(number: int, layout: RowLayout, row: Row) -> dict[str, Any]:
     """A row as JSON values: its trial, the number of its layout, and what is its own."""
     bits = b64encode(layout.bits(row)).decode().rstrip("=")
     return {TRIAL: row[TRIAL], LAYOUT: number, BITS: bits, REST: layout.others(row)}
 
 
-def row_of(record: Mapping[str, Any], layouts: Mapping[int, Layout]) -> tuple[Row, int | None]:
+def row_of(record: Mapping[str, Any], layouts: Mapping[int, RowLayout]) -> tuple[Row, int | None]:
     """The inverse of `line_of`, and where the row ran.
 
     Raises:
@@ -135,15 +135,15 @@ class PackedRows(Mapping[Key, Row]):
     """Rows by trial and skill, each made from its bits when it is asked for: some 400 bytes a row instead of 2000."""
 
     def __init__(self) -> None:
-        self._packed: dict[Key, tuple[Layout, tuple[Any, ...], bytes]] = {}
-        self._layouts: dict[tuple[Any, ...], Layout] = {}
+        self._packed: dict[Key, tuple[RowLayout, tuple[Any, ...], bytes]] = {}
+        self._layouts: dict[tuple[Any, ...], RowLayout] = {}
         self._others: dict[str, tuple[Any, ...]] = {}
         self._labels: dict[str, str] = {}
 
-    def layout(self, row: Row, ran_on: int | None) -> Layout:
+    def layout(self, row: Row, ran_on: int | None) -> RowLayout:
         """The layout of a row, the same object for all rows that have it in common."""
         kind = (ran_on, row.get(SKILL), row.get(SEED), *row, *map(type, row.values()))
-        return self._layouts.get(kind) or self._layouts.setdefault(kind, Layout.of(row, ran_on))
+        return self._layouts.get(kind) or self._layouts.setdefault(kind, RowLayout.of(row, ran_on))
 
     def add(self, row: Row, ran_on: int | None) -> None:
         """Take a row that ran on an environment of that number."""
@@ -155,7 +155,7 @@ class PackedRows(Mapping[Key, Row]):
         self._packed[row[TRIAL], label] = layout, kept, layout.bits(row)
 
     def ran_on(self, key: Key) -> int | None:
-        """Number of the environment in which a row ran, None if it is not known."""
+        """Number of the environment in which a row ran, or None if it is not known."""
         return self._packed[key][0].ran_on
 
     def __getitem__(self, key: Key) -> Row:

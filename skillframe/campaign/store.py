@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from skillframe.campaign.packed import LAYOUT, Key, Layout, PackedRows, RowView, line_of, row_of
+from skillframe.campaign.packed import LAYOUT, Key, PackedRows, RowLayout, RowView, line_of, row_of
 from skillframe.campaign.rows import LEFT_OUT, Row, absent, cell, columns, decode, encode
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.verify import FIX, KEYS, KINDS, Line, check_rows, check_shape
@@ -86,7 +86,7 @@ class RowLog:
         repair_tail(self._path)
         found = read_content(folder, campaign, spec)
         self.done, self.sessions, self.unchecked = found.done, list(found.sessions), found.unchecked
-        self._version, self._next, self._stated = found.version, found.layouts, dict[Layout, int]()
+        self._version, self._next, self._stated = found.version, found.layouts, dict[RowLayout, int]()
         self.environments = found.environments
         self._descriptor = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | BINARY, 0o666)
         if os.fstat(self._descriptor).st_size == 0:
@@ -205,7 +205,7 @@ class _Reader:
         self._path, self._campaign, self._spec = path, campaign, spec
         self._done, self._numbers = PackedRows(), list[int]()
         self._sessions: list[dict[str, Any]] = []
-        self._layouts: dict[int, Layout] = {}
+        self._layouts: dict[int, RowLayout] = {}
         self._early: list[tuple[int, Row]] = []
         self._block: list[Line] = []
 
@@ -248,7 +248,7 @@ class _Reader:
         if type(layout) is not int or layout < 0 or layout in self._layouts:
             raise InputError(where, f"states layout {layout!r}, which is no number or stated before", FIX)
         try:
-            self._layouts[record[LAYOUT]] = Layout.from_record(record)
+            self._layouts[record[LAYOUT]] = RowLayout.from_record(record)
         except ValueError as error:
             raise InputError(where, str(error), FIX) from None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
@@ -50,29 +51,39 @@ def _of(rows: Sequence[Row], label: str, complete: bool) -> Sequence[Row]:
 
 
 def _rate(counted: Sequence[Row], rows: Sequence[Row], label: str, validity: Validity) -> dict[str, Any]:
-    n, s = len(counted), sum(row["success"] for row in counted)
+    n, s, unended = len(counted), 0, 0
+    failures, ended, largest = Counter[str](), Counter[str](), dict[str, float | None].fromkeys(PEAKS)
+    for row in counted:  # once, for each is made anew
+        s += row["success"]
+        unended += row["success"] and row.get("ended_itself") is False
+        if not row["success"]:
+            failures[row["failure"]] += 1
+        if "ended_by" in row:  # rows of 0.1 do not say
+            ended[row["ended_by"]] += 1
+        for name in PEAKS:
+            largest[name] = _larger(largest[name], row.get(name))
     interval = validity.interval(s, n)
-    failures = [row["failure"] for row in counted if not row["success"]]
-    ended = [row["ended_by"] for row in counted if "ended_by" in row]  # rows of 0.1 do not say
     return {
         "skill": label,
         "trials": n,
         "successes": s,
-        "unended": sum(row["success"] and row.get("ended_itself") is False for row in counted),
+        "unended": unended,
         "rate": s / n if n else None,
         "interval_95": None if interval is None else list(interval),
         "method": validity.interval_method,
-        "failures": {text: failures.count(text) for text in sorted(set(failures))},
-        "ended_by": {code: ended.count(code) for code in sorted(set(ended))},
-        "largest": {name: _largest([row.get(name) for row in counted]) for name in PEAKS},
+        "failures": dict(sorted(failures.items())),
+        "ended_by": dict(sorted(ended.items())),
+        "largest": largest,
         "uncounted": sum(row["skill"] == label for row in rows) - n,
         **({LEFT_OUT: counted[0][LEFT_OUT]} if counted and LEFT_OUT in counted[0] else {}),
     }
 
 
-def _largest(values: Sequence[Any]) -> float | None:
-    """The largest finite number, or None."""
-    return max((v for v in values if isinstance(v, float) and math.isfinite(v)), default=None)
+def _larger(found: float | None, value: Any) -> float | None:
+    """The larger of what was found and a finite number."""
+    if not isinstance(value, float) or not math.isfinite(value):
+        return found
+    return value if found is None or value > found else found
 
 
 def scores(spec: CampaignSpec, rows: Sequence[Row], complete: bool) -> dict[str, dict[str, Any]]:

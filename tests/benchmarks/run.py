@@ -24,7 +24,7 @@ sys.path.insert(0, str(ROOT))
 
 from skillframe.campaign.runner import CHUNK  # noqa: E402
 from skillframe.world.sensors import SensorSettings  # noqa: E402
-from tests.benchmarks import crane, interfaces, segmenter  # noqa: E402
+from tests.benchmarks import crane, engine, interfaces, segmenter  # noqa: E402
 from tests.benchmarks.timing import Recorded, one_trial_loop, replay, timed_run  # noqa: E402
 from tests.laws.pushing import Push, impedance  # noqa: E402
 from tests.laws.runs import setup  # noqa: E402
@@ -239,6 +239,7 @@ def main():
     interfaces.real_time(show)
     crane.rows(show)
     segmenter.measure(show)
+    engine.rows(show)
     memory()
 
 
