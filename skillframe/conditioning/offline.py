@@ -18,7 +18,7 @@ from skillframe.demonstration.faults.find import alive, faults, with_named
 from skillframe.demonstration.record import Demonstration
 from skillframe.demonstration.stalls import Stall, kept_stalls, stalls
 from skillframe.errors import InputError
-from skillframe.frames import Float, norm, rotate_spatial
+from skillframe.frames import Float, matrix_from_quaternion, norm, rotate_spatial
 from skillframe.signals.kalman import WrenchFilter, WrenchModel
 
 METHODS = ("smoother", "filter", "none")
@@ -180,14 +180,14 @@ def _typical_noise(demonstration: Demonstration, live: NDArray[np.bool_]) -> flo
 
 def payload_of(demonstration: Demonstration, inside: Any) -> Payload:
     """Payload identified over chosen samples, in tool axes."""
-    rotation = demonstration.pose.rotation[inside]
+    rotation = matrix_from_quaternion(demonstration.quaternion[inside])
     back = np.swapaxes(rotation, -1, -2)
     return identify_payload(rotate_spatial(back, demonstration.wrench[inside]), gravity_in_tool(rotation))
 
 
 def _without_mass(demonstration: Demonstration, inside: Any, payload: Payload) -> Payload:
     """The bias alone: the weight was removed before."""
-    back = np.swapaxes(demonstration.pose.rotation[inside], -1, -2)
+    back = np.swapaxes(matrix_from_quaternion(demonstration.quaternion[inside]), -1, -2)
     reading: Float = rotate_spatial(back, demonstration.wrench[inside])
     bias = reading.mean(axis=0)
     left = np.sqrt(np.mean((reading - bias) ** 2, axis=0))
