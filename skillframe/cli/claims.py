@@ -88,11 +88,11 @@ def _refuse_real(source: Path) -> None:
 
 def start(
     source: Path, out: Path, rate: float | None = None, confidence: float | None = None, skill: str | None = None,
-    look: int | None = None,
+    look: int | None = None, most: int | None = None,
 ) -> None:  # fmt: skip
-    """Begin a folder from a campaign file."""
+    """Begin a folder from a campaign file; `most` ranges are allowed, of None as many as a box may have."""
     from skillframe.campaign import evaluate
-    from skillframe.campaign.claims.question import USUAL, begin
+    from skillframe.campaign.claims.question import MOST_MAPPED, USUAL, begin
     from skillframe.campaign.spec import CampaignSpec
     from skillframe.extend.registry import registry
 
@@ -100,7 +100,7 @@ def start(
     begin(
         spec, out, evaluate.describe, registry().world(spec.world_place).params,
         rate=USUAL if rate is None else rate, confidence=USUAL if confidence is None else confidence, skill=skill,
-        look=look,
+        look=look, most=most or MOST_MAPPED,
     )  # fmt: skip
 
 
@@ -144,11 +144,12 @@ def _judged(folder: Path, engine: Engine, again: bool) -> Outcome | None:
     """Run what is missing, and judge. None if no box was worth claiming."""
     from skillframe.campaign.claims import procedure
     from skillframe.campaign.claims.certificate import outcome
-    from skillframe.campaign.claims.question import LOOK, read_question
+    from skillframe.campaign.claims.question import LOOK, mapped_question
     from skillframe.campaign.claims.rounds import is_complete, looked
     from skillframe.cli.campaign_words import progress
     from skillframe.errors import InputError
 
+    question = mapped_question(folder)
     places = procedure.claims(folder)
     if not places and not is_complete(folder / LOOK, engine.params):
         note("looking where it works; these trials carry no claim")
@@ -157,7 +158,6 @@ def _judged(folder: Path, engine: Engine, again: bool) -> Outcome | None:
     if not places or again:
         if again and (not places or outcome(folder, engine.params).best is not None):
             raise InputError("--again", "no claim of this folder has failed", "leave it out")
-        question = read_question(folder)
         box = procedure.propose(question, looked(folder, engine.params))
         if box is None:
             return None

@@ -58,7 +58,7 @@ def break_(source: Path, out: Path | None, skill: str | None, workers: int | Non
     """Find a small disturbance that breaks a skill, and try it again with fresh noise.
 
     A disturbance is a point of the ranges under [vary]. Its size is its distance from the nominal point, each quantity
-    counted in half widths of its range. SOURCE is as for campaign map.
+    counted in half widths of its range. SOURCE is as for campaign map, and may have up to six ranges.
 
     Exit code 0 if a disturbance was found and confirmed, 1 if none was.
 
@@ -93,11 +93,15 @@ def _answer(
     tell: Callable[[Path, dict[str, Any]], int],
 ) -> int:  # fmt: skip
     """Look, search, tell."""
+    from skillframe.campaign.claims.question import LOOKS, mapped_question
+
     folder = source if out is None else out
     with terminable() as code:
         try:
             if out is not None:
-                start(source, out, skill=skill)
+                start(source, out, skill=skill, most=max(LOOKS) if verb == "break" else None)
+            elif verb != "break":
+                mapped_question(folder)
             with engine_of(folder, workers) as engine:
                 _look(folder, engine)
                 found = search(folder, engine, note)

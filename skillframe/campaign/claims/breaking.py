@@ -2,7 +2,8 @@ r"""The smallest disturbance that breaks a skill: rays from where it works, then
 
 A disturbance is a point of the declared ranges; its size is its distance from the nominal point, each quantity counted
 in half widths of its range. Sobol directions are tried just inside the best radius found so far, where most rays work
-and cost one trial; those that fail are bisected, all side by side. Then the three best rays, thirty degrees apart, are
+and cost one trial; those that fail are bisected, all side by side. Where none fails, more are tried, up to half of all
+trials: what fails in few directions only is met by chance. Then the three best rays, thirty degrees apart, are
 bent at random and shortened, a batch at a time: a step grows after a hit, shrinks after a miss and begins again once it
 is small (an evolution strategy with one parent a ray). Batches instead of single trials are our choice: a batch of 24
 takes hardly longer than one trial.
@@ -23,7 +24,7 @@ from skillframe.campaign.claims.border import ToTry
 from skillframe.campaign.claims.engine import Looked, Say
 from skillframe.frames import Float
 
-BUDGET = {1: 96, 2: 256, 3: 384, 4: 600}
+BUDGET = {1: 96, 2: 256, 3: 384, 4: 600, 5: 960, 6: 960}
 """Trials after which a search ends, by the number of quantities; ours, from runs on synthetic truths."""
 AGAIN, MOST_AGAIN = 8, 3
 """Fresh trials at a point that is to be confirmed, and how many points are tried, the smallest first."""
@@ -74,7 +75,9 @@ def directions(dimension: int, count: int) -> Float:
     from scipy.special import ndtri
     from scipy.stats import qmc
 
-    points = qmc.Sobol(dimension, scramble=True, rng=np.random.default_rng(1)).random(count)
+    points = qmc.Sobol(dimension, scramble=True, rng=np.random.default_rng(1)).random_base2((count - 1).bit_length())[
+        :count
+    ]
     normal = ndtri(np.clip(points, 1e-9, 1.0 - 1e-9))
     result: Float = normal / np.sqrt(np.sum(normal**2, axis=1, keepdims=True))
     return result
@@ -96,7 +99,7 @@ def search(
     if undisturbed > AGAIN // 2:
         return BreakingPoints(spent, undisturbed, origin[None, :])
     rays = known_rays(seen, origin)
-    spent += yield from _rays(rays, origin, say)
+    spent += yield from _rays(rays, origin, budget // 2, say)
     number = 0
     while rays and spent + PARENTS * CHILDREN <= budget:
         number += 1
@@ -118,13 +121,15 @@ def known_rays(seen: Looked, origin: Float) -> list[Ray]:
     return rays
 
 
-def _rays(rays: list[Ray], origin: Float, say: Say) -> Generator[ToTry, Looked, int]:
-    """Find rays that fail, and how near, side by side. Returns the trials it took."""
-    best = min((ray.radius for ray in rays), default=np.inf)
-    new = [Ray(way, min(reach(origin, way), INSIDE * best)) for way in directions(len(origin), _count(len(origin)))]
-    fails = yield from _tried(origin, [(ray.direction, ray.radius) for ray in new])
-    rays += [ray for ray, failed in zip(new, fails, strict=True) if failed]
-    spent = len(new)
+def _rays(rays: list[Ray], origin: Float, most: int, say: Say) -> Generator[ToTry, Looked, int]:
+    """Find rays that fail, and how near, side by side; `most` directions while none does. Returns the trials it took."""
+    best, count = min((ray.radius for ray in rays), default=np.inf), _count(len(origin))
+    ways, spent = directions(len(origin), max(most, count)), 0
+    while not spent or (not rays and spent + count <= most):
+        new = [Ray(way, min(reach(origin, way), INSIDE * best)) for way in ways[spent : spent + count]]
+        fails = yield from _tried(origin, [(ray.direction, ray.radius) for ray in new])
+        rays += [ray for ray, failed in zip(new, fails, strict=True) if failed]
+        spent += len(new)
     while live := _live(rays):
         middles = [0.5 * (ray.works + ray.radius) for ray in live]
         fails = yield from _tried(origin, [(ray.direction, at) for ray, at in zip(live, middles, strict=True)])

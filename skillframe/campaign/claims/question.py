@@ -22,8 +22,11 @@ from skillframe.frames import Float
 
 QUESTION, LOOK = "question.json", "look"
 FORMAT, VERSION = "skillframe.question", 1
-LOOKS = {1: 64, 2: 128, 3: 256, 4: 512}
-"""Trials that are looked at, by the number of ranges: our choice, from the volumes that they certify in simulations."""
+LOOKS = {1: 64, 2: 128, 3: 256, 4: 512, 5: 64, 6: 64}
+"""Trials that are looked at, by the number of ranges: our choice, from the volumes that they certify in simulations. With
+more than `MOST_MAPPED` only a breaking point is looked for, whose own rays tell more than even trials do."""
+MOST_MAPPED = 4
+"""Ranges of a border, a box or a rank; a breaking point may have as many as `LOOKS` names."""
 USUAL = 0.95
 """Rate and confidence where none is asked for."""
 NORMAL = 2.0
@@ -67,7 +70,7 @@ class Question:
 
 def begin(
     spec: CampaignSpec, out: Path, describe: Describe, params: type, *, rate: float, confidence: float,
-    skill: str | None = None, look: int | None = None,
+    skill: str | None = None, look: int | None = None, most: int = MOST_MAPPED,
 ) -> Question:  # fmt: skip
     """Write the question into a new folder and prepare the trials to look at.
 
@@ -80,13 +83,14 @@ def begin(
         confidence: of the claim.
         skill: its label or the label's beginning; None for the first.
         look: trials to look at; None for `LOOKS`.
+        most: ranges that may be declared.
 
     Raises:
         InputError: axes that are no ranges, too many ranges, or a folder that holds something.
         UnknownName: no such skill.
     """
     _check(rate, confidence)
-    ranges = _ranges(spec)
+    ranges = _ranges(spec, most)
     label = pick_label(spec.labels, skill)
     question = Question(rate=rate, confidence=confidence, ranges=ranges)
     one = replace(
@@ -122,7 +126,7 @@ def _check(rate: float, confidence: float) -> None:
             raise InputError(name, f"is {value:g}", "give a number from 0.5 up to, and not, 1")
 
 
-def _ranges(spec: CampaignSpec) -> dict[str, tuple[float, float]]:
+def _ranges(spec: CampaignSpec, most: int) -> dict[str, tuple[float, float]]:
     ranges: dict[str, tuple[float, float]] = {}
     for name, axis in sorted(spec.vary.items()):
         if axis.kind in ("uniform", "sobol"):
@@ -135,14 +139,33 @@ def _ranges(spec: CampaignSpec) -> dict[str, tuple[float, float]]:
                 f"vary.{name}", f"is a {axis.kind} axis, from which no fresh trial can be drawn",
                 "make it uniform, normal or choice",
             )  # fmt: skip
-    if not 1 <= len(ranges) <= max(LOOKS):
-        raise InputError(
-            "vary", f"declares {len(ranges)} ranges", f"a box has 1 to {max(LOOKS)}: put the others under [set]"
-        )
+    if not 1 <= len(ranges) <= most:
+        raise InputError("vary", f"declares {len(ranges)} ranges", few_ranges(most))
     degenerate = next((name for name, (low, high) in ranges.items() if not low < high), None)
     if degenerate is not None:
         raise InputError(f"vary.{degenerate}", "has no width", "give a standard deviation above 0, or fix it in [set]")
     return ranges
+
+
+def few_ranges(most: int) -> str:
+    """How many ranges may be declared for what."""
+    if most > MOST_MAPPED:
+        return f"a breaking point has 1 to {most}: put the others under [set]"
+    return f"a border, a box and a rank have 1 to {most}: put the others under [set] (campaign break has 1 to {max(LOOKS)})"
+
+
+def mapped_question(folder: Path) -> Question:
+    """The question of a folder of which a border, a box or a rank is asked.
+
+    Raises:
+        InputError: not such a folder, damaged, or of more ranges than `MOST_MAPPED`.
+    """
+    question = read_question(folder)
+    if len(question.ranges) > MOST_MAPPED:
+        raise InputError(
+            folder, f"was begun by campaign break with {len(question.ranges)} ranges", few_ranges(MOST_MAPPED)
+        )
+    return question
 
 
 def read_question(folder: Path) -> Question:

@@ -21,7 +21,7 @@ from skillframe.campaign.claims import border, breaking, matter
 from skillframe.campaign.claims.border import Border, ToTry
 from skillframe.campaign.claims.engine import Engine, Looked, Say
 from skillframe.campaign.claims.plan import METHOD, PLAN, RoundPlan
-from skillframe.campaign.claims.question import LOOK, Question, read_question
+from skillframe.campaign.claims.question import LOOK, MOST_MAPPED, Question, mapped_question, read_question
 from skillframe.campaign.claims.rounds import BORDER, carry_out, ended, looked, next_sobol, rows_hash, scene_of, seed_of
 from skillframe.campaign.folder import load
 from skillframe.errors import InputError
@@ -63,7 +63,7 @@ def map_border(folder: Path, engine: Engine, say: Say = print) -> dict[str, Any]
 
 
 def _border(folder: Path, params: type | None, say: Say) -> Generator[ToTry, Looked, Border]:
-    question = read_question(folder)
+    question = mapped_question(folder)
     seen = looked(folder, params, rounds=0)
     budget = max(border.BUDGET[len(question.ranges)], 2 * len(seen.works))
     return border.search(seen, len(seen.works), next_sobol(folder, question, params), budget, say)
@@ -114,7 +114,7 @@ def _confirming(points: Float) -> Generator[ToTry, Looked, tuple[int | None, lis
 
 def rank(folder: Path, engine: Engine, say: Say = print) -> dict[str, Any]:
     """Rank the quantities and test the first two. Returns the content of matter.json."""
-    question = read_question(folder)
+    question = mapped_question(folder)
     held = carry_out(folder, MATTER, _matter(folder, engine.params, say), engine, say)
     where, seen = nominal(folder, question), looked(folder, engine.params, rounds=0)
     return _written(folder, MATTER, {
@@ -132,7 +132,7 @@ def _ranks(folder: Path, params: type | None) -> dict[str, float]:
 
 
 def _matter(folder: Path, params: type | None, say: Say) -> Generator[ToTry, Looked, tuple[matter.Frozen, ...]]:
-    question = read_question(folder)
+    question = mapped_question(folder)
     at = question.scaled(nominal(folder, question))[0]
     seed = seed_of(load(folder / LOOK, params).seed, MATTER, 0)
     return matter.search(_ranks(folder, params), list(question.ranges), at, seed, say)
@@ -162,7 +162,9 @@ def check_plan(folder: Path, params: type | None = None) -> list[str]:
     def quiet(text: str) -> None:
         """Nothing runs, so there is nothing to tell."""
 
-    searches: dict[str, Any] = {BORDER: _border(folder, params, quiet)}
+    searches: dict[str, Any] = {}
+    if len(question.ranges) <= MOST_MAPPED:
+        searches[BORDER] = _border(folder, params, quiet)
     if plan.of(BREAK):
         searches[BREAK] = _breaking(folder, params, quiet)
     if plan.of(MATTER):
