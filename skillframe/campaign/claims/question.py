@@ -23,8 +23,8 @@ from skillframe.frames import Float
 QUESTION, LOOK = "question.json", "look"
 FORMAT, VERSION = "skillframe.question", 1
 LOOKS = {1: 64, 2: 128, 3: 256, 4: 512, 5: 64, 6: 64}
-"""Trials that are looked at, by the number of ranges: our choice, from the volumes that they certify in simulations. With
-more than `MOST_MAPPED` only a breaking point is looked for, whose own rays tell more than even trials do."""
+"""Trials that are looked at, by the number of ranges: our choice, from the volumes that they certify in simulations.
+With more than `MOST_MAPPED` only a breaking point is looked for, whose own rays tell more than even trials do."""
 MOST_MAPPED = 4
 """Ranges of a border, a box or a rank; a breaking point may have as many as `LOOKS` names."""
 USUAL = 0.95
@@ -151,7 +151,8 @@ def few_ranges(most: int) -> str:
     """How many ranges may be declared for what."""
     if most > MOST_MAPPED:
         return f"a breaking point has 1 to {most}: put the others under [set]"
-    return f"a border, a box and a rank have 1 to {most}: put the others under [set] (campaign break has 1 to {max(LOOKS)})"
+    others = f"put the others under [set] (campaign break has 1 to {max(LOOKS)})"
+    return f"a border, a box and a rank have 1 to {most}: {others}"
 
 
 def mapped_question(folder: Path) -> Question:

@@ -9,17 +9,19 @@ from pathlib import Path
 from test_certify import ENGINE, through
 
 from skillframe.campaign.claims import procedure
+from skillframe.campaign.claims.engine import Engine
 from skillframe.campaign.claims.searches import find_break, map_border, rank
+from skillframe.campaign.runner import Options
 
 STATED = ("rows.jsonl", "summary.json", "lock")
 """Files that tell of times and processes."""
 
 
-def everything(out: Path) -> None:
-    map_border(out, ENGINE, lambda text: None)
-    find_break(out, ENGINE, lambda text: None)
-    rank(out, ENGINE, lambda text: None)
-    through(out)
+def everything(out: Path, engine: Engine = ENGINE) -> None:
+    map_border(out, engine, lambda text: None)
+    find_break(out, engine, lambda text: None)
+    rank(out, engine, lambda text: None)
+    through(out, engine)
 
 
 def content(folder: Path):
@@ -48,11 +50,13 @@ def die_writing(number: int) -> None:
     os.fsync = fsync
 
 
-if __name__ == "__main__":  # search_fakes.py FOLDER SECONDS [WRITES]: killed after so long, or in its n-th write
+if __name__ == "__main__":  # FOLDER SECONDS [WRITES [WORKERS]]: killed after so long, or in its n-th write (0: in none)
     timer = threading.Timer(min(float(sys.argv[2]), threading.TIMEOUT_MAX), die)
     timer.daemon = True
     timer.start()
     if len(sys.argv) > 3:
         die_writing(int(sys.argv[3]))
+    if len(sys.argv) > 4:
+        ENGINE = ENGINE._replace(options=Options(traces=0, workers=int(sys.argv[4])))
     procedure.look(Path(sys.argv[1]), ENGINE)
-    everything(Path(sys.argv[1]))
+    everything(Path(sys.argv[1]), ENGINE)

@@ -282,6 +282,22 @@ def test_a_folder_whose_process_was_killed_while_it_wrote_ends_as_one_that_was_n
     assert content(tmp_path / "killed" / "out") == content(tmp_path / "whole" / "out")
 
 
+@pytest.mark.slow
+def test_a_folder_ends_alike_on_two_threads_of_blas_and_after_a_kill_with_other_workers(tmp_path, monkeypatch):
+    """Whole on one thread of BLAS without workers; killed in its 12th write with two workers, then on two threads."""
+    text = TEXT.replace("{ normal = [0.0, 0.01] }", "{ choice = [0.0, 0.002] }")
+    for name in ("whole", "other"):
+        spec = written(tmp_path / name / "in", text)
+        begin(spec, tmp_path / name / "out", ENGINE.describe, ValleyParams, rate=0.95, confidence=0.95)
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")
+    assert killed(tmp_path / "whole" / "out", np.inf) == 0
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
+    assert killed(tmp_path / "other" / "out", np.inf, 12, 2) == -9
+    assert killed(tmp_path / "other" / "out", np.inf) == 0
+    assert (tmp_path / "whole" / "out" / PLAN).read_bytes() == (tmp_path / "other" / "out" / PLAN).read_bytes()
+    assert content(tmp_path / "other" / "out") == content(tmp_path / "whole" / "out")
+
+
 @pytest.mark.figures
 def test_twenty_kills_at_random_moments_leave_the_folder_as_it_would_be(tmp_path):
     """Ten in a random write, ten at a random time: seed 2026_11_23."""
