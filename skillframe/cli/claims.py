@@ -90,7 +90,7 @@ def start(
     source: Path, out: Path, rate: float | None = None, confidence: float | None = None, skill: str | None = None,
     look: int | None = None, most: int | None = None,
 ) -> None:  # fmt: skip
-    """Begin a folder from a campaign file; `most` ranges are allowed, of None as many as a box may have."""
+    """Begin a folder from a campaign file of `most` ranges, or, of None, as many as a box may have."""
     from skillframe.campaign import evaluate
     from skillframe.campaign.claims.question import MOST_MAPPED, USUAL, begin
     from skillframe.campaign.spec import CampaignSpec

@@ -122,7 +122,7 @@ def known_rays(seen: Looked, origin: Float) -> list[Ray]:
 
 
 def _rays(rays: list[Ray], origin: Float, most: int, say: Say) -> Generator[ToTry, Looked, int]:
-    """Find rays that fail, and how near, side by side; `most` ways while none does. Returns the trials it took."""
+    """Find rays that fail, and how near, of `most` ways while none does. Returns the trials it took."""
     best, count = min((ray.radius for ray in rays), default=np.inf), _count(len(origin))
     ways, spent = directions(len(origin), max(most, count)), 0
     while not spent or (not rays and spent + count <= most):
