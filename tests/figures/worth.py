@@ -28,10 +28,10 @@ from skillframe.demonstration.record import Demonstration
 from skillframe.frames import Float
 from skillframe.world.scene import Scene
 from tests.figures import bayonets
-from tests.figures.worth_families import FAMILIES, FLOORS, KINDS, SHORT, demonstrations, drawn
+from tests.figures.worth_families import FAMILIES, FLOORS, KINDS, LONGER_S, SHORT, demonstrations, drawn
 from tests.figures.worth_methods import document_of, hand_written, lmc_row, played, pushes
 from tests.figures.worth_runs import EACH, executed, side_by_side, table
-from tests.figures.worth_skills import Row
+from tests.figures.worth_skills import LONGEST, Row
 
 PEOPLE = ("noise 8", "bias 10", "hesitating", "wrong first")
 PLAYED = ("replay", "mean path", "dmp", "gmr", "seds", "acp")
@@ -74,7 +74,7 @@ def run_set(family: str, seed: int, kinds: Sequence[str], learners: Sequence[str
     floors = FLOORS.get(family, SHORT)
     shown, failed = demonstrations(scene, turn, rng, kinds, EACH, floors)
     rows = tuning_rows(shown) if tune else rows_of_set(shown, turn, scene, learners)
-    done = executed(scene, rows, turn, rng, seed, floors=floors)
+    done = executed(scene, rows, turn, rng, seed, LONGER_S.get(family, LONGEST), floors)
     return {"family": family, "seed": seed, "failed": failed, "results": done}
 
 

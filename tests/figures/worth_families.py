@@ -65,6 +65,8 @@ by their limit of 80 N, 5 N and 4 mm 3 of 48."""
 FLOORS = {"hump_long": (0.070, 0.085, 0.100, 0.110)}
 """How far before the ramp people begin, in place of `SHORT`. The longer, the more the floor weighs in means."""
 SHORT = (0.012, 0.030, 0.040, 0.055)
+LONGER_S = {"hump_long": 14.0}
+"""How long a run may take [s] where 8 do not bear the way at the speed of one who hesitates, some 14 mm/s."""
 NUMBERS = {
     "corner": 0, "hump": 1, "hump_low": 2, "skew": 3, "slide": 4, "steps": 5, "valley": 6, "bayonet": 7, "hump_long": 8,
 }  # fmt: skip

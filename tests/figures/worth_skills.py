@@ -18,6 +18,7 @@ from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_
 STIFF_N_M, STIFF_NM_RAD = 1000.0, 20.0
 GRID = 0.005  # s between two samples of a played motion
 LONGEST = 8.0  # s that a run may take; the longest way is 95 mm at 20 mm/s
+SAMPLED_S = 14.0  # s of a played motion that are sampled: as long as the longest run
 SPIRAL_M, SPIRAL_SPEED = 0.003, 0.02  # what a turn of the spiral adds to its radius [m], and its speed along the way
 
 
@@ -161,7 +162,7 @@ def _played(row: Row, start: Observation) -> tuple[list[Command], Float]:
     skill, n = registry().skill(row.document["type"]).build(row.document), len(start.time)
     skill.start(start, [np.random.default_rng(i) for i in range(n)])
     commands, ends = list[Command](), np.full(n, np.inf)
-    for g in range(round(LONGEST / GRID)):
+    for g in range(round(SAMPLED_S / GRID)):
         seen = start._replace(time=np.full(n, g * GRID), dt=GRID)
         commands.append(skill.step(seen))
         ends = np.where((commands[-1].status != Status.RUNNING) & np.isinf(ends), g, ends)
