@@ -37,7 +37,7 @@ SIDEWAYS = 6e-3
 _ABOVE = 2e-3
 _FREE = 1e-5
 _MOST_LOADED = 8
-_LOADED: dict[tuple[tuple[str, str], ...], LoadedParts] = {}
+_LOADED: dict[tuple[str, ...], LoadedParts] = {}
 """The last parts by what their files hold, wherever these lie: a campaign's folder has copies of them."""
 _TRIES = (1.0, 0.75, 0.5, 0.25, 0.0)
 
@@ -111,13 +111,13 @@ def load(path: Path) -> LoadedParts:
         MissingDependency: the extra `parts` is not installed.
     """
     hashes = {name: _digest(file) for name, file in {path.name: path, **mesh_files(path)}.items()}
-    key = tuple(hashes.items())
+    key = tuple(hashes.values())  # the file's own text names its meshes
     if key not in _LOADED:
         found = _load(path, hashes)
         if len(_LOADED) >= _MOST_LOADED:
             del _LOADED[next(iter(_LOADED))]
         _LOADED[key] = found
-    return _LOADED[key]._replace(name=name_of(path))
+    return _LOADED[key]._replace(name=name_of(path), hashes=hashes)
 
 
 def _digest(path: Path) -> str:

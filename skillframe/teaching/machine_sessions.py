@@ -25,7 +25,15 @@ from skillframe.machine.law.hydraulic import plane_axes
 from skillframe.robot.chain import ClosedChain
 from skillframe.robot.model import RobotModel
 from skillframe.skill import Status
-from skillframe.teaching.sessions import Recording, Watch, collect, demonstration_from, progress_callback, start_columns
+from skillframe.teaching.sessions import (
+    Recording,
+    Try,
+    Watch,
+    collect,
+    demonstration_from,
+    progress_callback,
+    start_columns,
+)  # fmt: skip
 from skillframe.teaching.teleoperation import Operator, OperatorSettings, require_stable_loop
 from skillframe.world.placement import fixture_poses
 from skillframe.world.scene import Scene
@@ -57,9 +65,9 @@ def record_operated(
     require_stable_loop(settings)
     _require_direction(scene)
 
-    def attempt(slots: list[int], number: int) -> Result:
-        rngs = [np.random.default_rng([seed, slot, number]) for slot in slots]
-        columns = start_columns(scene, slots, draws or {})
+    def attempt(tries: Sequence[Try]) -> Result:
+        rngs = [np.random.default_rng([seed, slot, number]) for slot, number in tries]
+        columns = start_columns(scene, [slot for slot, _ in tries], draws or {})
         return operate(robot, scene, settings, columns, rngs, rate_hz=rate_hz, duration_s=duration_s, watch=watch)
 
     def keep(trace: Trace, slot: int, number: int) -> Demonstration:

@@ -6,6 +6,7 @@ counted; the count is part of the result and of the file's metadata.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -38,6 +39,8 @@ MOST_ATTEMPTS = 20
 MOST_AT_ONCE = 100
 """Demonstrations that are simulated side by side, so that memory does not grow with the traces of a thousand."""
 Done = Callable[[State], NDArray[np.bool_]]
+Try = tuple[int, int]
+"""A demonstration that is wanted, and the number of the attempt at it."""
 Watch = Callable[[float, float], None]
 """Told how many seconds are simulated, and of how many at most."""
 ESTIMATED = SensorSettings(force_noise=1.0, torque_noise=0.07)
@@ -134,8 +137,8 @@ def record(
     longest = longest_s(scene) if duration_s is None else duration_s
     sensors = sensors or (ESTIMATED if settings.kind == "teleoperation" else SensorSettings())
 
-    def attempt(slots: list[int], number: int) -> Result:
-        return _attempt(robot, scene, settings, slots, number, seed, draws or {}, rate_hz, longest, sensors, watch)
+    def attempt(tries: Sequence[Try]) -> Result:
+        return _attempt(robot, scene, settings, tries, seed, draws or {}, rate_hz, longest, sensors, watch)
 
     def keep(trace: Trace, slot: int, number: int) -> Demonstration:
         trace = trace if sensed else replace(trace, wrench=-trace.command_wrench)
@@ -155,18 +158,21 @@ def collect(
     robot: RobotModel,
     scene: Scene,
     count: int,
-    attempt: Callable[[list[int], int], Result],
+    attempt: Callable[[Sequence[Try]], Result],
     keep: Callable[[Trace, int, int], Demonstration],
     progress: Callable[[str], None] | None,
     attempts: int = MOST_ATTEMPTS,
 ) -> Recording:
     """Let a teacher attempt what is still missing until every slot has its demonstration.
 
+    What failed is attempted once more, then twice side by side, then four times, and so on. The first that succeeds is
+    kept, as if they had been made one after the other; what comes after it is not counted.
+
     Args:
         robot: for the messages.
         scene: for the messages.
         count: slots to be filled.
-        attempt: runs the slots, the so many-th time.
+        attempt: runs slots, each with the number of its attempt.
         keep: makes the demonstration of a slot from its trace and the number of the attempt.
         progress: told in words what happens.
         attempts: at a slot, at most.
@@ -178,16 +184,22 @@ def collect(
     rejected: list[str] = []
     if progress is not None:
         progress(beginning(robot, scene, count))
-    for number in range(attempts):
-        left = [slot for slot in range(count) if slot not in done]
-        for slots in (left[i : i + MOST_AT_ONCE] for i in range(0, len(left), MOST_AT_ONCE)):
-            result = attempt(slots, number)
+    number = 0
+    while number < attempts:
+        ahead = range(number, min(number + max(number, 1), attempts))
+        tries = deque((slot, each) for each in ahead for slot in range(count) if slot not in done)
+        while some := _still_due(tries, done):
+            result = attempt(some)
             assert result.traces is not None
-            for slot, good, failure, trace in zip(slots, result.success, result.failure, result.traces, strict=True):
+            ends = zip(some, result.success, result.failure, result.traces, strict=True)
+            for (slot, each), good, failure, trace in ends:
+                if slot in done:
+                    continue
                 if good:
-                    done[slot] = keep(trace, slot, number)
+                    done[slot] = keep(trace, slot, each)
                 else:
-                    rejected.append(f"demonstration {slot}, attempt {number}: {failure}")
+                    rejected.append(f"demonstration {slot}, attempt {each}: {failure}")
+        number = ahead.stop
         if progress is not None:
             progress(f"{len(done)} of {count} demonstrations recorded, {len(rejected)} rejected")
             if rejected and (note := guess_note(robot.spec)):
@@ -201,18 +213,28 @@ def collect(
     )
 
 
+def _still_due(tries: deque[Try], done: Mapping[int, Demonstration]) -> list[Try]:
+    """The next that are run side by side, taken off; what has succeeded meanwhile is not due any more."""
+    some: list[Try] = []
+    while tries and len(some) < MOST_AT_ONCE:
+        one = tries.popleft()
+        if one[0] not in done:
+            some.append(one)
+    return some
+
+
 def beginning(robot: RobotModel, scene: Scene, count: int) -> str:
     """Said once nothing speaks against the recording any more."""
     return f"{robot.spec.name} in {scene.name}: recording {count} demonstration{'s' * (count != 1)} ..."
 
 
 def _attempt(
-    robot: RobotModel, scene: Scene, settings: TeacherSettings, slots: list[int], attempt: int, seed: int,
+    robot: RobotModel, scene: Scene, settings: TeacherSettings, tries: Sequence[Try], seed: int,
     draws: Mapping[str, float], rate_hz: float, duration_s: float, sensors: SensorSettings | None,
     watch: Watch | None,
 ) -> Result:  # fmt: skip
-    columns = start_columns(scene, slots, draws)
-    teacher = teacher_for(scene, fixture_poses(robot, columns, len(slots)), settings, robot.spec.servo)
+    columns = start_columns(scene, [slot for slot, _ in tries], draws)
+    teacher = teacher_for(scene, fixture_poses(robot, columns, len(tries)), settings, robot.spec.servo)
     last = (scene.task, *scene.task.then)[-1]
     setup = Setup(
         robot=robot.guided(), scene=scene, center_of_compliance=np.array(scene.tool.frames[scene.tool.hand]),
@@ -220,7 +242,7 @@ def _attempt(
         stop_when=_held(last.done or scene.goal, last.held_s * robot.spec.control.tick_hz),
         make_drive=drive_maker(robot),
     )  # fmt: skip
-    rngs = [np.random.default_rng([seed, slot, attempt]) for slot in slots]
+    rngs = [np.random.default_rng([seed, slot, number]) for slot, number in tries]
     told = progress_callback(watch, duration_s)
     return simulate(teacher, setup, columns, rngs, duration_s=duration_s, trace_hz=rate_hz, progress=told)
 
