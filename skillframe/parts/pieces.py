@@ -160,14 +160,14 @@ def _surface(hull: Hull) -> float:
 def error_of(hulls: list[Hull], solid: Any) -> float:
     """How far the union of hulls is from a solid [m], the larger of what is too much and what is missing."""
     whole = united([solid_of(hull.vertices, hull.faces) for hull in hulls])
-    surfaces = [vertices[faces] for vertices, faces in map(arrays_of, (solid, whole))]
+    surfaces = [_Triangles(vertices[faces]) for vertices, faces in map(arrays_of, (solid, whole))]
     found = 0.0
     for difference in (whole - solid, solid - whole):
         for body in difference.decompose():
             if 2.0 * body.volume() < _MORE * body.surface_area():  # rounding
                 continue
             points = _looked_at(*arrays_of(body))
-            found = max([found, *(float(distances(points, surface).max()) for surface in surfaces)])
+            found = max([found, *(float(surface.distances(points).max()) for surface in surfaces)])
     return found
 
 
@@ -181,23 +181,41 @@ def _looked_at(vertices: Float, faces: Faces) -> Float:
 
 
 def distances(points: Float, triangles: Float) -> Float:
-    """Distance of points (P, 3) from the nearest of triangles (F, 3, 3), (P,) [m].
+    """Distance of points (P, 3) from the nearest of triangles (F, 3, 3), (P,) [m]."""
+    return _Triangles(triangles).distances(points)
 
-    A triangle is looked at where its bounding sphere comes nearer to a point than the nearest corner of all is.
-    """
-    from scipy.spatial import cKDTree
-    from trimesh.triangles import closest_point
 
-    scale = 1.0 / float(np.ptp(triangles.reshape(-1, 3), axis=0).max())  # trimesh compares with absolute tolerances
-    points, triangles = scale * points, scale * triangles
-    centres = triangles.mean(axis=1)
-    radii = norm(triangles - centres[:, None]).max(axis=1)
-    nearest: Float = cKDTree(triangles.reshape(-1, 3)).query(points)[0]
-    step = max(1, _PAIRS // len(triangles))
-    for start in range(0, len(points), step):
-        some = points[start : start + step]
-        near = norm(some[:, None] - centres) - radii <= nearest[start : start + step, None]
-        point, triangle = np.nonzero(near)
-        away = norm(some[point] - closest_point(triangles[triangle], some[point]))
-        np.minimum.at(nearest, start + point, away)
-    return nearest / scale
+class _Triangles:
+    """Triangles (F, 3, 3) [m], each with its bounding sphere, and a tree of their corners."""
+
+    def __init__(self, triangles: Float) -> None:
+        from scipy.spatial import cKDTree
+
+        self._scale = 1.0 / float(np.ptp(triangles.reshape(-1, 3), axis=0).max())  # trimesh's tolerances are absolute
+        self._triangles = self._scale * triangles
+        self._centres = self._triangles.mean(axis=1)
+        self._radii = norm(self._triangles - self._centres[:, None]).max(axis=1)
+        self._corners = cKDTree(self._triangles.reshape(-1, 3))
+
+    def distances(self, points: Float) -> Float:
+        """Of points (P, 3), (P,) [m].
+
+        A triangle is looked at where its sphere comes nearer to a point than the nearest corner of all is, and before
+        that, where it comes as near to a ball around all points as the farthest of these corners does.
+        """
+        from trimesh.triangles import closest_point
+
+        points = self._scale * points
+        nearest: Float = self._corners.query(points)[0]
+        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        reach = (1.0 + 1e-9) * (norm(points - middle).max() + nearest.max())
+        close = norm(self._centres - middle) - self._radii <= reach
+        triangles, centres, radii = self._triangles[close], self._centres[close], self._radii[close]
+        step = max(1, _PAIRS // len(triangles))
+        for start in range(0, len(points), step):
+            some = points[start : start + step]
+            near = norm(some[:, None] - centres) - radii <= nearest[start : start + step, None]
+            point, triangle = np.nonzero(near)
+            away = norm(some[point] - closest_point(triangles[triangle], some[point]))
+            np.minimum.at(nearest, start + point, away)
+        return nearest / self._scale
