@@ -1,6 +1,9 @@
 """Worlds with second parts, in millimetres, drawn with manifold3d: gears, a latch. And connectors without."""
 
+from itertools import pairwise
+
 import manifold3d
+import numpy as np
 
 from tests.part_meshes import FILE, box, export, keyed, rod, write
 
@@ -34,6 +37,15 @@ rest = -0.0005
 damping = 2.0
 mass = 0.02
 goal = [-0.0005, 0.0003]
+"""
+)
+BAYONET = (
+    FILE
+    + """
+[task]
+turns = [{ lift = "0.3mm", turn = "-18deg" }, { lift = "8mm", turn = "-24deg" }]
+[task.demonstration]
+tilt = "2deg"
 """
 )
 
@@ -83,14 +95,37 @@ def usb():
     return shell, pocket + box((-5.2, -1.45, -1.0), (5.2, 1.45, 6.5))
 
 
+def pins(grown=0.0, inner=8.0):
+    """Two pins of 4 mm along x, their middles 6 mm below the mouth, out to 15 mm, grown all around."""
+    pin = manifold3d.Manifold.cylinder(15.0 - inner + grown, 2.0 + grown, circular_segments=32)
+    pin = pin.rotate([0.0, 90.0, 0.0]).translate([inner, 0.0, -6.0])
+    return pin + pin.rotate([0.0, 0.0, 180.0])
+
+
+def bayonet():
+    """A cap of 24 mm with two pins: down a groove at 80 degrees from the level, then along a lock of 18 degrees."""
+    way = [(0.0, 0.0), (0.3, -18.0), (8.0, -24.0), (12.0, -24.0)]
+    grooves, grown = [], pins(0.3, inner=11.0)
+    for (low, a), (high, b) in pairwise(way):
+        ends = np.linspace((low, a), (high, b), 13)
+        there = [[side.translate([0.0, 0.0, z]).rotate([0.0, 0.0, t]) for side in grown.decompose()] for z, t in ends]
+        grooves += [(one + two).hull() for now, then in pairwise(there) for one, two in zip(now, then, strict=True)]
+    bore = rod(12.3, -8.3, 1.0, 48, outside=True)
+    socket = box((-20.0, -20.0, -14.0), (20.0, 20.0, 0.0)) - bore
+    for groove in grooves:
+        socket = socket - groove
+    return rod(12.0, -8.0, 10.0, 48) + pins(), socket
+
+
 def made(name, folder):
     """The fixture file of a world by name."""
-    text = {"gear": GEAR, "latch": LATCH}.get(name, FILE)
-    plug, socket, *second = {"gear": gears, "latch": latch, "connector": connector, "usb": usb}[name]()
+    text = {"gear": GEAR, "latch": LATCH, "bayonet": BAYONET}.get(name, FILE)
+    drawn = {"gear": gears, "latch": latch, "connector": connector, "usb": usb, "bayonet": bayonet}
+    plug, socket, *second = drawn[name]()
     path = write(folder / name, plug, socket, text)
     for solid in second:
         export(solid, path.parent / "second.stl")
     return path
 
 
-WORLDS = ("gear", "latch", "connector", "usb")
+WORLDS = ("gear", "latch", "connector", "usb", "bayonet")

@@ -94,11 +94,13 @@ class SeatedKeys:
         height: along the axis [m, 1um to 100mm].
         sideways: [m, 1um to 100mm].
         tilt: of the axis [rad, 0.1deg to 90deg].
+        turned: how far a part with `turns` may be from the end of its turn [rad, 0.1deg to 180deg].
     """
 
     height: float = 0.001
     sideways: float = 0.002
     tilt: float = 0.035
+    turned: float = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,6 +117,19 @@ class ShownKeys:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TurnKeys:
+    """`[[task.turns]]`, a point of the way out of a part that is screwed in, as a bayonet is.
+
+    Attributes:
+        lift: of the part above its assembled place [m, 1um to 200mm].
+        turn: of it there against its assembled attitude, right-handed about the way out [rad, -360deg to 360deg].
+    """
+
+    lift: float
+    turn: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TaskKeys:
     """`[task]`.
 
@@ -123,12 +138,15 @@ class TaskKeys:
         start: where runs start.
         seated: what counts as done.
         demonstration: how it is shown.
+        turns: points of the way out, the lowest first, between which a part is lifted and turned evenly; it is turned
+            no further above the last. Without any it goes straight.
     """
 
     axis: Literal["auto"] | Triple = (0.0, 0.0, -1.0)
     start: StartKeys = field(default_factory=StartKeys)
     seated: SeatedKeys = field(default_factory=SeatedKeys)
     demonstration: ShownKeys = field(default_factory=ShownKeys)
+    turns: tuple[TurnKeys, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -162,6 +180,9 @@ def read_fixture(path: Path) -> FixtureFile:
         raise InputError(f"{path}: tool", "has mass and density", "keep one of the two")
     if not isinstance(file.task.axis, str) and not any(file.task.axis):
         raise InputError(f"{path}: task.axis", "is zero", 'give for example [0, 0, -1], or "auto"')
+    lifts = [each.lift for each in file.task.turns]
+    if lifts != sorted(set(lifts)):
+        raise InputError(f"{path}: task.turns", "do not rise", "give the lowest lift first, each once")
     for index, second in enumerate(file.second):
         check_second(file.second, index, f"{path}: second[{index}]")
         if second.mesh:

@@ -7,6 +7,7 @@ Overlap is told by its mean thickness, 2 V / A of what the parts have in common.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,12 +23,40 @@ TOUCH = 1e-5
 """Overlap that is let pass [m]: what a contact sinks by."""
 NEAR = 8e-4
 """Material this near to the held part, sideways, belongs to the mouth [m]."""
-_STEP, _MOST_STEPS = 5e-4, 160
+_STEP, _MOST_STEPS, _TURN_STEP = 5e-4, 160, np.radians(2.0)
 _GAPS, _FAR = 24, (5e-4, 5e-3)  # looked for near by first, which is faster
 _RATIO = 50.0
 _BESIDE = 0.1  # of the part's size, how far its tip may lie outside it
 Axis = tuple[float, float, float]
 _AXES = ((0, 0, -1), (0, 0, 1), (-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0))
+
+
+class WayOut(NamedTuple):
+    """How a held part leaves: lifted, and turned about an upright line by (K,) `turns` [rad] at (K,) `lifts` [m].
+
+    Between these it turns evenly, and no further above the last. The line goes through `middle` (x, y) [m].
+    """
+
+    lifts: tuple[float, ...] = (0.0,)
+    turns: tuple[float, ...] = (0.0,)
+    middle: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def before(self) -> Float:
+        """Attitude (3, 3) of the part before it goes in, against that at its end."""
+        return self._turned_by(self.turns[-1])
+
+    def at(self, solid: Any, lift: float) -> Any:
+        """The assembled part, lifted so far [m]."""
+        if any(self.turns):
+            turn = self._turned_by(float(np.interp(lift, self.lifts, self.turns)))
+            there = solid.translate([-self.middle[0], -self.middle[1], 0.0])
+            solid = _turned(there, turn).translate([self.middle[0], self.middle[1], 0.0])
+        return solid.translate([0.0, 0.0, float(lift)])
+
+    @staticmethod
+    def _turned_by(angle: float) -> Float:
+        return rotation_matrix(np.array([0.0, 0.0, angle]))
 
 
 class PartsFit(NamedTuple):
@@ -41,6 +70,7 @@ class PartsFit(NamedTuple):
         turn: (3, 3) from the frame of `pose` and `assembled` to the fixture frame.
         axis: of insertion in that frame.
         origin: (3,) of that frame, in the fixture frame.
+        way: by which the held part leaves.
     """
 
     plug: Any
@@ -53,6 +83,7 @@ class PartsFit(NamedTuple):
     turn: Float
     axis: Axis
     origin: Float
+    way: WayOut
 
 
 def fit(plug: MeshPart, socket: MeshPart, file: FixtureFile) -> PartsFit:
@@ -69,6 +100,7 @@ def fit(plug: MeshPart, socket: MeshPart, file: FixtureFile) -> PartsFit:
     one, two = (_turned(each, turn) for each in (one, two))
     mouth = _mouth(one, two)
     tip = _tip(one, mouth, turn, file)
+    way = _way(file)
     origin = -np.array([tip[0], tip[1], mouth])
     one, two = (each.translate(list(origin)) for each in (one, two))
     depth = float(mouth - tip[2])
@@ -76,10 +108,10 @@ def fit(plug: MeshPart, socket: MeshPart, file: FixtureFile) -> PartsFit:
         what = f"{plug.name} does not go into {socket.name}: nothing of it lies below a mouth"
         raise InputError("the assembled pose", what, "move [tool] assembled, give task.axis, or check the units")
     lifts: Float = depth * np.arange(1.0, _GAPS + 1.0) / (_GAPS + 1.0)
-    gaps: Float = np.array([_gap(_lifted(one, lift), two) for lift in lifts])
+    gaps: Float = np.array([_gap(way.at(one, lift), two) for lift in lifts])
     inside = np.reshape(one.trim_by_plane([0.0, 0.0, -1.0], 0.0).bounding_box(), (2, 3))
     radius = 0.5 * float(np.ptp(inside[:, :2], axis=0).max())
-    return PartsFit(one, two, depth, float(np.median(gaps)), gaps, lifts, radius, turn, axis, origin)
+    return PartsFit(one, two, depth, float(np.median(gaps)), gaps, lifts, radius, turn, axis, origin, way)
 
 
 def _gap(one: Any, two: Any) -> float:
@@ -103,8 +135,18 @@ def _turned(solid: Any, rotation: Float) -> Any:
     return solid.transform(np.column_stack([rotation, np.zeros(3)]))
 
 
-def _lifted(solid: Any, lift: float) -> Any:
-    return solid.translate([0.0, 0.0, float(lift)])
+def _way(file: FixtureFile) -> WayOut:
+    """The way out that a file gives, about the line through the tip."""
+    points = [(0.0, 0.0), *((each.lift, each.turn) for each in file.task.turns)]
+    return WayOut(tuple(lift for lift, _ in points), tuple(turn for _, turn in points))
+
+
+def _way_before(one: Any, two: Any, turn: Float, file: FixtureFile) -> WayOut:
+    """The same while the parts are not yet in the fixture frame."""
+    if not file.task.turns:
+        return WayOut()
+    tip = _tip(one, _mouth(one, two), turn, file)
+    return _way(file)._replace(middle=(float(tip[0]), float(tip[1])))
 
 
 def _check_scales(plug: MeshPart, socket: MeshPart) -> None:
@@ -150,15 +192,18 @@ def _axis(
     for axis in _AXES if given == "auto" else (given,):
         along = np.array(axis, dtype=float) / np.linalg.norm(axis)
         turn = _down(along)
-        stands = _in_the_way(_turned(one, turn), _turned(two, turn))
+        there = _turned(one, turn), _turned(two, turn)
+        stands = _in_the_way(*there, _way_before(*there, turn, file))
         if stands is None:
             return turn, (float(along[0]), float(along[1]), float(along[2]))
         blocked.append((along, *stands))
     along, deep, lift = max(blocked, key=lambda each: each[2])
     out = ", ".join(f"{-x + 0.0:g}" for x in along)
-    what = f"{plug.name} cannot leave {socket.name} along ({out}): {1000.0 * deep:.2g} mm of it stand in the way "
+    by = " by task.turns" if file.task.turns else ""
+    what = f"{plug.name} cannot leave {socket.name} along ({out}){by}: {1000.0 * deep:.2g} mm of it stand in the way "
     what += f"at {1000.0 * lift:.3g} mm of lift"
-    fix = "such parts need more than one straight motion" if given == "auto" else 'give another axis, or "auto"'
+    fix = "give another axis" if given != "auto" else "such parts need more than one straight motion"
+    fix += ", or task.turns of a part that is screwed in" if not file.task.turns else ", or other turns"
     raise InputError("task.axis", what, fix)
 
 
@@ -172,15 +217,24 @@ def _down(axis: Float) -> Float:
     return rotation_matrix(turn * (np.arctan2(size, float(axis @ down)) / size)) if size > 0.0 else np.eye(3)
 
 
-def _in_the_way(plug: Any, socket: Any) -> tuple[float, float] | None:
+def _in_the_way(plug: Any, socket: Any, way: WayOut) -> tuple[float, float] | None:
     """How thick what stands in the way is, and at which lift [m], or None if the held part comes out."""
     whole = float(socket.bounding_box()[5] - plug.bounding_box()[2])
     count = int(np.clip(np.ceil(whole / _STEP), 8, _MOST_STEPS))
-    for lift in whole * (np.arange(count) + 1.0) / count if whole > 0.0 else ():
-        here = _lifted(plug, lift)
+    lifts = whole * (np.arange(count) + 1.0) / count if whole > 0.0 else np.zeros(0)
+    for lift in _with_turns(lifts, way):
+        here = way.at(plug, lift)
         if here.min_gap(socket, TOUCH) < TOUCH and (deep := thickness(here ^ socket)) > TOUCH:
             return deep, float(lift)
     return None
+
+
+def _with_turns(lifts: Float, way: WayOut) -> Float:
+    """Lifts, and where the part turns so many more between that none of its turns is more than 2 degrees."""
+    ends = zip(pairwise(way.lifts), pairwise(way.turns), strict=True)
+    more = [np.linspace(*span, 2 + int(abs(b - a) / _TURN_STEP))[1:] for span, (a, b) in ends if a != b]
+    found: Float = np.unique(np.concatenate([lifts, *more]))
+    return found
 
 
 def _mouth(plug: Any, socket: Any) -> float:
@@ -217,9 +271,9 @@ def _given_tip(plug: Any, tip: Float) -> Float:
 
 
 def tilted(fit: PartsFit, tilt: Float, tip: Float) -> Any:
-    """The held part with its tip at a point (3,) and turned about it by a rotation vector (3,)."""
+    """The held part before it goes in, with its tip at a point (3,) and turned about it by a rotation vector (3,)."""
     at_tip = fit.plug.translate([0.0, 0.0, fit.depth])
-    return _turned(at_tip, rotation_matrix(tilt)).translate([float(x) for x in tip])
+    return _turned(at_tip, rotation_matrix(tilt) @ fit.way.before).translate([float(x) for x in tip])
 
 
 def lowest(points: Float, tilt: Float) -> Float:
@@ -229,6 +283,6 @@ def lowest(points: Float, tilt: Float) -> Float:
 
 
 def corners(fit: PartsFit) -> Float:
-    """The corners (P, 3) of the held part's hull relative to its tip [m]."""
-    found: Float = arrays_of(fit.plug.hull())[0] + np.array([0.0, 0.0, fit.depth])
+    """The corners (P, 3) of the held part's hull relative to its tip before it goes in [m]."""
+    found: Float = (arrays_of(fit.plug.hull())[0] + np.array([0.0, 0.0, fit.depth])) @ fit.way.before.T
     return found

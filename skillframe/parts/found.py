@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +86,8 @@ def lines(loaded: LoadedParts) -> list[str]:
     least, play = (1000.0 * x for x in (float(found.gaps.min()), found.clearance))
     plug, socket = loaded.file.tool.mesh, loaded.file.fixture.mesh
     return [
-        f"{plug} goes {1000.0 * found.depth:.3g} mm deep into {socket} and comes out along ({out})",
+        f"{plug} goes {1000.0 * found.depth:.3g} mm deep into {socket} and comes out along ({out})"
+        + (f", turned by {math.degrees(found.way.turns[-1]):.3g} degrees" if any(found.way.turns) else ""),
         f"clearance along the way {play:.3g} mm (median; least {least:.3g} mm)",
         f"contact by {_contact(loaded)}; contact error {1e6 * loaded.contact_error:.2g} um "
         f"(at most {1e6 * SHARE * found.clearance:.3g} um is let pass)",

@@ -133,7 +133,7 @@ def _surface(whole: MeshPart, loaded: LoadedParts) -> tuple[Geom, ...]:
 def _check_free(part: SecondPart, solid: Any, loaded: LoadedParts, above: float) -> None:
     """Refuse a second part in which the held one stands at the start, or when it is assembled."""
     plug = loaded.fit.plug
-    places = {"at the start": plug.translate([0.0, 0.0, loaded.fit.depth + above])}
+    places = {"at the start": loaded.fit.way.at(plug, loaded.fit.depth + above)}
     if part.goal is None or part.goal[0] <= 0.0 <= part.goal[1]:
         places["in the assembled pose"] = plug
     for when, placed in places.items():

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.config.fields import require_ranges
-from skillframe.frames import Float, norm
+from skillframe.frames import Float, matrix_from_quaternion, norm, quaternion_from_matrix
 from skillframe.parts.declared import FixtureFile, read_fixture
 from skillframe.parts.fit import corners, lowest
 from skillframe.parts.load import LoadedParts, PreparedPart, load
@@ -91,11 +91,19 @@ def build_world(path: Path, params: PartsParams) -> Scene:
 
     fixed, movers = second_parts(path, loaded, params.above_mouth)
 
+    screwed = bool(loaded.file.task.turns)
+
+    def leans(state: State) -> Float:
+        return np.maximum(tilt_of(state), _turn_left(state)) if screwed else tilt_of(state)
+
     def seated(state: State) -> NDArray[np.bool_]:
         there: NDArray[np.bool_] = np.abs(state.tip.position[..., 2] + depth) < params.height
         there = there & (norm(state.tip.position[..., :2]) < params.sideways) & (tilt_of(state) < params.tilt)
+        if screwed:
+            there = there & (_turn_left(state) < loaded.file.task.seated.turned)
         return there & in_place(loaded.file.second, state)
 
+    x, y, z, w = quaternion_from_matrix(found.way.before @ matrix_from_quaternion(TOOL_DOWN)).tolist()
     return Scene(
         name=loaded.name,
         fixture=(*_geoms(loaded.socket, np.eye(3), np.zeros(3), FIXTURE_COLOUR), *fixed, *_table(loaded)),
@@ -103,10 +111,10 @@ def build_world(path: Path, params: PartsParams) -> Scene:
         tool=_tool(loaded),
         friction=params.friction,
         start_tip=(0.0, 0.0, params.above_mouth),
-        start_quaternion=TOOL_DOWN,
+        start_quaternion=(x, y, z, w) if screwed else TOOL_DOWN,
         start_lift=lift,
         goal=seated,
-        goal_error=lambda state: (norm(state.tip.position - np.array([0.0, 0.0, -depth])), tilt_of(state)),
+        goal_error=lambda state: (norm(state.tip.position - np.array([0.0, 0.0, -depth])), leans(state)),
         way=insertion(depth, found.radius),
         task=Task(
             direction=(0.0, 0.0, -1.0), aligned=TOOL_DOWN, hand="aligning",
@@ -115,6 +123,13 @@ def build_world(path: Path, params: PartsParams) -> Scene:
         ),
         params=stated(loaded),
     )  # fmt: skip
+
+
+def _turn_left(state: State) -> Float:
+    """Angle (N,) [rad] about the fixture's z by which a tip is turned against its assembled attitude."""
+    turned = state.tip.rotation * _FLIP  # of the part against itself assembled, as far as it is upright
+    left: Float = np.abs(np.arctan2(turned[..., 1, 0] - turned[..., 0, 1], turned[..., 0, 0] + turned[..., 1, 1]))
+    return left
 
 
 def stated(loaded: LoadedParts) -> dict[str, Any]:
