@@ -7,6 +7,7 @@ points where edges cross the plane, sorted by angle (our choice: a fixture cut o
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -165,7 +166,7 @@ def creased(vertices: Float, faces: NDArray[np.int64]) -> Mesh:
 
 
 def section(mesh: Mesh, point: Float, normal: Float) -> Mesh:
-    """The part of a convex mesh behind a plane, closed by a darker cap."""
+    """The part of a closed mesh behind a plane, with a darker cap where it was cut."""
     height = (mesh.vertices - point) @ normal
     if len(height) == 0 or height.max() <= 1e-9:
         return mesh
@@ -181,7 +182,8 @@ def _clipped(mesh: Mesh, height: Float) -> Mesh:
     normals: list[Float] = []
     colors: list[Float] = []
     faces: list[tuple[int, int, int]] = []
-    for face in mesh.faces:
+    in_plane = (np.abs(height[mesh.faces]) < 1e-9).all(axis=1)  # the cap is there, where anything is behind them
+    for face in mesh.faces[~in_plane]:
         loop = _clip_face(mesh, face, height)
         start = len(vertices)
         vertices += [v for v, _ in loop]
@@ -206,13 +208,37 @@ def _clip_face(mesh: Mesh, face: NDArray[np.int64], height: Float) -> list[tuple
 
 
 def _cap(soup: Mesh, point: Float, normal: Float, color: Float) -> Mesh:
-    edge = soup.vertices[np.abs((soup.vertices - point) @ normal) < 1e-9]
-    if len(edge) < 3:
-        return EMPTY
+    """What a closed mesh encloses of the plane that it was cut by, in strips between the ends of its edges there."""
     side = unit(cross(normal, np.roll(np.abs(normal), 1)))
-    local = edge - edge.mean(axis=0)
-    angle = np.round(np.arctan2(local @ cross(normal, side), local @ side), 9)
-    edge = edge[np.unique(angle, return_index=True)[1]]
-    faces = np.array([(0, i, i + 1) for i in range(1, len(edge) - 1)], dtype=np.int64).reshape(-1, 3)
+    up = cross(normal, side)
+    edges = _edges_on(soup, point, normal)
+    across, along = (edges - point) @ side, (edges - point) @ up  # (E, 2) each
+    ends = np.unique(across.round(9))
+    corners: list[Float] = []
+    for low, high in pairwise(ends.tolist()):
+        at = np.array([low, high])
+        met = (across[:, 0] < 0.5 * (low + high)) & (across[:, 1] > 0.5 * (low + high))
+        share = (at - across[met, :1]) / np.diff(across[met], axis=1)
+        heights = along[met, :1] + share * np.diff(along[met], axis=1)  # of each edge at both ends of the strip
+        order = np.argsort(heights.sum(axis=1), kind="stable")
+        for under, over in zip(order[::2], order[1::2], strict=False):
+            (a, b), (c, d) = heights[under], heights[over]
+            corners.append(np.array([[low, a], [high, b], [high, d], [low, c]]))
+    if not corners:
+        return EMPTY
+    flat = np.concatenate(corners)
+    vertices = point + flat[:, :1] * side + flat[:, 1:] * up
+    faces = np.array([(i, i + 1, i + 2) if k else (i, i + 2, i + 3) for i in range(0, len(flat), 4) for k in (1, 0)])
     shaded = np.array([*(CUT_SHADE * color[:3]), color[3]])
-    return Mesh(edge, np.tile(normal, (len(edge), 1)), faces, np.tile(shaded, (len(edge), 1)))
+    return Mesh(vertices, np.tile(normal, (len(flat), 1)), faces, np.tile(shaded, (len(flat), 1)))
+
+
+def _edges_on(soup: Mesh, point: Float, normal: Float) -> Float:
+    """The edges (E, 2, 3) of a clipped mesh in the plane, from the less to the more along its side."""
+    side = unit(cross(normal, np.roll(np.abs(normal), 1)))
+    on = np.abs((soup.vertices[soup.faces] - point) @ normal) < 1e-9
+    two = on.sum(axis=1) == 2
+    edges: Float = soup.vertices[soup.faces[two][on[two]].reshape(-1, 2)]
+    back = (edges[:, 1] - edges[:, 0]) @ side < 0.0
+    edges[back] = edges[back, ::-1]
+    return edges

@@ -5,7 +5,9 @@ from hypothesis import strategies as st
 from report_fakes import LENGTH, RADIUS, peg_mesh
 
 from skillframe.frames import norm, unit
+from skillframe.parts.solid import arrays_of
 from skillframe.reports.shapes import SEGMENTS, creased, face_normals, merge, mesh_of, section
+from tests.part_meshes import box
 
 # a regular polygon of n sides in a circle has the share (n / 2 pi) sin(2 pi / n) of its area
 POLYGON = SEGMENTS / (2 * np.pi) * np.sin(2 * np.pi / SEGMENTS)
@@ -56,6 +58,20 @@ def test_two_halves_of_a_cut_box_make_up_the_whole(offset, azimuth, rise):
     point = offset * normal
     halves = volume(section(box, point, normal)) + volume(section(box, point, -normal))
     assert halves == pytest.approx(volume(box), abs=1e-9)
+
+
+@pytest.mark.parametrize("at", [0.0, 0.3, 0.5, 4.2])
+@pytest.mark.parametrize("normal", [(0.0, -1.0, 0.0), (0.0, 0.6, -0.8), (1.0, 0.0, 0.0)])
+def test_two_halves_of_a_cut_block_with_a_hole_and_a_second_body_make_up_the_whole(normal, at):
+    """Signed volumes add up only where both halves are closed, so a cap may cover neither the hole nor the gap."""
+    block = box((-2.0, -1.0, -1.0), (2.0, 1.0, 1.0)) - box((-3.0, -0.5, -0.4), (3.0, 0.5, 0.5))
+    vertices, faces = arrays_of(block + box((4.0, -0.5, -0.5), (5.0, 0.5, 0.5)))
+    whole = mesh_of({**geom("mesh", [1.0]), "vertices": vertices.tolist(), "faces": faces.tolist()})
+    normal = np.array(normal)
+    halves = [section(whole, at * normal, side * normal) for side in (1.0, -1.0)]
+    assert volume(whole) == pytest.approx(4.0 * (4.0 - 0.9) + 1.0)
+    # to 1e-6 of it: the ends of edges are taken to a nanometre, and this is metres large
+    assert sum(map(volume, halves)) == pytest.approx(volume(whole), rel=1e-6)
 
 
 def test_a_cut_cylinder_is_closed():
