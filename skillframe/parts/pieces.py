@@ -32,7 +32,7 @@ _AXES = {"z": (0, 1, 2), "x": (1, 2, 0), "y": (2, 0, 1)}
 _MORE = 1e-8  # m; mean thickness of what the hull of several pieces may hold beyond them
 _TOUCHING, _GRID = 1e-9, 1e-6  # m
 _LEAST_VOLUME = 1e-14  # m3; MuJoCo takes no mesh of less than 1e-15
-_PAIRS = 200_000
+_AT_ONCE = 64  # points
 
 
 class ConvexPieces(NamedTuple):
@@ -201,21 +201,21 @@ class _Triangles:
         """Of points (P, 3), (P,) [m].
 
         A triangle is looked at where its sphere comes nearer to a point than the nearest corner of all is, and before
-        that, where it comes as near to a ball around all points as the farthest of these corners does.
+        that, where it comes as near to a ball around some points as the farthest of their corners does.
         """
+        from scipy.spatial import cKDTree
         from trimesh.triangles import closest_point
 
         points = self._scale * points
         nearest: Float = self._corners.query(points)[0]
-        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-        reach = (1.0 + 1e-9) * (norm(points - middle).max() + nearest.max())
-        close = norm(self._centres - middle) - self._radii <= reach
-        triangles, centres, radii = self._triangles[close], self._centres[close], self._radii[close]
-        step = max(1, _PAIRS // len(triangles))
-        for start in range(0, len(points), step):
-            some = points[start : start + step]
-            near = norm(some[:, None] - centres) - radii <= nearest[start : start + step, None]
+        order = cKDTree(points, leafsize=_AT_ONCE).indices  # those that follow each other lie near each other
+        for some in np.split(order, range(_AT_ONCE, len(order), _AT_ONCE)):
+            low, high = points[some].min(axis=0), points[some].max(axis=0)
+            reach = (1.0 + 1e-9) * (0.5 * norm(high - low) + nearest[some].max())
+            close = np.flatnonzero(norm(self._centres - 0.5 * (low + high)) - self._radii <= reach)
+            near = norm(points[some, None] - self._centres[close]) - self._radii[close] <= nearest[some, None]
             point, triangle = np.nonzero(near)
-            away = norm(some[point] - closest_point(triangles[triangle], some[point]))
-            np.minimum.at(nearest, start + point, away)
+            there = points[some[point]]
+            away = norm(there - closest_point(self._triangles[close[triangle]], there))
+            np.minimum.at(nearest, some[point], away)
         return nearest / self._scale
