@@ -37,13 +37,22 @@ Tried = tuple[np.ndarray, np.ndarray]
 
 
 class Asked(NamedTuple):
-    """A world, how its skill is run, and its ranges with what is nominal in them."""
+    """A world, how its skill is run, its ranges with what is nominal in them, who is taught, and what is run.
+
+    `held_out` is the number of fresh random trials, `beside` are the other ways to choose trials, `rates` those that
+    are certified.
+    """
 
     world: str
     setting: str
     duration_s: float
     ranges: dict[str, tuple[float, float]]
     nominal: tuple[float, ...]
+    robot: str = "panda"
+    teacher: str = "kinesthetic"
+    held_out: int = HELD_OUT
+    beside: tuple[str, ...] = ("Sobol", "random", "grid")
+    rates: tuple[float, ...] = (0.95, 0.99)
 
 
 ASKED = {
@@ -53,12 +62,22 @@ ASKED = {
     "valley": Asked("valley", "", 6.0, {
         "fixture.offset_x": (-0.03, 0.06), "fixture.tilt_y": (-0.9, 0.9),
     }, (0.0, 0.0)),
+    "coupler": Asked("hose_coupler", 'coc = "tip"', 10.0, {
+        "start.tilt_x": (-0.12, 0.12), "world.friction": (0.05, 0.8),
+    }, (0.0, 0.2)),
+    "corner": Asked("corner", 'coc = "tip"', 10.0, {
+        "fixture.tilt_z": (-0.12, 0.12), "world.friction": (0.05, 0.6),
+    }, (0.0, 0.2)),
+    "crane": Asked("pallets", "", 30.0, {
+        "robot.payload": (0.0, 475.0), "actuator.delay": (0.0, 0.08),
+    }, (475.0, 0.02), "hiab_xs031", "teleoperation", 256, ("Sobol",), (0.95,)),
 }  # fmt: skip
 
 
 def taught(asked: Asked, folder: Path) -> None:
     """Two demonstrations of a simulated person, and the skill learned from them."""
     demonstration = ["demonstration", "record", "--world", asked.world, "--count", "2", "--seed", "1"]
+    demonstration += ["--robot", asked.robot, "--teacher", asked.teacher]
     assert run([*demonstration, "--out", str(folder / "d.npz")]) == 0
     shown = [str(folder / f"d{i}.npz") for i in (1, 2)]
     assert run(["learn", *shown, "--out", str(folder / "learned.skill.json")]) == 0
@@ -69,9 +88,8 @@ def campaign(
 ) -> Path:
     """A campaign file over the ranges, each an axis in the words of `axis`."""
     lines = [f'"{key}" = {axis(low, high)}' for key, (low, high) in asked.ranges.items()]
-    head = (
-        f'world = "{asked.world}"\nrobot = "panda"\ntrials = {trials}\nseed = {seed}\nskills = ["learned.skill.json"]'
-    )
+    head = f'world = "{asked.world}"\nrobot = "{asked.robot}"\nskills = ["learned.skill.json"]'
+    head += f"\ntrials = {trials}\nseed = {seed}"
     path = folder / f"{name}.toml"
     path.write_text(f"{head}\n{asked.setting}\nduration_s = {asked.duration_s}\n[vary]\n" + "\n".join(lines) + "\n")
     return path
@@ -117,10 +135,10 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     if not (folder / "learned.skill.json").exists():
         taught(asked, folder)
-    seconds = timed(folder, "fresh", ["campaign", "run", str(campaign(asked, folder, "fresh", HELD_OUT, 77, uniform)),
-                                      "--out", str(folder / "fresh"), "--traces", "0"])  # fmt: skip
+    path = campaign(asked, folder, "fresh", asked.held_out, 77, uniform)
+    seconds = timed(folder, "fresh", ["campaign", "run", str(path), "--out", str(folder / "fresh"), "--traces", "0"])
     points, works = rows_of(asked, folder / "fresh" / "results.csv")
-    told("fresh, at random", HELD_OUT, f"{works.mean():.3f} succeed", f"{seconds:.0f} s")
+    told("fresh, at random", asked.held_out, f"{works.mean():.3f} succeed", f"{seconds:.0f} s")
     if chosen.seeds:
         return repeated(asked, folder, (points, works), range(100, 100 + chosen.seeds))
 
@@ -138,13 +156,13 @@ def main() -> None:
     beside = {"Sobol": (count, sobol), "random": (count, uniform)}
     side = round(count ** (1.0 / len(asked.ranges)))
     beside["grid"] = (side ** len(asked.ranges), lambda low, high: grid(low, high, side))
-    for name, (trials, axis) in beside.items():
+    for name, (trials, axis) in ((name, beside[name]) for name in asked.beside):
         path = campaign(asked, folder, name.lower(), trials, 5, axis)
         out = folder / name.lower()
         seconds = timed(folder, name.lower(), ["campaign", "run", str(path), "--out", str(out), "--traces", "0"])
         predicted(name, rows_of(asked, out / "results.csv"), (points, works), nominal, seconds)
 
-    for rate in (0.95, 0.99):
+    for rate in asked.rates:
         claim = folder / f"claim{rate}"
         if not claim.exists():
             shutil.copytree(border, claim)
