@@ -103,10 +103,14 @@ def pins(grown=0.0, inner=8.0):
 
 
 def bayonet():
-    """A cap of 24 mm with two pins: down a groove at 80 degrees from the level, then along a lock of 18 degrees."""
-    way = [(0.0, 0.0), (0.3, -18.0), (8.0, -24.0), (12.0, -24.0)]
+    """A cap of 24 mm with two pins: down a groove at 80 degrees from the level, then along a lock of 18 degrees.
+
+    The groove's mouth is wider by 1.5 mm on either side, over 2 mm, as those of real ones are.
+    """
+    way = [[(0.0, 0.0), (0.3, -18.0), (8.0, -24.0), (12.0, -24.0)]]
+    way += [[(4.0, -20.9), (6.0, -22.5 + wider), (12.0, -22.5 + wider)] for wider in (-6.4, 6.4)]
     grooves, grown = [], pins(0.3, inner=11.0)
-    for (low, a), (high, b) in pairwise(way):
+    for (low, a), (high, b) in (piece for each in way for piece in pairwise(each)):
         ends = np.linspace((low, a), (high, b), 13)
         there = [[side.translate([0.0, 0.0, z]).rotate([0.0, 0.0, t]) for side in grown.decompose()] for z, t in ends]
         grooves += [(one + two).hull() for now, then in pairwise(there) for one, two in zip(now, then, strict=True)]
