@@ -32,8 +32,9 @@ QUIET_S = 5.0  # a recording that is over by then needs no progress
 @world_option("World to demonstrate")
 @robot_option
 @click.option(
-    "--teacher", type=click.Choice(["kinesthetic", "teleoperation", "blind"]), default="kinesthetic", show_default=True
-)
+    "--teacher", type=click.Choice(["kinesthetic", "teleoperation", "blind"]),
+    help="Who shows it [kinesthetic; of machines teleoperation].",
+)  # fmt: skip
 @click.option(
     "--out",
     required=True,
@@ -91,9 +92,9 @@ QUIET_S = 5.0  # a recording that is over by then needs no progress
 @click.option("--json", "as_json", is_flag=True, help="What was recorded as JSON on stdout.")
 @quiet_option
 def command(
-    world: str, robot: str, teacher: str, out: Path, count: int, seed: int, noise: float | None, delay: float | None,
-    scale: float | None, belief: str | None, centre: str | None, rate: float | None, settings: tuple[str, ...],
-    as_json: bool, **operated: Any,
+    world: str, robot: str, teacher: str | None, out: Path, count: int, seed: int, noise: float | None,
+    delay: float | None, scale: float | None, belief: str | None, centre: str | None, rate: float | None,
+    settings: tuple[str, ...], as_json: bool, **operated: Any,
 ) -> int:  # fmt: skip
     """Record demonstrations of a world from a simulated person.
 
@@ -101,7 +102,7 @@ def command(
     --count 2 shows the valley from both sides. A blind teacher searches from a start of its own each time, knowing no
     more than --belief; every search is kept, whether it found the goal or not.
 
-    A hydraulic machine is taught by --teacher teleoperation from a scaled master that reflects its force. First it
+    A hydraulic machine is taught by teleoperation, from a scaled master that reflects its force. First it
     swings in the air to identify friction and payload; what it then records as wrench it estimates from its pressures.
     A set-up whose loop gain |K + j w D [with --feed-velocity]| scale / (force scale x hand stiffness) is not below 1 is
     refused.
@@ -124,6 +125,7 @@ def command(
     with warned():
         scene, draws = scene_of(world, dict(parse_setting(text) for text in settings), depth=1)
     machine = robot_of(robot)
+    teacher = teacher or ("teleoperation" if machine.spec.hydraulic else "kinesthetic")
     _refuse_idle(teacher, (noise, delay, scale), (belief, centre))
     person: Person
     if machine.spec.hydraulic or any(map(_given, operated.values())):
