@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import islice, product
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -23,6 +24,7 @@ from skillframe.frames import Float, rotate
 from skillframe.robot.model import RobotModel
 from skillframe.world.placement import nominal_fixture
 from skillframe.world.scene import Scene
+from skillframe_papers.rows.blocks import Blocks
 from skillframe_papers.rows.outcome import classify
 
 POSTURES = ("upright", "mirrored")
@@ -114,20 +116,64 @@ def insert(
     robot: RobotModel, scene: Scene, phase: Phase, tilts_deg: Sequence[float], frictions: Sequence[float],
     *, posture: str = "upright", seed: int = 0, duration_s: float = 30.0, to_the_bottom: bool = False,
 ) -> list[Row]:  # fmt: skip
-    """Insertions of every friction and tilt in one batch, frictions first.
+    """Insertions of every friction and tilt, frictions first. Arguments as `side_by_side`."""
+    asked = [Asked(phase, tilts_deg, frictions)]
+    return side_by_side(
+        robot, scene, asked, posture=posture, seed=seed, duration_s=duration_s, to_the_bottom=to_the_bottom
+    )[0]
+
+
+class Asked(NamedTuple):
+    """Insertions of one phase: every friction [Nm] and tilt [degrees], frictions first."""
+
+    phase: Phase
+    tilts_deg: Sequence[float]
+    frictions: Sequence[float]
+
+
+def side_by_side(
+    robot: RobotModel, scene: Scene, asked: Sequence[Asked], *, posture: str = "upright", seed: int = 0,
+    duration_s: float = 30.0, to_the_bottom: bool = False,
+) -> list[list[Row]]:  # fmt: skip
+    """Insertions, those about the same points in one simulation: each is, to the last bit, what it is alone.
 
     Each ends where the goal is reached, 10 mm above the bottom, or, with `to_the_bottom`, where the skill ends.
+
+    Args:
+        robot: of two arms.
+        scene: what they put together.
+        asked: phases, and from where.
+        posture: of `POSTURES`.
+        seed: of the sensors' noise.
+        duration_s: after which an insertion has failed.
+        to_the_bottom: see above.
+
+    Returns:
+        by what was asked, its rows.
     """
     robot, scene = posed(robot, scene, posture)
-    friction, tilt = np.array(list(product(frictions, tilts_deg)), dtype=float).T
-    points = np.array([arm.center_of_compliance for arm in phase.arms])
-    setup = Setup(
-        robot=robot, scene=scene, center_of_compliance=points, stop_when=None if to_the_bottom else scene.goal
-    )
-    draws = {"start.tilt_y": np.radians(tilt), "robot.joint_friction": friction}
-    rngs = [np.random.default_rng([seed, i]) for i in range(len(tilt))]
-    result = simulate_arms(DualArm(phase), setup, draws, rngs, duration_s=duration_s)
-    return rows_of(result, robot, tilt, friction)
+    alike: dict[bytes, list[int]] = {}
+    for i, each in enumerate(asked):
+        alike.setdefault(_points(each.phase).tobytes(), []).append(i)
+    found = dict[int, list[Row]]()
+    for which in alike.values():
+        pairs = [np.array(list(product(asked[i].frictions, asked[i].tilts_deg)), dtype=float) for i in which]
+        friction, tilt = np.concatenate(pairs).T
+        setup = Setup(
+            robot=robot, scene=scene, center_of_compliance=_points(asked[which[0]].phase),
+            stop_when=None if to_the_bottom else scene.goal,
+        )  # fmt: skip
+        draws = {"start.tilt_y": np.radians(tilt), "robot.joint_friction": friction}
+        rngs = [np.random.default_rng([seed, i]) for pair in pairs for i in range(len(pair))]
+        skill = Blocks([DualArm(asked[i].phase) for i in which], [len(pair) for pair in pairs])
+        rows = iter(rows_of(simulate_arms(skill, setup, draws, rngs, duration_s=duration_s), robot, tilt, friction))
+        found |= {i: list(islice(rows, len(pair))) for i, pair in zip(which, pairs, strict=True)}
+    return [found[i] for i in range(len(asked))]
+
+
+def _points(phase: Phase) -> Float:
+    """Centres of compliance (2, 3), in each arm's tool frame [m]."""
+    return np.array([arm.center_of_compliance for arm in phase.arms])
 
 
 def rows_of(result: ArmsResult, robot: RobotModel, tilt_deg: np.ndarray, friction: np.ndarray) -> list[Row]:

@@ -1,6 +1,7 @@
 """The insertions that the rows of the two-arm paper read: configurations, tilts, joint friction, heights, parts.
 
-Computed once for all rows of the group. A configuration's insertions of one kind are one batch.
+Computed once for all rows of the group. Insertions that differ in nothing but their configuration, tilt and joint friction
+run side by side.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from skillframe_dualarm.document import Arm, Phase, configured, relative
 
 from skillframe.execution.prepare import load_robot_model, load_world
 from skillframe.extend.records import RowRun
-from skillframe_papers.rows.insertion import POSTURES, Row, insert, largest, raised, sticking
+from skillframe_papers.rows.insertion import POSTURES, Asked, Row, insert, largest, raised, side_by_side, sticking
 
 NAMES = ("A", "B", "C", "D", "E", "E*")
 COARSE, BETWEEN = (4.0, 8.0, 12.0), (6.0, 10.0, 14.0)
@@ -94,22 +95,29 @@ def _computed(settings: tuple[tuple[str, float], ...], seed: int, quick: bool) -
     values = dict(settings)
     run = _Runs(values, seed, QUICK_SECONDS if quick else SECONDS)
     stiff, own = values["robot.joint_friction"], values["world.friction"]
-    names, between = NAMES[:5], [] if quick else both(BETWEEN)
-    rows = {(n, POSTURES[0]): run(n, both(COARSE), [0.0, stiff]) + run(n, between, [stiff]) for n in names}
+    names, all_names = NAMES[:5], NAMES[:5] if quick else NAMES
+    coarse, small = both(COARSE), both(PARTS_DEG)
+    asked = {(n, "coarse"): (coarse, [0.0, stiff]) for n in all_names}
+    if not quick:
+        asked |= {(n, "between"): (both(BETWEEN), [stiff]) for n in names}
+        asked |= {(n, "beyond"): (both(BEYOND), [0.0]) for n in names}
+    done = run(asked)
+    rows = {(n, POSTURES[0]): done[n, "coarse"] + done.get((n, "between"), []) for n in all_names}
     stuck = {n: [r for r in rows[n, POSTURES[0]] if r.joint_friction > 0.0] for n in names}
     heights = {(n, HEIGHTS_M[1]): stuck[n] for n in names}
     parts = {(n, own): [r for r in stuck[n] if abs(r.tilt_deg) in PARTS_DEG] for n in names}
-    others = () if quick else PARTS
-    parts |= {(n, f): run(n, both(PARTS_DEG), [stiff], parts=f) for f in others for n in names}
     beyond: dict[str, list[Row]] = {}
     bottom: dict[str, list[Row]] = {}
     if not quick:
-        rows["E*", POSTURES[0]] = run("E*", both(COARSE), [0.0, stiff])
-        rows |= {(n, POSTURES[1]): run(n, both(COARSE), [stiff], posture=POSTURES[1]) for n in names}
-        at = [(n, h) for h in (HEIGHTS_M[0], HEIGHTS_M[2]) for n in names]
-        heights |= {(n, h): run(n, both(COARSE), [stiff], height=h) for n, h in at}
-        beyond = {n: run(n, both(BEYOND), [0.0]) for n in names}
-        bottom = {n: run(n, [8.0, -8.0], [stiff], to_the_bottom=True) for n in names}
+        beyond = {n: done[n, "beyond"] for n in names}
+        parts |= {(n, f): found for f in PARTS for n, found in run.each(names, small, stiff, parts=f).items()}
+        mirrored = run.each(names, coarse, stiff, posture=POSTURES[1])
+        rows |= {(n, POSTURES[1]): found for n, found in mirrored.items()}
+        heights |= {
+            (n, h): found for h in (HEIGHTS_M[0], HEIGHTS_M[2])
+            for n, found in run.each(names, coarse, stiff, height=h).items()
+        }  # fmt: skip
+        bottom = run.each(names, [8.0, -8.0], stiff, to_the_bottom=True)
     return Sweep(rows, stiff, heights, beyond, parts, bottom)
 
 
@@ -121,19 +129,22 @@ class _Runs(NamedTuple):
     seconds: float
 
     def __call__(
-        self, name: str, tilts: Sequence[float], stiff: Sequence[float], *, posture: str = "upright",
+        self, asked: Mapping[tuple[str, str], tuple[Sequence[float], Sequence[float]]], *, posture: str = "upright",
         height: float | None = None, parts: float | None = None, to_the_bottom: bool = False,
-    ) -> list[Row]:  # fmt: skip
-        if not tilts:
-            return []
+    ) -> dict[tuple[str, str], list[Row]]:  # fmt: skip
+        """Tilts and frictions of configurations, each named first in its key, side by side."""
         robot = load_robot_model("dual_panda")
         robot = robot if height is None else raised(robot, height)
         scene = load_world("dual_peg", {"friction": self.values["world.friction"] if parts is None else parts})
-        phase = phase_of(name, scene.tool.frames, self.values)
-        return insert(
-            robot, scene, phase, tilts, stiff, posture=posture, seed=self.seed, duration_s=self.seconds,
-            to_the_bottom=to_the_bottom,
+        found = side_by_side(
+            robot, scene, [Asked(phase_of(n, scene.tool.frames, self.values), *how) for (n, _), how in asked.items()],
+            posture=posture, seed=self.seed, duration_s=self.seconds, to_the_bottom=to_the_bottom,
         )  # fmt: skip
+        return dict(zip(asked, found, strict=True))
+
+    def each(self, names: Sequence[str], tilts: Sequence[float], stiff: float, **where: Any) -> dict[str, list[Row]]:
+        """The same tilts of several configurations with joint friction, by name."""
+        return {n: found for (n, _), found in self({(n, ""): (tilts, [stiff]) for n in names}, **where).items()}
 
 
 @cache
