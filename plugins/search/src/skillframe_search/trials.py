@@ -52,9 +52,9 @@ class Task(NamedTuple):
 
 
 @cache
-def demonstrations(task: Task, count: int = 5, seed: int = 1) -> tuple[Demonstration, ...]:
-    """Blind searches of a person who believes in N(centre, believed^2)."""
-    settings = BlindSettings(believed=task.believed, centre=task.centre)
+def demonstrations(task: Task, count: int = 5, seed: int = 1, time_s: float = 30.0) -> tuple[Demonstration, ...]:
+    """Blind searches of a person who believes in N(centre, believed^2), for so long at most [s]."""
+    settings = BlindSettings(believed=task.believed, centre=task.centre, time_s=time_s)
     robot = load_robot_model("free_tool")
     return tuple(record_blind(robot, task.scene, settings, count=count, seed=seed).demonstrations)
 

@@ -95,7 +95,8 @@ class Blocks(Skill):
         self._blocks = [
             (skill, slice(end - size, end)) for skill, size, end in zip(skills, sizes, ends, strict=True)
         ]  # fmt: skip
-        self._said: list[Impedance] | None = None
+        self._said: list[Impedance] = []
+        self._all: Impedance | None = None
 
     def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
         """Start each in its trials."""
@@ -121,7 +122,9 @@ class Blocks(Skill):
             ValueError: some skills say their damping and some do not.
         """
         before, self._said = self._said, said
-        if before is not None and all(a is b for new, old in zip(said, before, strict=True) for a, b in zip(new, old)):
+        if self._all is not None and all(
+            new.stiffness is old.stiffness and new.damping is old.damping for new, old in zip(said, before, strict=True)
+        ):
             return self._all
         sizes = [rows.stop - rows.start for _, rows in self._blocks]
         damping = [_each(i.damping, n) for i, n in zip(said, sizes, strict=True) if i.damping is not None]

@@ -19,10 +19,9 @@ from skillframe.demonstration.record import Demonstration
 from skillframe.extend.records import RowResult, RowRun
 from skillframe.frames import Float
 from skillframe_papers.bars import ahead, counted, judged, together
-from skillframe_papers.rows.search import EARLY_S, GIVEN, SHIFT, searched
+from skillframe_papers.rows.search import EARLY_S, SHIFT, off_centre, searched
 
-PEOPLE, QUICK_PEOPLE = 5, 1
-GOALS, QUICK_GOALS = 20, 5
+PEOPLE, GOALS = 5, 20
 ONE, FEW, MANY = 1, 3, 10
 GOAL_SEED = 66_000
 KEPT = 0.9
@@ -50,12 +49,11 @@ def believed(index: int) -> tuple[float, float, float]:
 
 
 def _people(job: RowRun) -> list[Given]:
-    """A quick run takes demonstrations that rows 13 and 23 have recorded."""
-    people, seed = job.count(PEOPLE, QUICK_PEOPLE), 1 + job.seed
-    unknowing = demonstrations(_task(job, NOBODY_KNEW), max(GIVEN, FEW * people), seed)
-    tasks = [_task(job, believed(k)) for k in range(people)]
+    seed = 1 + job.seed
+    unknowing = demonstrations(_task(job, NOBODY_KNEW), FEW * PEOPLE, seed)
+    tasks = [_task(job, believed(k)) for k in range(PEOPLE)]
     return [
-        Given(task, demonstrations(task, job.count(MANY, GIVEN), seed), unknowing[FEW * k : FEW * (k + 1)])
+        Given(task, demonstrations(task, MANY, seed), unknowing[FEW * k : FEW * (k + 1)])
         for k, task in enumerate(tasks)
     ]
 
@@ -71,27 +69,38 @@ def _found(job: RowRun, given: Given, taught: Sequence[tuple[Demonstration, ...]
 
 def few(job: RowRun) -> RowResult:
     """Row 14: goals found, over the number of demonstrations."""
-    people, each = _people(job), job.count(GOALS, QUICK_GOALS)
-    counts = (FEW, GIVEN) if job.quick else (ONE, FEW, MANY)
+    if job.quick:
+        return _quick(job)
+    counts = (ONE, FEW, MANY)
     found = {name: list[int]() for name in (*(f"from {n}" for n in counts), NULL)}
-    for k, given in enumerate(people):
-        where = goals(each, given.task, GOAL_SEED + 1000 * job.seed + k)
+    for k, given in enumerate(_people(job)):
+        where = goals(GOALS, given.task, GOAL_SEED + 1000 * job.seed + k)
         hits = _found(job, given, [*(given.own[:n] for n in counts), given.unknowing], where)
         for own, each_found in zip(found.values(), hits, strict=True):
             own.append(each_found)
-        job.tell(f"person {k}: {', '.join(f'{name} {hits[-1]}' for name, hits in found.items())} of {each}")
-    return _told(job, found, counts[-1], each * len(people))
+        job.tell(f"person {k}: {', '.join(f'{name} {hits[-1]}' for name, hits in found.items())} of {GOALS}")
+    return _told(job, found, MANY, GOALS * PEOPLE)
 
 
-def _told(job: RowRun, found: Mapping[str, list[int]], most: int, count: int) -> RowResult:
-    """The row, from goals found by each person's searches."""
+def _quick(job: RowRun) -> RowResult:
+    """The first person's three demonstrations alone, on the goals of row 23, whose searches these are."""
+    done = off_centre(job)
+    found = {f"from {FEW}": done["samples, tour"], NULL: done["not told"]}
+    hits = {name: [int((each.seconds <= EARLY_S).sum())] for name, each in found.items()}
+    return _told(job, hits, None, len(done["not told"].seconds))
+
+
+def _told(job: RowRun, found: Mapping[str, list[int]], most: int | None, count: int) -> RowResult:
+    """The row, from goals found by each person's searches. `most`: demonstrations that a few are beside, if any are."""
     hits = {name: sum(values) for name, values in found.items()}
-    ours, many, null = hits[f"from {FEW}"], hits[f"from {most}"], hits[NULL]
-    enough = judged(ours, count, KEPT * many / count, quick=job.quick)
+    ours, null = hits[f"from {FEW}"], hits[NULL]
+    many = None if most is None else hits[f"from {most}"]
+    enough = [] if many is None else [judged(ours, count, KEPT * many / count, quick=job.quick)]
     return RowResult(
-        ours=f"{counted(ours, count)} holes found in {EARLY_S:g} s from {FEW} demonstrations, {many} from {most}; "
-        f"null, from {FEW} of somebody who does not know: {null}",
-        verdict=together([enough], ahead(ours, null, count, quick=job.quick)),
+        ours=f"{counted(ours, count)} holes found in {EARLY_S:g} s from {FEW} demonstrations"
+        + ("" if many is None else f", {many} from {most}")
+        + f"; null, from {FEW} of somebody who does not know: {null}",
+        verdict=together(enough, ahead(ours, null, count, quick=job.quick)),
         head=("search learned", f"found in {EARLY_S:g} s", "by person"),
         rows=[(name, counted(hits[name], count), ", ".join(map(str, each))) for name, each in found.items()],
         difference="The paper gives no number. Each number of demonstrations is one choice of "

@@ -1,7 +1,7 @@
 """The insertions that the rows of the two-arm paper read: configurations, tilts, joint friction, heights, parts.
 
-Computed once for all rows of the group. Insertions that differ in nothing but their configuration, tilt and joint friction
-run side by side.
+Computed once for all rows of the group. Insertions that differ in nothing but their configuration, tilt and joint
+friction run side by side.
 """
 
 from __future__ import annotations
