@@ -33,14 +33,15 @@ LEARNED, NULL, HAND = "learned from one demonstration", "the same push, stiff", 
 def _valley(job: RowRun) -> dict[str, Ran]:
     starts = {"start.offset_x": np.linspace(-REACH_M, REACH_M, job.count(13, 3)).tolist()}
     given = skills_of(job, "valley", 1, SEED)
-    ways = {LEARNED: given, NULL: [stiff(s, "translation", STIFF_N_M) for s in given], HAND: [by_hand()]}
+    ways = {LEARNED: given, NULL: [stiff(s, "translation", STIFF_N_M) for s in given]}
+    ways |= {} if job.quick else {HAND: [by_hand()]}
     return run(job, "valley", ways, starts, "free_tool")
 
 
 def _coupler(job: RowRun, given: Sequence[Document]) -> dict[str, Ran]:
     starts = {"start.tilt_y": np.linspace(-radians(SPREAD_DEG), radians(SPREAD_DEG), job.count(4, 2)).tolist()}
     rigid = [stiff(s, "rotation", STIFF_TURN_NM_RAD) for s in given]
-    ways = {LEARNED: given, NULL: rigid, HAND: [by_hand(turn="y")]}
+    ways = {LEARNED: given, NULL: rigid} | ({} if job.quick else {HAND: [by_hand(turn="y")]})
     return run(job, "hose_coupler", ways, starts, "free_tool", "tip")
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from skillframe.execution.executor import simulate
 from skillframe.execution.prepare import prepare
+from skillframe.execution.setup import Setup
 from skillframe.extend.records import Document
 from skillframe.frames import Float, Pose
 from skillframe.robot.model import RobotModel
@@ -67,14 +68,31 @@ def ran(
         by document, how its trials ended.
     """
     made = [prepare(robot, scene, each.document, center) for each in trials]
+    return ran_made(made, [(each.draws, each.rngs) for each in trials], duration_s=duration_s)
+
+
+def ran_made(
+    made: Sequence[tuple[Skill, Setup]], trials: Sequence[tuple[Mapping[str, Float], Sequence[np.random.Generator]]],
+    *, duration_s: float,
+) -> list[Ended]:  # fmt: skip
+    """Run skills side by side, each with the quantities and generators of its trials.
+
+    Args:
+        made: skills and how they run: the same robot and scene.
+        trials: of each skill; all draw the same quantities.
+        duration_s: simulated seconds after which a trial is stopped.
+
+    Returns:
+        by skill, how its trials ended.
+    """
     alike: dict[bytes, list[int]] = {}
     for i, (_, setup) in enumerate(made):
         alike.setdefault(setup.center_of_compliance.tobytes(), []).append(i)
     found = dict[int, Ended]()
     for which in alike.values():
-        some, sizes = [trials[i] for i in which], [len(trials[i].rngs) for i in which]
-        draws = {key: np.concatenate([each.draws[key] for each in some]) for key in some[0].draws}
-        rngs = [rng for each in some for rng in each.rngs]
+        some, sizes = [trials[i] for i in which], [len(trials[i][1]) for i in which]
+        draws = {key: np.concatenate([each[key] for each, _ in some]) for key in some[0][0]}
+        rngs = [rng for _, each in some for rng in each]
         skill = Blocks([made[i][0] for i in which], sizes)
         done = simulate(skill, made[which[0]][1], draws, rngs, duration_s=duration_s)
         parts = (np.split(values, np.cumsum(sizes)[:-1]) for values in (done.success, done.duration_s))

@@ -31,7 +31,7 @@ from skillframe_papers.rows.skills import Ran
 SEED, EACH = 74_000, 2
 SETS, QUICK_SETS = 4, 1
 TURNS, QUICK_TURNS = 4, 1
-SHARE, LONGEST_S = 0.9, 10.0
+SHARE, LONGEST_S, QUICK_LONGEST_S = 0.9, 10.0, 6.0
 LEAST_DEG, MOST_DEG = 40.0, 80.0
 QUICK_WORLDS = ("peg",)
 WORLDS = {"valley": ("valley", None), "peg": ("peg_in_hole", "tip")}
@@ -58,13 +58,14 @@ def turned(seed: int) -> RobotModel:
 
 
 def _run(
-    robot: RobotModel, scene: Scene, documents: Sequence[Document], centre: str | None
+    robot: RobotModel, scene: Scene, documents: Sequence[Document], centre: str | None, quick: bool
 ) -> list[NDArray[np.bool_]]:  # fmt: skip
     """Whether skills do the task, each from every start that was shown."""
     starts = scene.task.starts
     draws = {key: np.array([start.get(key, 0.0) for start in starts]) for key in starts[0]}
     trials = [Trials(each, draws, [np.random.default_rng([SEED, k]) for k in range(len(starts))]) for each in documents]
-    return successes(robot, scene, trials, duration_s=LONGEST_S, center=centre)
+    longest = QUICK_LONGEST_S if quick else LONGEST_S
+    return successes(robot, scene, trials, duration_s=longest, center=centre)
 
 
 def _executed(job: RowRun, name: str) -> dict[Case, Ran]:
@@ -76,9 +77,9 @@ def _executed(job: RowRun, name: str) -> dict[Case, Ran]:
     shown = [record(plain, scene, person, count=EACH, seed=first + i).demonstrations for i in sets]
     options = [LearnOptions(axes=axes) for axes in NAMES]
     documents = [learned(registry().skill("lmc"), list(each), option) for option in options for each in shown]
-    still = np.array(_run(plain, scene, documents, centre))
+    still = np.array(_run(plain, scene, documents, centre, job.quick))
     turns = range(job.count(TURNS, QUICK_TURNS))
-    moved = np.concatenate([_run(turned(first + k), scene, documents, centre) for k in turns], axis=1)
+    moved = np.concatenate([_run(turned(first + k), scene, documents, centre, job.quick) for k in turns], axis=1)
     found = dict[Case, Ran]()
     for axes, before, after in zip(NAMES, *(np.split(won, len(NAMES)) for won in (still, moved)), strict=True):
         found |= {Case(name, axes, False): Ran(before), Case(name, axes, True): Ran(after)}

@@ -37,6 +37,7 @@ from skillframe_papers.rows.phases import (
 )
 
 FAR_S = 0.35
+QUICK_MOVED, QUICK_PACED = ("corner",), ("corner", "hose coupler")
 CLOCK = "a clock"
 SLOW, FAST = 0.75, 1.5
 """Pace of the people who show what is followed in row 18 over that of those who taught, so that no clock can do it."""
@@ -143,7 +144,7 @@ def moved(job: RowRun) -> RowResult:
     groups, key, seed = groups_of(job), key_of(job), SEED + job.seed
     shift, rows, told = float(job.settings["table.moved"]), list[tuple[str, ...]](), list[str]()
     shares, beside = list[Verdict](), True
-    for name in TASKS:
+    for name in QUICK_MOVED if job.quick else TASKS:
         half = _half(job, groups)
         up = demonstrated(key, seed + 1, half, name, shift)
         new = [*up, *demonstrated(key, seed + 2, groups * EACH - half, name, -shift)]
@@ -179,7 +180,7 @@ def online(job: RowRun) -> RowResult:
     """Row 18: phases followed online."""
     groups, key, seed = groups_of(job), key_of(job), SEED + job.seed
     rows, all_of, clock = list[tuple[str, ...]](), list[Followed](), 0
-    for name in TASKS:
+    for name in QUICK_PACED if job.quick else TASKS:
         half = _half(job, groups)
         new = demonstrated(key, seed + 3, half, name, 0.0, SLOW)
         new = (*new, *demonstrated(key, seed + 4, groups * EACH - half, name, 0.0, FAST))

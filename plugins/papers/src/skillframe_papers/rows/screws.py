@@ -17,8 +17,7 @@ import numpy as np
 from skillframe.demonstration.record import Demonstration
 from skillframe.document.source import learned
 from skillframe.errors import SkillframeError
-from skillframe.execution.executor import simulate
-from skillframe.execution.prepare import load_robot_model, load_world, prepare
+from skillframe.execution.prepare import load_robot_model, load_world
 from skillframe.extend.records import Document, LearnOptions, RowResult, RowRun
 from skillframe.extend.registry import registry
 from skillframe.frames import Float
@@ -26,6 +25,7 @@ from skillframe.teaching.sessions import record
 from skillframe.teaching.teacher import TeacherSettings
 from skillframe.world.scene import Scene
 from skillframe_papers.bars import ahead, counted, judged, together
+from skillframe_papers.rows.blocks import Trials, successes
 from skillframe_papers.rows.skills import Ran
 
 SEED, EACH = 68_000, 3
@@ -122,11 +122,13 @@ def screw(job: RowRun) -> RowResult:
         ways = {OURS: given, PUSH: without(given, "rotation"), TURN: without(given, "translation")}
         if not job.quick:
             ways |= {LOOSE: paced(given), HAND: _hand(given)}
-        for name, document in ways.items():
-            skill, setup = prepare(load_robot_model("panda"), scene, document, "tip")
-            rngs = [np.random.default_rng([seed, 2, k]) for k in range(count)]
-            result = simulate(skill, setup, _draws(count, seed), rngs, duration_s=LONGEST_S)
-            won.setdefault(name, []).append(result.success.tolist())
+        trials = [
+            Trials(each, _draws(count, seed), [np.random.default_rng([seed, 2, k]) for k in range(count)])
+            for each in ways.values()
+        ]
+        done = successes(load_robot_model("panda"), scene, trials, duration_s=LONGEST_S, center="tip")
+        for name, success in zip(ways, done, strict=True):
+            won.setdefault(name, []).append(success.tolist())
         job.tell(f"set {i}: {', '.join(f'{name} {sum(hits[-1])}' for name, hits in won.items())} of {count}")
     return _told(job, {name: Ran(np.array(hits)) for name, hits in won.items()}, told, unable)
 

@@ -28,6 +28,7 @@ from skillframe_papers.rows.blocks import Trials, successes
 SEED = 64_000
 SETS, QUICK_SETS = 6, 1
 SHARE = 0.9
+LONGEST_S, QUICK_LONGEST_S = 15.0, 8.0
 REACH_M, SPREAD_DEG = 0.06, 8.0
 TILTS_DEG = (4.0, 8.0, 12.0)
 WRIST, TIP = [0.0, 0.0, 0.0], [0.0, 0.0, 0.2]
@@ -87,7 +88,8 @@ def run(
         Trials(each, draws, [np.random.default_rng([job.seed, i]) for i in range(count)])
         for documents in given.values() for each in documents
     ]  # fmt: skip
-    done = iter(successes(load_robot_model(robot), scene, trials, duration_s=15.0, center=center))
+    longest = QUICK_LONGEST_S if job.quick else LONGEST_S
+    done = iter(successes(load_robot_model(robot), scene, trials, duration_s=longest, center=center))
     return {name: Ran(np.array([next(done) for _ in documents])) for name, documents in given.items()}
 
 
@@ -121,7 +123,7 @@ def region(job: RowRun) -> RowResult:
     none = "the same pushes, stiff"
     given = {
         "learned": skills, none: [stiff(s, "translation", STIFF_N_M) for s in skills],
-        "by hand: straight down, free across": [by_hand()],
+        **({} if job.quick else {"by hand: straight down, free across": [by_hand()]}),
     }  # fmt: skip
     found = run(job, "valley", given, starts, "free_tool")
     return _judged(
@@ -135,34 +137,43 @@ def _tilts(job: RowRun) -> dict[str, list[float]]:
     return {"start.tilt_y": np.radians(np.linspace(-SPREAD_DEG, SPREAD_DEG, job.count(5, 3))).tolist()}
 
 
+STIFF_TURN = "the same, stiff in rotation"
+
+
 @cache
-def _pegs(key: Key, seed: int, quick: bool, each: int) -> dict[str, Ran]:
-    """Pegs learned from `each` demonstrations, run by an arm about their tips, and the same with a stiff attitude."""
+def _pegs(key: Key, seed: int, quick: bool) -> dict[int, dict[str, Ran]]:
+    """By number of demonstrations: pegs learned from so many and run by an arm, and the same with a stiff attitude.
+
+    All turn about their tips, and run side by side.
+    """
     job = RowRun(settings=dict(key), seed=seed, quick=quick)
-    skills = skills_of(job, "peg_in_hole", each)
-    turned = [stiff(s, "rotation", STIFF_TURN_NM_RAD) for s in skills]
-    given = {
-        f"learned from {each}": skills, "the same, stiff in rotation": turned,
-        "by hand: straight down, free along x, turning about y": [by_hand(turn="y")],
-    }  # fmt: skip
-    return run(job, "peg_in_hole", given, _tilts(job), "panda", "tip")
+    given = dict[str, Sequence[Document]]()
+    for each in (1, 2):
+        skills = skills_of(job, "peg_in_hole", each)
+        given |= {f"learned from {each}": skills, f"{each}": [stiff(s, "rotation", STIFF_TURN_NM_RAD) for s in skills]}
+    hand = {} if quick else {"by hand: straight down, free along x, turning about y": [by_hand(turn="y")]}
+    found = run(job, "peg_in_hole", given | hand, _tilts(job), "panda", "tip")
+    return {
+        each: {f"learned from {each}": found[f"learned from {each}"], STIFF_TURN: found[f"{each}"]}
+        | {name: found[name] for name in hand}
+        for each in (1, 2)
+    }
 
 
 def peg(job: RowRun) -> RowResult:
     """Row 28: pegs learned from two demonstrations, inserted by an arm from varying starting orientation."""
-    found = _pegs(tuple(sorted(job.settings.items())), job.seed, job.quick, 2)
+    found = _pegs(tuple(sorted(job.settings.items())), job.seed, job.quick)[2]
     return _judged(
-        job, found, "the same, stiff in rotation",
-        f"runs of a Panda insert from tilts within {SPREAD_DEG:g} degrees",
+        job, found, STIFF_TURN, f"runs of a Panda insert from tilts within {SPREAD_DEG:g} degrees",
         "Learned with a free tool from +8 and -8 degrees, steered about the tip.",
     )  # fmt: skip
 
 
 def single(job: RowRun) -> RowResult:
     """Row 29: the same from one demonstration, which started from one side."""
-    found = _pegs(tuple(sorted(job.settings.items())), job.seed, job.quick, 1)
+    found = _pegs(tuple(sorted(job.settings.items())), job.seed, job.quick)[1]
     return _judged(
-        job, found, "the same, stiff in rotation",
+        job, found, STIFF_TURN,
         f"runs of a Panda insert from tilts within {SPREAD_DEG:g} degrees, learned from one demonstration",
         "The demonstration starts at +8 degrees.",
     )  # fmt: skip

@@ -91,15 +91,15 @@ def slave(job: RowRun) -> RowResult:
         "none": found.of("C", stuck=False), "the master's alone (the null)": stuck_in(key, job.seed, 0, job.quick),
         SLAVE: stuck_in(key, job.seed, 1, job.quick), "both": found.of("C", stuck=True),
     }  # fmt: skip
-    tilts = (4.0, -4.0, 8.0, -8.0)
+    tilts = (8.0, -8.0) if job.quick else (4.0, -4.0, 8.0, -8.0)
     ends = {where: [_ended(rows, tilt) for tilt in tilts] for where, rows in cases.items()}
     worked = {where: [text.startswith("success") for text in each] for where, each in ends.items()}
-    none, master, slave, _ = (each[2:] for each in worked.values())
+    none, master, slave, _ = (each[-2:] for each in worked.values())
     good = all(none) and all(master) and not any(slave)
     return RowResult(
         ours=f"C from 8 degrees, signs that insert: {sum(none)} of 2 without joint friction, {sum(master)} with the "
-        f"master's alone, {sum(slave)} with the slave's alone; from 4 degrees with the slave's: "
-        f"{sum(worked[SLAVE][:2])} of 2",
+        f"master's alone, {sum(slave)} with the slave's alone"
+        + ("" if job.quick else f"; from 4 degrees with the slave's: {sum(worked[SLAVE][:2])} of 2"),
         verdict="pass" if good else "fail", head=("joint friction in", *(f"{tilt:+g} degrees" for tilt in tilts)),
         rows=[(where, *each) for where, each in ends.items()],
         difference=f"Null: the same friction in the master's joints, where the bar has {sum(not w for w in master)} of "

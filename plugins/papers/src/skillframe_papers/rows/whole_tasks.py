@@ -19,7 +19,7 @@ from skillframe_baselines.document import ReplaySettings
 from skillframe.demonstration.record import Demonstration
 from skillframe.document.source import learned
 from skillframe.errors import InputError
-from skillframe.execution.executor import Setup, simulate
+from skillframe.execution.executor import Setup
 from skillframe.execution.prepare import load_robot_model, load_world, prepare
 from skillframe.extend.records import LearnOptions, RowResult, RowRun, Verdict
 from skillframe.extend.registry import registry
@@ -30,6 +30,7 @@ from skillframe.teaching.sessions import record
 from skillframe.teaching.teacher import TeacherSettings
 from skillframe.world.scene import Scene
 from skillframe_papers.bars import ahead, counted, judged, together
+from skillframe_papers.rows.blocks import ran_made
 from skillframe_papers.rows.skills import Ran
 
 SEED, EACH = 67_000, 3
@@ -106,6 +107,10 @@ def _draws(task: Whole, scene: Scene, count: int, seed: int) -> dict[str, Float]
     return draws
 
 
+def _rngs(count: int, seed: int) -> list[np.random.Generator]:
+    return [np.random.default_rng([seed, 2, k]) for k in range(count)]
+
+
 def _executed(job: RowRun, name: str) -> dict[str, Ran]:
     """Successes by method, set and start."""
     task, person = TASKS[name], TeacherSettings(aim_noise=radians(job.settings["teacher.aim_noise_deg"]))
@@ -116,14 +121,11 @@ def _executed(job: RowRun, name: str) -> dict[str, Ran]:
         seed = SEED + 1000 * job.seed + i
         shown = record(load_robot_model("free_tool"), scene, person, count=EACH, seed=seed, duration_s=20.0)
         methods = _methods(list(shown.demonstrations), task, scene, won)
+        given = [(_draws(task, scene, count, seed), _rngs(count, seed)) for _ in methods]
+        done = ran_made([each() for each in methods.values()], given, duration_s=LONGEST_S)
+        ended = dict(zip(methods, done, strict=True))
         for way, hits in won.items():
-            if way not in methods:
-                hits.append([False] * count)
-                continue
-            skill, setup = methods[way]()
-            rngs = [np.random.default_rng([seed, 2, k]) for k in range(count)]
-            draws = _draws(task, scene, count, seed)
-            hits.append(simulate(skill, setup, draws, rngs, duration_s=LONGEST_S).success.tolist())
+            hits.append(ended[way].success.tolist() if way in ended else [False] * count)
         job.tell(f"{name}, set {i}: {', '.join(f'{way} {sum(hits[-1])}' for way, hits in won.items())} of {count}")
     return {way: Ran(np.array(hits)) for way, hits in won.items()}
 
