@@ -106,9 +106,16 @@ def _rotation_vector_near_pi(rotation: Float, w: Float, angle: Float) -> Float:
     return axis * (sign * angle)[..., None]
 
 
+_UPRIGHT = np.eye(3)
+
+
 def rotation_matrix(vector: ArrayLike) -> Float:
     """Exponential of rotation vectors (..., 3): Rodrigues' formula, exact to rounding for every angle."""
     v = np.asarray(vector, dtype=float)
+    if not v.any():  # what does not turn, which is most of what is asked in a tick
+        still = np.empty((*v.shape[:-1], 3, 3))
+        still[...] = _UPRIGHT
+        return still
     angle = norm(v)
     small = angle < 1e-6
     safe = np.where(small, 1.0, angle)

@@ -216,8 +216,8 @@ def _search() -> Iterable[RowType]:
     yield RowType(
         name="41", summary="a search that exerts the forces it was shown finds more on a soft arm",
         published="trajectory augmented with learned forces", source=SEARCH,
-        bar="arm of 500 N/m, 13.4 s (quick: 10): at least 75 % of the peg's holes (by count), by 95 % intervals more than the same "
-        "search with a constant push",
+        bar="arm of 500 N/m, 13.4 s (quick: 10): at least 75 % of the peg's holes (by count), by 95 % intervals more "
+        "than the same search with a constant push",
         calibrated="the fillet of the part, and the arm's 500 N/m, at which it had been seen", settings=SEARCHED,
         group="search", run=Lazy("skillframe_papers.rows.search:soft"),
     )  # fmt: skip
@@ -251,7 +251,7 @@ def _phases() -> Iterable[RowType]:
               "followed:moved")  # fmt: skip
     yield row("18", "the phase is recognised online by the forward algorithm", "online",
               "new demonstrations at another pace: 90 % of the policies without a mistake (every change within 0.3 s, "
-              "no switch elsewhere), by 95 % intervals more than a clock (quick: not in the valley)",
+              "no switch elsewhere), by 95 % intervals more than a clock (quick: the hose coupler)",
               "followed:online")  # fmt: skip
     yield row("26", "stops and force thresholds do not tolerate errors", "not error-tolerant",
               "in every world: the phase model finds at least 90 % of the changes within 0.3 s (by count), and by 95 % "

@@ -37,7 +37,7 @@ from skillframe_papers.rows.phases import (
 )
 
 FAR_S = 0.35
-QUICK_MOVED, QUICK_PACED = ("corner",), ("corner", "hose coupler")
+QUICK_MOVED, QUICK_PACED = ("corner",), ("hose coupler",)
 CLOCK = "a clock"
 SLOW, FAST = 0.75, 1.5
 """Pace of the people who show what is followed in row 18 over that of those who taught, so that no clock can do it."""

@@ -28,7 +28,7 @@ from skillframe_papers.rows.blocks import Trials, successes
 SEED = 64_000
 SETS, QUICK_SETS = 6, 1
 SHARE = 0.9
-LONGEST_S, QUICK_LONGEST_S = 15.0, 8.0
+LONGEST_S, QUICK_LONGEST_S = 15.0, 6.0
 REACH_M, SPREAD_DEG = 0.06, 8.0
 TILTS_DEG = (4.0, 8.0, 12.0)
 WRIST, TIP = [0.0, 0.0, 0.0], [0.0, 0.0, 0.2]
@@ -134,7 +134,7 @@ def region(job: RowRun) -> RowResult:
 
 
 def _tilts(job: RowRun) -> dict[str, list[float]]:
-    return {"start.tilt_y": np.radians(np.linspace(-SPREAD_DEG, SPREAD_DEG, job.count(5, 3))).tolist()}
+    return {"start.tilt_y": np.radians(np.linspace(-SPREAD_DEG, SPREAD_DEG, job.count(5, 2))).tolist()}
 
 
 STIFF_TURN = "the same, stiff in rotation"

@@ -155,7 +155,7 @@ class _Runs(NamedTuple):
 
 @cache
 def stuck_in(settings: tuple[tuple[str, float], ...], seed: int, arm: int, quick: bool) -> list[Row]:
-    """Configuration C at 4 (not quick) and 8 degrees of both signs with joint friction in one arm alone: 0 master, 1 slave."""
+    """Configuration C at 4 (not quick) and 8 degrees of both signs, joint friction in one arm: 0 master, 1 slave."""
     values = dict(settings)
     robot = sticking(load_robot_model("dual_panda"), arm)
     scene = load_world("dual_peg", {"friction": values["world.friction"]})
