@@ -193,7 +193,7 @@ def _search() -> Iterable[RowType]:
     yield RowType(
         name="13", summary="learned search finds the hole (peg) and the socket", published="85 % peg, 67 % socket",
         source=SEARCH, bar="samples and ergodic control each: peg at least 75 %, socket at least 60 %, random walk at "
-        "least 30 points below (quick: samples on the peg alone, in 10 s)",
+        "least 30 points below (quick: samples on the peg alone, in 7 s)",
         calibrated=chosen, settings=SEARCHED, group="search",
         run=Lazy("skillframe_papers.rows.search:found"),
     )  # fmt: skip
@@ -216,7 +216,7 @@ def _search() -> Iterable[RowType]:
     yield RowType(
         name="41", summary="a search that exerts the forces it was shown finds more on a soft arm",
         published="trajectory augmented with learned forces", source=SEARCH,
-        bar="arm of 500 N/m, 13.4 s (quick: 10): at least 75 % of the peg's holes (by count), by 95 % intervals more "
+        bar="arm of 500 N/m, 13.4 s (quick: 7): at least 75 % of the peg's holes (by count), by 95 % intervals more "
         "than the same search with a constant push",
         calibrated="the fillet of the part, and the arm's 500 N/m, at which it had been seen", settings=SEARCHED,
         group="search", run=Lazy("skillframe_papers.rows.search:soft"),

@@ -31,7 +31,7 @@ from skillframe_papers.rows.skills import Ran
 SEED, EACH = 68_000, 3
 SETS, QUICK_SETS = 4, 1
 STARTS, QUICK_STARTS = 6, 2
-SHARE, LONGEST_S, QUICK_LONGEST_S = 0.9, 14.0, 10.0
+SHARE, LONGEST_S = 0.9, 14.0
 PEOPLE, ATTEMPTS = 10, 4
 """Simulated people who are asked at most, and how often each tries a demonstration again."""
 GENTLE_N = 4.0
@@ -109,7 +109,6 @@ def screw(job: RowRun) -> RowResult:
     scene = load_world("bayonet", {"friction": job.settings["world.friction"]})
     person = TeacherSettings(aim_noise=radians(job.settings["teacher.aim_noise_deg"]), force_max=GENTLE_N)
     sets, count = job.count(SETS, QUICK_SETS), job.count(STARTS, QUICK_STARTS)
-    longest = QUICK_LONGEST_S if job.quick else LONGEST_S
     won, told, unable = dict[str, list[list[bool]]](), 0, 0
     for i in range(sets):
         seed = SEED + 1000 * job.seed + i
@@ -127,7 +126,7 @@ def screw(job: RowRun) -> RowResult:
             Trials(each, _draws(count, seed), [np.random.default_rng([seed, 2, k]) for k in range(count)])
             for each in ways.values()
         ]
-        done = successes(load_robot_model("panda"), scene, trials, duration_s=longest, center="tip")
+        done = successes(load_robot_model("panda"), scene, trials, duration_s=LONGEST_S, center="tip")
         for name, success in zip(ways, done, strict=True):
             won.setdefault(name, []).append(success.tolist())
         job.tell(f"set {i}: {', '.join(f'{name} {sum(hits[-1])}' for name, hits in won.items())} of {count}")

@@ -25,7 +25,7 @@ GOALS, QUICK_GOALS = 60, 4
 GIVEN, QUICK_GIVEN = 5, 3  # demonstrations
 SHOWN_S, QUICK_SHOWN_S = 30.0, 6.0  # how long a person searches
 BUDGETS = (3.0, 7.0, 13.4, 20.0)
-QUICK_S, SOFT_S = 10.0, 13.4
+QUICK_S, SOFT_S = 7.0, 13.4
 """What a quick run gives a search in place of 20 s, and every run at most on a soft arm."""
 SOFT_N_M = 500.0
 EARLY_S = 7.0

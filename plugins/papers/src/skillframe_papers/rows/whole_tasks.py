@@ -36,7 +36,7 @@ from skillframe_papers.rows.skills import Ran
 SEED, EACH = 67_000, 3
 SETS, QUICK_SETS = 4, 1
 STARTS, QUICK_STARTS = 6, 2
-SHARE, LONGEST_S, QUICK_LONGEST_S = 0.9, 20.0, 12.0
+SHARE, LONGEST_S = 0.9, 20.0
 ONE, SHIFTED, PLACED, HALVES = "one phase", "replay, shifted", "replay, in its place", "cut in the middle"
 NULLS = (ONE, SHIFTED, PLACED)
 QUICK_ONLY = ("policy", ONE, SHIFTED)
@@ -122,9 +122,7 @@ def _executed(job: RowRun, name: str) -> dict[str, Ran]:
         shown = record(load_robot_model("free_tool"), scene, person, count=EACH, seed=seed, duration_s=20.0)
         methods = _methods(list(shown.demonstrations), task, scene, won)
         given = [(_draws(task, scene, count, seed), _rngs(count, seed)) for _ in methods]
-        done = ran_made(
-            [each() for each in methods.values()], given, duration_s=QUICK_LONGEST_S if job.quick else LONGEST_S
-        )
+        done = ran_made([each() for each in methods.values()], given, duration_s=LONGEST_S)
         ended = dict(zip(methods, done, strict=True))
         for way, hits in won.items():
             hits.append(ended[way].success.tolist() if way in ended else [False] * count)
