@@ -7,7 +7,7 @@ so that it hangs. (Mirroring both arms is reversing the sign of the tilt, gravit
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, product
 from typing import NamedTuple
@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 from skillframe_dualarm.document import Phase
+from skillframe_dualarm.dual_peg import REACH
 from skillframe_dualarm.runtime import DualArm
 
 from skillframe.errors import UnknownName
@@ -123,6 +124,22 @@ def insert(
     )[0]
 
 
+def at_start(tilt_rad: Float) -> dict[str, Float]:
+    """Quantities of a pair whose peg starts tilted, and its arm with it: what is commanded goes along the peg."""
+    return {"start.tilt_y": tilt_rad}
+
+
+def in_the_grasp(tilt_rad: Float) -> dict[str, Float]:
+    """Of a pair whose peg sits askew in the master's grip, its tip in its place: the arm goes along the hole.
+
+    The grip is turned about the wrist, so that it is moved by as much as the tip would go.
+    """
+    return {
+        "grasp.tilt_y": tilt_rad, "grasp.offset_x": -REACH * np.sin(tilt_rad),
+        "grasp.offset_z": REACH * (1.0 - np.cos(tilt_rad)),
+    }  # fmt: skip
+
+
 class Asked(NamedTuple):
     """Insertions of one phase: every friction [Nm] and tilt [degrees], frictions first."""
 
@@ -133,7 +150,7 @@ class Asked(NamedTuple):
 
 def side_by_side(
     robot: RobotModel, scene: Scene, asked: Sequence[Asked], *, posture: str = "upright", seed: int = 0,
-    duration_s: float = 30.0, to_the_bottom: bool = False,
+    duration_s: float = 30.0, to_the_bottom: bool = False, tilted: Callable[[Float], dict[str, Float]] = at_start,
 ) -> list[list[Row]]:  # fmt: skip
     """Insertions, those about the same points in one simulation: each is, to the last bit, what it is alone.
 
@@ -147,6 +164,7 @@ def side_by_side(
         seed: of the sensors' noise.
         duration_s: after which an insertion has failed.
         to_the_bottom: see above.
+        tilted: quantities of tilts [rad]: how they come about.
 
     Returns:
         by what was asked, its rows.
@@ -163,7 +181,7 @@ def side_by_side(
             robot=robot, scene=scene, center_of_compliance=_points(asked[which[0]].phase),
             stop_when=None if to_the_bottom else scene.goal,
         )  # fmt: skip
-        draws = {"start.tilt_y": np.radians(tilt), "robot.joint_friction": friction}
+        draws = {**tilted(np.radians(tilt)), "robot.joint_friction": friction}
         rngs = [np.random.default_rng([seed, i]) for pair in pairs for i in range(len(pair))]
         skill = Blocks([DualArm(asked[i].phase) for i in which], [len(pair) for pair in pairs])
         rows = iter(rows_of(simulate_arms(skill, setup, draws, rngs, duration_s=duration_s), robot, tilt, friction))
