@@ -1,7 +1,8 @@
-"""Rows 43 and 44 of the papers' results: two arms whose peg sits askew in the grip, as the two-arm paper has its errors.
+"""Rows 43 and 44 of the papers' results: two arms whose peg sits askew in the grip, as the paper has its errors.
 
 "Pose errors originating from inaccurate grasping", says the paper. Rows 7 to 12 tilt the peg's arm at the start, and
-what is commanded goes along the tilted peg. Here the arm goes along the hole and the peg alone is tilted, about its tip.
+what is commanded goes along the tilted peg. Here the arm goes along the hole and the peg alone is tilted, about its
+tip.
 """
 
 from __future__ import annotations
@@ -106,8 +107,11 @@ def _beaten(ours: list[Row], other: list[Row]) -> tuple[int, int]:
 
 
 def _less(one: Row, other: Row) -> bool:
-    ways = (lambda r: r.time_s, lambda r: sum(r.joint_path_rad), lambda r: r.force_n)
-    return all(way(one) < way(other) for way in ways)
+    return (
+        one.time_s < other.time_s
+        and sum(one.joint_path_rad) < sum(other.joint_path_rad)
+        and one.force_n < other.force_n
+    )
 
 
 def _told(row: Row) -> str:
