@@ -15,7 +15,7 @@ HOMES = {
     "coordinator:dual_arm": "dualarm",
     "skill:dual_arm": "dualarm",  # asked for as any other behaviour
     "world:dual_peg": "dualarm",
-    **{f"row:{number}": "papers" for number in range(1, 41)},
+    **{f"row:{number}": "papers" for number in range(1, 45)},
     "command:reproduce": "papers",
     "command:benchmark": "benchmarks",
     **{f"score:automate_{name}": "benchmarks" for name in ("distance", "height")},

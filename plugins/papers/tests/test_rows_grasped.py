@@ -1,0 +1,77 @@
+"""Verdicts of rows 41 to 44, from insertions and searches made up here, and where a peg askew in the grip is."""
+
+import numpy as np
+import pytest
+from skillframe_dualarm.dual_peg import REACH
+from skillframe_papers.rows import grasped, search
+from skillframe_papers.rows.insertion import Row, at_start, in_the_grasp
+from skillframe_papers.rows.sweep import both
+
+from skillframe.extend.records import RowRun
+from skillframe.world.plant import grasp_pose
+
+JOB = RowRun(settings={"time": 20.0, "stiffness": 2000.0})
+
+
+def test_a_peg_askew_in_the_grip_has_its_tip_where_a_straight_one_has_it():
+    tilts = np.radians([-12.0, 4.0, 12.0])
+    held = grasp_pose(in_the_grasp(tilts), 3)
+    tip = held.position + held.rotation @ [0.0, 0.0, REACH]
+    assert tip == pytest.approx(np.tile([0.0, 0.0, REACH], (3, 1)), abs=1e-12)
+    assert np.arccos(held.rotation[:, 2, 2]) == pytest.approx(np.abs(tilts))
+    assert grasp_pose(at_start(tilts), 3) is None
+
+
+def inserted(limits, less=2.0):
+    """Insertions of a configuration, up to a tilt of each sign, each with so much time, motion and force."""
+    plus, minus = limits
+    return [
+        Row(tilt_deg=t, joint_friction=0.5, outcome="success" if abs(t) <= (plus if t > 0.0 else minus) else "jam",
+            time_s=less, force_n=less, joint_path_rad=(less, 0.0), weighted_rad=(less, 0.0),
+            largest_joint_rad=(less, 0.0), turned_deg=(0.0, 0.0), reason="")
+        for t in both((4.0, 8.0, 12.0))
+    ]  # fmt: skip
+
+
+PUBLISHED = {"A": (4.0, 4.0), "B": (12.0, 12.0), "C": (4.0, 4.0), "D": (8.0, 8.0), "E": (12.0, 12.0)}
+
+
+def judged(row, monkeypatch, *, changed=None, less=1.0):
+    limits = PUBLISHED | (changed or {})
+    rows = {name: inserted(each, less if name == "E" else 2.0) for name, each in limits.items()}
+    found = grasped.Grasped(dict.fromkeys(grasped.HEIGHTS_M, rows), 0.5)
+    monkeypatch.setattr(grasped, "_grasped", lambda job: found)
+    return row(JOB)
+
+
+@pytest.mark.parametrize(("changed", "expected"), [
+    ({}, "pass"), ({"D": (4.0, 4.0)}, "pass"), ({"B": (4.0, 12.0)}, "fail"), ({"E": (0.0, 12.0)}, "fail"),
+])  # fmt: skip
+def test_the_table_with_tilts_in_the_grasp_passes_within_one_step_of_the_published(changed, expected, monkeypatch):
+    assert judged(grasped.table, monkeypatch, changed=changed).verdict == expected
+
+
+@pytest.mark.parametrize(("changed", "less", "expected"), [
+    ({}, 1.0, "pass"),
+    ({}, 2.0, "fail"),  # no less than the others
+    ({"E": (12.0, 8.0)}, 1.0, "fail"),  # B reaches further
+    (dict.fromkeys("ABCD", (0.0, 0.0)), 1.0, "fail"),  # nobody to compare with
+])  # fmt: skip
+def test_e_is_best_only_if_it_reaches_furthest_and_takes_less_of_everything(changed, less, expected, monkeypatch):
+    assert judged(grasped.best, monkeypatch, changed=changed, less=less).verdict == expected
+
+
+def searched(*hits, count=30):
+    return [search.Tried(np.where(np.arange(count) < each, 1.0, np.inf), {}) for each in hits]
+
+
+@pytest.mark.parametrize(("ours", "null", "expected"), [(27, 10, "pass"), (27, 25, "fail"), (10, 0, "fail")])
+def test_learned_forces_must_find_enough_and_more_than_a_constant_push(ours, null, expected, monkeypatch):
+    monkeypatch.setattr(search, "tried", lambda *_: searched(ours, null))
+    assert search.soft(JOB).verdict == expected
+
+
+@pytest.mark.parametrize(("ours", "null", "expected"), [(27, 10, "pass"), (27, 25, "fail"), (10, 0, "fail")])
+def test_ergodic_control_must_find_enough_and_more_than_the_random_walk(ours, null, expected, monkeypatch):
+    monkeypatch.setattr(search, "tried", lambda *_: searched(ours, null))
+    assert search.ergodic(JOB).verdict == expected
