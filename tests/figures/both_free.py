@@ -9,39 +9,23 @@ upright, the fixture at 0.75 m. "12 / 12" would be the paper's. Configuration B,
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
 from types import MappingProxyType
 from typing import NamedTuple
 
-import numpy as np
-from skillframe_dualarm.document import Phase
-from skillframe_dualarm.dual_peg import REACH, DualPegParams, build
-from skillframe_dualarm.runtime import DualArm
+from skillframe_dualarm.dual_peg import DualPegParams, build
 from skillframe_papers.published import INSERTION
-from skillframe_papers.rows.blocks import Blocks
+from skillframe_papers.rows.insertion import Asked, at_start, in_the_grasp, largest, side_by_side
 from skillframe_papers.rows.sweep import both, phase_of
 
 from skillframe.control import controller
-from skillframe.execution.arms import simulate_arms
 from skillframe.execution.prepare import load_robot_model
-from skillframe.execution.setup import Setup
 from skillframe.frames import Float
 
 TILTS_DEG = (4.0, 8.0, 12.0)
 NAMES = ("E", "B")
 Draws = dict[str, Float]
-
-
-def at_start(tilt: Float) -> Draws:
-    """The peg's arm starts tilted: the rows' way."""
-    return {"start.tilt_y": tilt}
-
-
-def in_the_grasp(tilt: Float) -> Draws:
-    """The peg sits askew in the master's grip, its tip where it should be."""
-    return {"grasp.tilt_y": tilt, "grasp.offset_x": -REACH * np.sin(tilt), "grasp.offset_z": REACH * (1 - np.cos(tilt))}
 
 
 def in_the_slave(tilt: Float) -> Draws:
@@ -56,7 +40,7 @@ class Tried(NamedTuple):
         name: what is changed.
         start: how a tilt [rad] comes about.
         friction: of the joints [Nm].
-        phase: what changes of the motion.
+        phase: what changes of the motion, of the rows' settings.
         spring: of the null space, in 1/s2.
         seconds: simulated at most.
     """
@@ -104,25 +88,14 @@ def sprung(spring: float) -> Iterator[None]:
         law._null_space = plain  # type: ignore[method-assign]
 
 
-def reached(tried: Tried, names: Sequence[str] = NAMES) -> dict[str, tuple[float, float]]:
-    """By configuration: largest tilt [degrees] up to which all are inserted, of either sign. 0: not even 4."""
+def reached(tried: Tried) -> list[tuple[float, float]]:
+    """Of each of `NAMES`: largest tilt [degrees] up to which all are inserted, of either sign. 0: not even 4."""
     robot, scene = load_robot_model("dual_panda"), build(DualPegParams(friction=INSERTION["world.friction"]))
-    phases: list[Phase] = [replace(phase_of(n, scene.tool.frames, INSERTION), **tried.phase) for n in names]
-    points = np.array([arm.center_of_compliance for arm in phases[0].arms])
-    tilts = np.tile(both(TILTS_DEG), len(names))
-    each = 2 * len(TILTS_DEG)
-    draws = {**tried.start(np.radians(tilts)), "robot.joint_friction": np.full(len(tilts), tried.friction)}
-    setup = Setup(robot=robot, scene=scene, center_of_compliance=points, stop_when=scene.goal)
-    skill = Blocks([DualArm(phase) for phase in phases], [each] * len(names))
-    rngs = [np.random.default_rng([0, i % each]) for i in range(len(tilts))]
+    values = {**INSERTION, **tried.phase}
+    asked = [Asked(phase_of(n, scene.tool.frames, values), both(TILTS_DEG), [tried.friction]) for n in NAMES]
     with sprung(tried.spring):
-        won = simulate_arms(skill, setup, draws, rngs, duration_s=tried.seconds).success.reshape(len(names), 2, -1)
-    return {name: (_largest(plus), _largest(minus)) for name, (plus, minus) in zip(names, won, strict=True)}
-
-
-def _largest(won: Sequence[bool]) -> float:
-    good = next((i for i, each in enumerate(won) if not each), len(won))
-    return TILTS_DEG[good - 1] if good else 0.0
+        found = side_by_side(robot, scene, asked, duration_s=tried.seconds, tilted=tried.start)
+    return [(largest(rows, 1, tried.friction), largest(rows, -1, tried.friction)) for rows in found]
 
 
 if __name__ == "__main__":
@@ -131,5 +104,4 @@ if __name__ == "__main__":
     only = parser.parse_args().only
     print("| tried | E, + / - | B, + / - |\n|---|---|---|")
     for tried in (each for each in TRIED if any(word in each.name for word in only)):
-        ends = reached(tried)
-        print(f"| {tried.name} | {' | '.join(f'{p:g} / {m:g}' for p, m in ends.values())} |", flush=True)
+        print(f"| {tried.name} | {' | '.join(f'{p:g} / {m:g}' for p, m in reached(tried))} |", flush=True)
