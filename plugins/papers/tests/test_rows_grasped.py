@@ -1,13 +1,16 @@
-"""Verdicts of rows 41 to 44, from insertions and searches made up here, and where a peg askew in the grip is."""
+"""Verdicts of rows 41 to 44, from insertions and searches made up here, and what runs side by side."""
 
 import numpy as np
 import pytest
 from skillframe_dualarm.dual_peg import REACH
 from skillframe_papers.rows import grasped, search
+from skillframe_papers.rows.blocks import Blocks
 from skillframe_papers.rows.insertion import Row, at_start, in_the_grasp
 from skillframe_papers.rows.sweep import both
 
 from skillframe.extend.records import RowRun
+from skillframe.frames import Pose
+from skillframe.skill import Command, Impedance, Observation, Skill, no_reasons
 from skillframe.world.plant import grasp_pose
 
 JOB = RowRun(settings={"time": 20.0, "stiffness": 2000.0})
@@ -75,3 +78,33 @@ def test_learned_forces_must_find_enough_and_more_than_a_constant_push(ours, nul
 def test_ergodic_control_must_find_enough_and_more_than_the_random_walk(ours, null, expected, monkeypatch):
     monkeypatch.setattr(search, "tried", lambda *_: searched(ours, null))
     assert search.ergodic(JOB).verdict == expected
+
+
+class Says(Skill):
+    """Says the very same gains until it is given others."""
+
+    def __init__(self, gain):
+        self.impedance = Impedance(np.full((6, 6), gain))
+
+    def start(self, observation, rngs):
+        pass
+
+    def step(self, observation):
+        many = np.zeros((*observation.twist.shape[:-1], 6))
+        count = len(many)
+        return Command(observation.pose, many, self.impedance, many, np.zeros(count, dtype=int), no_reasons(count))
+
+
+def test_gains_of_skills_side_by_side_stay_the_very_same_arrays_until_one_says_others():
+    skills = [Says(1.0), Says(2.0)]
+    blocks = Blocks(skills, [1, 2])
+    seen = Observation(
+        np.zeros(3), 1e-3, Pose(np.zeros((3, 3)), np.tile(np.eye(3), (3, 1, 1))), np.zeros((3, 6)), np.zeros((3, 6))
+    )
+    first, again = (blocks.step(seen).impedance for _ in range(2))
+    assert first.stiffness[:, 0, 0].tolist() == [1.0, 2.0, 2.0] and again.stiffness is first.stiffness
+    skills[1].impedance = Impedance(np.full((2, 6, 6), 3.0))
+    assert blocks.step(seen).impedance.stiffness[:, 0, 0].tolist() == [1.0, 3.0, 3.0]
+    skills[0].impedance = Impedance(np.eye(6), np.eye(6))
+    with pytest.raises(ValueError, match="damping"):
+        blocks.step(seen)
