@@ -16,6 +16,7 @@ from skillframe_papers.rows.insertion import PUBLISHED, Asked, Row, in_the_grasp
 from skillframe_papers.rows.sweep import COARSE, HEIGHTS_M, SECONDS, both, phase_of
 
 NAMES, QUICK_NAMES = ("A", "B", "C", "D", "E"), ("B", "D", "E")
+QUICK_DEG = COARSE[::2]
 QUICK_SECONDS, NEAR_DEG, OWN_M = 7.5, 4.0, HEIGHTS_M[1]
 
 
@@ -41,7 +42,7 @@ def _grasped(job: RowRun) -> Grasped:
 @cache
 def _computed(settings: tuple[tuple[str, float], ...], seed: int, quick: bool) -> Grasped:
     values, names = dict(settings), QUICK_NAMES if quick else NAMES
-    stiff, tilts = values["robot.joint_friction"], both(COARSE)
+    stiff, tilts = values["robot.joint_friction"], both(QUICK_DEG if quick else COARSE)
     robot, scene = load_robot_model("dual_panda"), load_world("dual_peg", {"friction": values["world.friction"]})
     asked = [Asked(phase_of(name, scene.tool.frames, values), tilts, [stiff]) for name in names]
     rows = {
@@ -73,8 +74,8 @@ def table(job: RowRun) -> RowResult:
              *(" / ".join(f"{found.reach(height, name, sign):g}" for sign in (1, -1)) for height in found.rows))
             for name in own
         ],
-        difference=f"Tilts of {', '.join(f'{t:g}' for t in COARSE)} degrees, both signs. Null: the same tilts of the "
-        "whole arm at the start, which is row 7.",
+        difference=f"Tilts of {', '.join(f'{t:g}' for t in (QUICK_DEG if job.quick else COARSE))} degrees, both signs. "
+        "Null: the same tilts of the whole arm at the start, which is row 7.",
         values={name: found.reach(OWN_M, name, 1) for name in own},
     )  # fmt: skip
 
