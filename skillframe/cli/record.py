@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 _AIM = Range(0.0, pi / 2.0, "as a person who is further off aims at nothing")
 _TURN = Range(-pi, pi, "half a turn to either side")
 _DELAY = Range(0.0, 1.0, "as buses and valves take milliseconds")
+_SIGHT = Range(0.0, 0.1, "as a person sees better than to a hand's width")
 _STIFF = Range(0.0, 1e8, "stiffer than steel structures of this size")
 _RATE = Range(0.01, 1e5, "as no controller here is faster")
 QUIET_S = 5.0  # a recording that is over by then needs no progress
@@ -55,6 +56,11 @@ QUIET_S = 5.0  # a recording that is over by then needs no progress
 )
 @click.option(
     "--scale", type=POSITIVE, help="Motion scale of teleoperation; default 1, teleoperation 2, of machines 4."
+)
+@click.option(
+    "--looks",
+    type=WithUnit("m", _SIGHT),
+    help="Kinesthetic: how exactly the person sees the mouth [m].",
 )
 @click.option(
     "--force-scale", type=POSITIVE, help="Machines: force of the machine over force at the hand; default 1000."
@@ -93,8 +99,8 @@ QUIET_S = 5.0  # a recording that is over by then needs no progress
 @quiet_option
 def command(
     world: str, robot: str, teacher: str | None, out: Path, count: int, seed: int, noise: float | None,
-    delay: float | None, scale: float | None, belief: str | None, centre: str | None, rate: float | None,
-    settings: tuple[str, ...], as_json: bool, **operated: Any,
+    delay: float | None, scale: float | None, looks: float | None, belief: str | None, centre: str | None,
+    rate: float | None, settings: tuple[str, ...], as_json: bool, **operated: Any,
 ) -> int:  # fmt: skip
     """Record demonstrations of a world from a simulated person.
 
@@ -126,12 +132,13 @@ def command(
         scene, draws = scene_of(world, dict(parse_setting(text) for text in settings), depth=1)
     machine = robot_of(robot)
     teacher = teacher or ("teleoperation" if machine.spec.hydraulic else "kinesthetic")
-    _refuse_idle(teacher, (noise, delay, scale), (belief, centre))
+    _refuse_idle(teacher, {"noise": noise, "delay": delay, "scale": scale, "looks": looks}, (belief, centre))
     person: Person
     if machine.spec.hydraulic or any(map(_given, operated.values())):
+        _refuse_looks(looks, teacher)
         scene, person = _operated(machine, scene, teacher, {**operated, "noise": noise, "delay": delay, "scale": scale})
     else:
-        person = _person(scene, teacher, (noise, delay, scale), (belief, centre))
+        person = _person(scene, teacher, (noise, delay, scale, looks), (belief, centre))
     with progress("s simulated", QUIET_S) as show:
         recording = record(
             scene, machine, teacher=person, count=count, seed=seed, set=draws, rate_hz=rate, progress=note,
@@ -152,22 +159,23 @@ def command(
     return 0
 
 
-def _refuse_idle(
-    teacher: str, person: tuple[float | None, float | None, float | None], places: tuple[str | None, str | None]
-) -> None:
+def _refuse_idle(teacher: str, person: dict[str, float | None], places: tuple[str | None, str | None]) -> None:
     """Refuse options that the chosen teacher would ignore."""
     from skillframe.errors import InputError
 
     blind = teacher == "blind"
-    idle = (
-        dict(zip(("noise", "delay", "scale"), person, strict=True))
-        if blind
-        else dict(zip(("belief", "centre"), places, strict=True))
-    )
+    idle: dict[str, float | str | None] = {**person} if blind else {"belief": places[0], "centre": places[1]}
     for name, value in idle.items():
         if value is not None:
             whose = "teachers who see" if blind else "--teacher blind"
             raise InputError(f"--{name}", f"is for {whose}, not for --teacher {teacher}", "leave it out")
+
+
+def _refuse_looks(looks: float | None, teacher: str) -> None:
+    from skillframe.errors import InputError
+
+    if looks is not None:
+        raise InputError("--looks", f"is for a hand on an arm, not for --teacher {teacher}", "leave it out")
 
 
 def _operated(
@@ -204,7 +212,7 @@ def _given(value: object) -> bool:
 
 
 def _person(
-    scene: Scene, teacher: str, person: tuple[float | None, float | None, float | None],
+    scene: Scene, teacher: str, person: tuple[float | None, float | None, float | None, float | None],
     places: tuple[str | None, str | None],
 ) -> Person:  # fmt: skip
     """Somebody who sees, or is blindfolded. What is not given is as by default."""
@@ -213,8 +221,9 @@ def _person(
 
     from skillframe.api.recording import seeing
 
-    noise, delay, scale = person
+    noise, delay, scale, looks = person
     given: dict[str, Any] = {"aim_noise": None if noise is None else radians(noise), "delay_s": delay, "scale": scale}
+    given["looks"] = looks
     belief, centre = places
     given |= {"believed": None if belief is None else _place(belief, "--belief")}
     given |= {"centre": None if centre is None else _place(centre, "--centre")}

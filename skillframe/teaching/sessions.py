@@ -27,8 +27,10 @@ from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, 
 from skillframe.handover import SLOW_TICKS
 from skillframe.robot.guesses import guess_note
 from skillframe.robot.model import RobotModel
+from skillframe.skill import Skill
 from skillframe.teaching.blind import BlindSettings
-from skillframe.teaching.staged import teacher_for
+from skillframe.teaching.eyes import LookingTeacher
+from skillframe.teaching.staged import hand_of, teacher_for
 from skillframe.teaching.teacher import TeacherSettings
 from skillframe.teaching.teleoperation import OperatorSettings
 from skillframe.world.placement import fixture_poses, places_in_base
@@ -214,7 +216,7 @@ def collect(
 
 
 def _still_due(tries: deque[Try], done: Mapping[int, Demonstration]) -> list[Try]:
-    """The next that are run side by side, taken off; what has succeeded meanwhile is not due any more."""
+    """The next that are run side by side, taken off without those that have succeeded meanwhile."""
     some: list[Try] = []
     while tries and len(some) < MOST_AT_ONCE:
         one = tries.popleft()
@@ -234,7 +236,7 @@ def _attempt(
     watch: Watch | None,
 ) -> Result:  # fmt: skip
     columns = start_columns(scene, [slot for slot, _ in tries], draws)
-    teacher = teacher_for(scene, fixture_poses(robot, columns, len(tries)), settings, robot.spec.servo)
+    teacher = person_for(scene, fixture_poses(robot, columns, len(tries)), settings, robot.spec.servo)
     last = (scene.task, *scene.task.then)[-1]
     setup = Setup(
         robot=robot.guided(), scene=scene, center_of_compliance=np.array(scene.tool.frames[scene.tool.hand]),
@@ -245,6 +247,13 @@ def _attempt(
     rngs = [np.random.default_rng([seed, slot, number]) for slot, number in tries]
     told = progress_callback(watch, duration_s)
     return simulate(teacher, setup, columns, rngs, duration_s=duration_s, trace_hz=rate_hz, progress=told)
+
+
+def person_for(scene: Scene, fixture: Pose, settings: TeacherSettings, firmly: bool) -> Skill:
+    """Who demonstrates a scene: somebody who looks, if the settings say how exactly, or the teacher of its stages."""
+    if settings.looks is None:
+        return teacher_for(scene, fixture, settings, firmly)
+    return LookingTeacher(scene, fixture, settings, hand_of(scene.task, firmly))
 
 
 def _held(done: Done, ticks: float) -> Done:

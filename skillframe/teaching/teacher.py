@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.errors import UnknownName
+from skillframe.errors import InputError, UnknownName
 from skillframe.frames import Float, Pose, matrix_from_quaternion, norm, rotate, rotation_matrix, rotation_vector, unit
 from skillframe.signals.delay import require_delay
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
@@ -96,6 +96,8 @@ class TeacherSettings:
         tremor_force: [N]; tremor_torque: [Nm].
         delay_s: one-way delay of teleoperation [s].
         scale: motion of the robot over motion of the master.
+        looks: how exactly the person sees where the mouth is, standard deviation an axis [m]; None: he does not look,
+            and pushes where he aims.
     """
 
     kind: str = "kinesthetic"
@@ -106,11 +108,15 @@ class TeacherSettings:
     tremor_torque: float = 0.03
     delay_s: float = 0.0
     scale: float = 1.0
+    looks: float | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in ("kinesthetic", "teleoperation"):
             raise UnknownName("teacher", self.kind, ["kinesthetic", "teleoperation"])
         require_delay(self.delay_s, "teacher: delay_s")
+        if self.looks is not None and (self.kind != "kinesthetic" or not 0.0 <= self.looks < np.inf):
+            what = f"is {self.looks!r} for a {self.kind} teacher"
+            raise InputError("teacher: looks", what, "give metres, 0 or more, for a kinesthetic one, or None")
 
 
 class Teacher(Skill):
