@@ -92,7 +92,7 @@ def planes(rng, dimension):
     return (lambda x: ~np.any(x @ normals.T > away, axis=1)), away.min()
 
 
-def dent(rng, dimension):
+def dent(rng, dimension, slope=2.0):
     """Fails in a cone of half angle 27 degrees whose tip is 0.4 away."""
     axis = rng.standard_normal(dimension)
     axis /= np.linalg.norm(axis)
@@ -100,12 +100,17 @@ def dent(rng, dimension):
     def works(x):
         along = x @ axis
         across = np.sqrt(np.maximum(np.sum(x**2, axis=1) - along**2, 0.0))
-        return ~(along > 0.4 + 2.0 * across)
+        return ~(along > 0.4 + slope * across)
 
     return works, 0.4
 
 
-@pytest.mark.parametrize("kind", [planes, dent])
+def wide_dent(rng, dimension):
+    """Fails in a cone of half angle 45 degrees whose tip is 0.4 away."""
+    return dent(rng, dimension, slope=1.0)
+
+
+@pytest.mark.parametrize("kind", [planes, dent, wide_dent])
 @pytest.mark.parametrize("dimension", [2, 3, 4, 5, 6])
 def test_a_breaking_point_is_within_a_tenth_of_the_smallest_in_fourteen_of_fifteen(kind, dimension):
     sizes, spent, first = [], [], []
@@ -131,11 +136,13 @@ def test_a_breaking_point_is_within_a_tenth_of_the_smallest_in_fourteen_of_fifte
     row(
         f"{kind.__name__}, {dimension}-D", f"{near} of 15 within 10 %, {np.sum(np.isfinite(sizes))} met",
         f"worst {max(sizes):.2f}, {np.median(spent):.0f} trials after {LOOKS[dimension]} looked at",
-        f"met after {np.median(first):.0f} in all (median), within 600 in {np.sum(np.array(first) <= 600)}",
+        f"met after {np.median(first):.0f} in all (median), within 600 in {np.sum(np.array(first) <= 600)}, "
+        f"within 1024 in {np.sum(np.array(first) <= 1024)}; at most {max(spent)}",
     )  # fmt: skip
     met = np.sum(np.isfinite(sizes))
     if kind is dent and dimension > 4:  # fails in 0.2 and 0.07 % of all directions: that one is met is luck
-        assert near >= max(1, 0.9 * met)
+        assert met >= {5: 12, 6: 8}[dimension]  # as many as 900 rays meet by chance
+        assert near >= met - 1
     else:
         assert near >= 14
 

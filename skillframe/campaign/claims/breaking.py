@@ -2,8 +2,8 @@ r"""The smallest disturbance that breaks a skill: rays from where it works, then
 
 A disturbance is a point of the declared ranges; its size is its distance from the nominal point, each quantity counted
 in half widths of its range. Sobol directions are tried just inside the best radius found so far, where most rays work
-and cost one trial; those that fail are bisected, all side by side. Where none fails, more are tried, up to half of all
-trials: what fails in few directions only is met by chance. Then the three best rays, thirty degrees apart, are
+and cost one trial; those that fail are bisected, all side by side. Where none fails, more are tried until
+few trials are left: what fails in few directions only is met by chance. Then the three best rays, thirty degrees apart, are
 bent at random and shortened, a batch at a time: a step grows after a hit, shrinks after a miss and begins again once it
 is small (an evolution strategy with one parent a ray). Batches instead of single trials are our choice: a batch of 24
 takes hardly longer than one trial.
@@ -26,6 +26,8 @@ from skillframe.frames import Float
 
 BUDGET = {1: 96, 2: 256, 3: 384, 4: 600, 5: 960, 6: 960}
 """Trials after which a search ends, by the number of quantities; ours, from runs on synthetic truths."""
+LATE = 2
+"""A first failure that is met late is followed for half of the budget all the same, beyond its end."""
 AGAIN, MOST_AGAIN = 8, 3
 """Fresh trials at a point that is to be confirmed, and how many points are tried, the smallest first."""
 INSIDE, NARROW, FINE = 0.97, 0.05, 0.01
@@ -91,7 +93,7 @@ def search(
     Args:
         seen: trials so far; those that failed are rays that need not be found.
         origin: (d,) the nominal point.
-        budget: trials in all.
+        budget: trials in all; up to half more where the first failure is met late.
         say: told how far it is.
     """
     ended = yield ToTry(np.tile(origin, (AGAIN, 1)), 0)
@@ -99,7 +101,8 @@ def search(
     if undisturbed > AGAIN // 2:
         return BreakingPoints(spent, undisturbed, origin[None, :])
     rays = known_rays(seen, origin)
-    spent += yield from _rays(rays, origin, budget // 2, say)
+    spent += yield from _rays(rays, origin, budget - _count(len(origin)), say)
+    budget = max(budget, spent + budget // LATE) if rays else budget
     number = 0
     while rays and spent + PARENTS * CHILDREN <= budget:
         number += 1
