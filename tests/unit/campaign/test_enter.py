@@ -96,6 +96,19 @@ def test_real_and_simulated_rows_are_never_read_as_one_table(tmp_path):
     assert not read_trials(path).real
 
 
+def test_a_real_table_and_a_simulated_one_joined_under_each_other_are_refused_by_compare(tmp_path, capsys):
+    two_skills(tmp_path / "bench")
+    real = (tmp_path / "bench" / "results.csv").read_text()
+    head = real.splitlines()[0].split(",")
+    for source in ("", "simulated"):
+        row = {"trial": "3", "skill": "peg", "success": "1", "off": "3.5", "source": source}
+        path = tmp_path / "joined.csv"
+        path.write_text(real + ",".join(row.get(name, "") for name in head) + "\n")
+        assert run(["compare", str(path)]) == 2
+        said = capsys.readouterr().err
+        assert "mixes real and simulated trials" in said and "keep them in two tables" in said
+
+
 def test_real_trials_are_compared_as_any_table_and_the_answer_says_that_they_are_real(tmp_path, capsys):
     two_skills(tmp_path)
     assert run(["compare", str(tmp_path)]) == 0
