@@ -2,10 +2,10 @@ r"""The smallest disturbance that breaks a skill: rays from where it works, then
 
 A disturbance is a point of the declared ranges; its size is its distance from the nominal point, each quantity counted
 in half widths of its range. Sobol directions are tried just inside the best radius found so far, where most rays work
-and cost one trial; those that fail are bisected, all side by side. Where none fails, more are tried until
-few trials are left: what fails in few directions only is met by chance. Then the three best rays, thirty degrees apart,
-are bent at random and shortened, a batch at a time: a step grows after a hit, shrinks after a miss and begins again once it
-is small (an evolution strategy with one parent a ray). Batches instead of single trials are our choice: a batch of 24
+and cost one trial; those that fail are bisected, all side by side. Where none fails, more are tried until few trials
+are left: what fails in few directions only is met by chance. Then the three best rays, thirty degrees apart, are bent
+at random and shortened, a batch at a time: a step grows after a hit, shrinks after a miss and begins again once it is
+small (an evolution strategy with one parent a ray). Batches instead of single trials are our choice: a batch of 24
 takes hardly longer than one trial.
 
 The last point is tried again with fresh noise. What comes out is the smallest disturbance *found*: a smaller one in a
