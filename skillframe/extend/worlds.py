@@ -16,6 +16,7 @@ from skillframe.world.worlds import (
     funnel,
     hose_coupler,
     hump,
+    lid,
     pallets,
     peg_in_hole,
     pit,
@@ -53,6 +54,9 @@ def world_types() -> Iterable[WorldType]:
     )  # fmt: skip
     yield WorldType(
         name="pit", summary="two or three faces that meet, in any attitude", params=pit.PitParams, build=pit.build,
+    )  # fmt: skip
+    yield WorldType(
+        name="lid", summary="a lid to push shut about its hinge", params=lid.LidParams, build=lid.build,
     )  # fmt: skip
     yield WorldType(
         name="bayonet", summary="a cap with two pins to push and turn at once", params=bayonet.BayonetParams,

@@ -55,6 +55,7 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Any]] = {
     "slide": _slide,
     "corner": lambda rng: _pit(rng, [(18, 24), (35, 45), (55, 63)], (0.12, 0.18)),
     "valley": lambda rng: _pit(rng, [(22, 28), (55, 63)], (0.18, 0.25)),
+    "lid": lambda rng: ("lid", {"opening": radians(rng.uniform(60, 68)), "friction": rng.uniform(0.08, 0.12)}),
     "bayonet": lambda rng: (
         "bayonet", {"lead": radians(rng.uniform(83, 87)), "friction": rng.uniform(0.18, 0.25), "depth": 0.004}
     ),
@@ -69,6 +70,7 @@ LONGER_S = {"hump_long": 14.0}
 """How long a run may take [s] where 8 do not bear the way at the speed of one who hesitates, some 14 mm/s."""
 NUMBERS = {
     "corner": 0, "hump": 1, "hump_low": 2, "skew": 3, "slide": 4, "steps": 5, "valley": 6, "bayonet": 7, "hump_long": 8,
+    "lid": 9,
 }  # fmt: skip
 """What a family adds to the seeds of its instances; a new family takes the next number."""
 
@@ -90,7 +92,7 @@ def starts(
         return np.column_stack([0.03 - before, np.zeros(count), np.full(count, lift)]) @ turn.T
     if scene.name == "bayonet":
         return np.tile(-lift * np.array(scene.task.direction), (count, 1))
-    if not scene.params["slopes"][0]:  # a slide
+    if scene.name == "pit" and not scene.params["slopes"][0]:  # a slide
         along, aside = rng.uniform(0.03, 0.06, count), rng.uniform(0.004, 0.025, count)
         return np.column_stack([-along, -aside, np.full(count, lift)]) @ turn.T
     nominal = np.array([[s.get(f"start.offset_{a}", 0.0) for a in "xyz"] for s in scene.task.starts])

@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from skillframe.frames import Float, Pose, matrix_from_quaternion, quaternion_from_matrix, rotate, rotation_matrix
-from skillframe.world.scene import Geom, Scene, State, Task, Vector
+from skillframe.world.scene import Geom, Mover, Scene, Sprung, State, Task, Vector
 
 _T = TypeVar("_T")
 
@@ -17,8 +17,8 @@ _T = TypeVar("_T")
 def turned(scene: Scene, vector: Vector) -> Scene:
     """The scene with fixture, starts, goal and push turned by a rotation vector [rad] about the fixture's origin.
 
-    The tool starts in the same attitude to the parts as before. A scene with a start lift, a holder, sprung parts or
-    stages is not for this function.
+    The tool starts in the same attitude to the parts as before. A scene with a start lift, a holder, parts that yield
+    or stages is not for this function.
     """
     if not any(vector):
         return scene
@@ -26,6 +26,7 @@ def turned(scene: Scene, vector: Vector) -> Scene:
     return replace(
         scene,
         fixture=tuple(_geom(geom, turn) for geom in scene.fixture),
+        sprung=tuple(_mover(part, turn) for part in scene.sprung),
         start_tip=_vector(turn @ np.array(scene.start_tip)),
         start_quaternion=_quaternion(turn, scene.start_quaternion),
         goal=_seen(scene.goal, turn),
@@ -37,6 +38,15 @@ def turned(scene: Scene, vector: Vector) -> Scene:
 def _geom(geom: Geom, turn: Float) -> Geom:
     place = _vector(turn @ np.array(geom.position))
     return replace(geom, position=place, quaternion=_quaternion(turn, geom.quaternion))
+
+
+def _mover(part: Sprung | Mover, turn: Float) -> Mover:
+    assert isinstance(part, Mover)
+    return replace(
+        part, geoms=tuple(_geom(geom, turn) for geom in part.geoms), anchor=_vector(turn @ np.array(part.anchor)),
+        axis=_vector(turn @ np.array(part.axis)), center_of_mass=_vector(turn @ np.array(part.center_of_mass)),
+        inertia=turn @ part.inertia @ turn.T,
+    )  # fmt: skip
 
 
 def _task(task: Task, turn: Float) -> Task:
@@ -58,7 +68,7 @@ def _seen(look: Callable[[State], _T], turn: Float) -> Callable[[State], _T]:
     def asked(state: State) -> _T:
         tip = Pose(rotate(turn.T, state.tip.position), turn.T @ state.tip.rotation)
         wrench = np.concatenate([rotate(turn.T, state.wrench[..., :3]), rotate(turn.T, state.wrench[..., 3:])], axis=-1)
-        return look(State(tip, wrench))
+        return look(State(tip, wrench, state.second))
 
     return asked
 

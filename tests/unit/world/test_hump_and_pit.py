@@ -1,8 +1,8 @@
-"""Worlds that can be turned as a whole: a hump to pass, a pit of several faces and a bayonet."""
+"""Worlds that can be turned as a whole: a hump to pass, a pit of several faces, a lid and a bayonet."""
 
 from __future__ import annotations
 
-from math import atan, cos, pi, radians, sin
+from math import acos, atan, atan2, cos, degrees, pi, radians, sin
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from skillframe.world.scene import State
 RECORDS = {record.name: record for record in world_types()}
 TURN = (0.7, -1.9, 1.1)
 STEPS, SKEW = {"steps": radians(18.0), "friction": 0.2, "slope": radians(48.0)}, {"skew": radians(16.0)}
-CASES = [("hump", {}), ("hump", STEPS), ("hump", SKEW), ("pit", {}), ("bayonet", {})]
+CASES = [("hump", {}), ("hump", STEPS), ("hump", SKEW), ("pit", {}), ("lid", {}), ("bayonet", {})]
 
 
 def scene(world, **params):
@@ -106,3 +106,29 @@ def test_a_bayonet_names_the_pushes_that_pass_and_refuses_a_lock_that_holds_noth
     assert given["most_push_angle_rad"] == pytest.approx(0.5 * pi - atan(0.2))
     with pytest.raises(InputError, match="lock > pin"):
         scene("bayonet", lock=0.004)
+
+
+def test_a_turned_lid_turns_about_a_turned_hinge_and_is_shut_by_its_angle():
+    plain, there, turn = scene("lid"), scene("lid", turn=TURN), rotation_matrix(np.array(TURN))
+    (part,), (seen) = plain.sprung, there.sprung[0]
+    np.testing.assert_allclose(seen.axis, turn @ part.axis, atol=1e-12)
+    np.testing.assert_allclose(seen.inertia, turn @ part.inertia @ turn.T, atol=1e-15)
+    opening = plain.params["opening"]
+    for at_angle, shut in ((0.0, False), (opening - radians(3.1), False), (opening - radians(2.9), True)):
+        state = at((0.0, 0.0, 0.0))._replace(second={"lid.angle": np.array([at_angle])})
+        assert plain.goal(state)[0] == there.goal(state)[0] == shut
+        assert there.goal_error(state)[1][0] == pytest.approx(opening - at_angle)
+
+
+def test_the_lid_s_push_is_in_the_middle_of_those_that_keep_the_ball_and_have_a_lever():
+    """From A - phi to acos(M / (F l)), with F = 15 N and l from hinge to ball: 65 - 5.7 and 84.0 degrees."""
+    found = scene("lid")
+    push = degrees(atan2(found.task.direction[0], -found.task.direction[2]))
+    low, high = 65.0 - degrees(atan(0.1)), degrees(acos(0.15 / (15.0 * 0.095)))
+    assert push == pytest.approx(0.5 * (low + high), abs=1e-6)
+    assert degrees(found.analytic["push_half_width_rad"]) == pytest.approx(0.5 * (high - low), abs=1e-6)
+
+
+def test_a_lid_that_no_push_shuts_is_refused():
+    with pytest.raises(InputError, match="a push that keeps the ball on the lid and shuts it"):
+        scene("lid", stuck=1.2)
