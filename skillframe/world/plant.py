@@ -127,7 +127,7 @@ class Plant:
         self.gauge: Float = self._sensor[:, self._layout.readings]
         """(N, 6) of the force-torque sensor as the simulator has it, live: `sensor_wrench` is its opposite."""
         self._force = self._external[:, self._layout.tool, 3:]
-        self._compiled = compiled_jacobian(self._layout, self._anchor, self._axis, self._tool_pose)
+        self._compiled = compiled_jacobian(self._layout, self._anchor, self._axis, self._xmat, self._tool_pose)
 
     def _apply(self, draws: Draws) -> None:
         if "world.friction" in draws:

@@ -6,10 +6,10 @@
 #define OUT __attribute__((visibility("default")))
 
 typedef struct {
-    const double *anchor, *axis, *position, *turned;
+    const double *anchor, *axis, *matrix, *position, *turned;
     double *jacobian;
     const int64_t *hinges, *hinge_dofs, *slides, *slide_dofs;
-    int64_t anchor_step, axis_step, position_step, trials, n_hinges, n_slides, nv;
+    int64_t anchor_step, axis_step, matrix_step, position_step, trials, n_hinges, n_slides, nv, base;
 } Arm;
 
 typedef struct {
@@ -25,7 +25,23 @@ static void cross(const double *a, const double *b, double *out)
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/* Columns [a x (p - anchor); a] of hinges, [a; 0] of slides, for the point p that lies `turned` from the tool frame. */
+/* Columns 3 to 5 of a free base, [axis x (p - anchor); axis] of each of its body's axes. Those before them stay. */
+static void turning(const double *matrix, const double *anchor, const double *point, double *out, int64_t nv)
+{
+    const double lever[3] = {point[0] - anchor[0], point[1] - anchor[1], point[2] - anchor[2]};
+    for (int64_t k = 0; k < 3; k++) {
+        const double axis[3] = {matrix[k], matrix[3 + k], matrix[6 + k]};
+        double way[3];
+        cross(axis, lever, way);
+        for (int64_t d = 0; d < 3; d++) {
+            out[d * nv + 3 + k] = way[d];
+            out[(3 + d) * nv + 3 + k] = axis[d];
+        }
+    }
+}
+
+/* Columns [a x (p - anchor); a] of hinges, [a; 0] of slides, for the point p that lies `turned` from the tool frame.
+ * `base` is the body of a free base, or -1. */
 OUT int64_t jacobian(const Arm *arm)
 {
     int64_t nv = arm->nv;
@@ -48,6 +64,8 @@ OUT int64_t jacobian(const Arm *arm)
             const double *a = arm->axis + i * arm->axis_step + 3 * arm->slides[k];
             for (int64_t d = 0; d < 3; d++) out[d * nv + arm->slide_dofs[k]] = a[d];
         }
+        if (arm->base >= 0)
+            turning(arm->matrix + i * arm->matrix_step + 9 * arm->base, arm->anchor + i * arm->anchor_step, point, out, nv);
     }
     return 0;
 }

@@ -1,6 +1,6 @@
 """Jacobian, wrist sensor and quaternions in C, to the last bit of the numpy that they stand for, in less of its time.
 
-What is done is in reading.c. Without a compiler, or for a free base, the code beside them runs.
+What is done is in reading.c. Without a compiler the code beside them runs.
 """
 
 from __future__ import annotations
@@ -26,23 +26,30 @@ class CompiledJacobian:
 
     Args:
         layout: of the arm.
-        anchor, axis: (N, joints, 3) of MuJoCo; tool: its tool frame. All live, and they stay where they are.
+        anchor, axis: (N, joints, 3) of MuJoCo; matrix: (N, bodies, 9) of it; tool: its tool frame. All live, and they
+            stay where they are.
         built: reading.c.
     """
 
-    def __init__(self, layout: Layout, anchor: Float, axis: Float, tool: Pose, built: ctypes.CDLL) -> None:
+    def __init__(
+        self, layout: Layout, anchor: Float, axis: Float, matrix: Float, tool: Pose, built: ctypes.CDLL
+    ) -> None:  # fmt: skip
         count, nv = len(anchor), int(layout.model.nv)
         self._rotation = tool.rotation
         self._turned, self._out = np.zeros((count, 3, 1)), np.zeros((count, 6, nv))
+        if layout.free:
+            self._out[:, [0, 1, 2], [0, 1, 2]] = 1.0
         hinges, hinge_dofs, slides, slide_dofs = (
             _numbers(part)
             for part in (layout.hinges, layout.hinge_dofs, layout.slides, layout.slide_dofs)
         )  # fmt: skip
         record = Record({
-            "anchor": anchor, "axis": axis, "position": tool.position, "turned": self._turned, "jacobian": self._out,
-            "hinges": hinges, "hinge_dofs": hinge_dofs, "slides": slides, "slide_dofs": slide_dofs,
-            "anchor_step": _step(anchor), "axis_step": _step(axis), "position_step": _step(tool.position),
-            "trials": count, "n_hinges": len(hinges), "n_slides": len(slides), "nv": nv,
+            "anchor": anchor, "axis": axis, "matrix": matrix, "position": tool.position, "turned": self._turned,
+            "jacobian": self._out, "hinges": hinges, "hinge_dofs": hinge_dofs, "slides": slides,
+            "slide_dofs": slide_dofs, "anchor_step": _step(anchor), "axis_step": _step(axis),
+            "matrix_step": _step(matrix), "position_step": _step(tool.position), "trials": count,
+            "n_hinges": len(hinges), "n_slides": len(slides), "nv": nv,
+            "base": int(layout.model.jnt_bodyid[0]) if layout.free else -1,
         })  # fmt: skip
         self._jacobian = record.bound(built, "jacobian")
 
@@ -107,10 +114,12 @@ class Quaternions:
         return quaternions
 
 
-def compiled_jacobian(layout: Layout, anchor: Float, axis: Float, tool: Pose) -> CompiledJacobian | None:
-    """A `CompiledJacobian`, or None for a free base or without a compiler."""
-    built = None if layout.free or not layout.model.njnt else library(SOURCE)
-    return None if built is None else CompiledJacobian(layout, anchor, axis, tool, built)
+def compiled_jacobian(
+    layout: Layout, anchor: Float, axis: Float, matrix: Float, tool: Pose
+) -> CompiledJacobian | None:  # fmt: skip
+    """A `CompiledJacobian`, or None without joints or without a compiler."""
+    built = library(SOURCE) if layout.model.njnt else None
+    return None if built is None else CompiledJacobian(layout, anchor, axis, matrix, tool, built)
 
 
 def compiled_wrist(sensor: Float, noise: Float, bias: Float, weight: Float, center: Float) -> CompiledWrist | None:
