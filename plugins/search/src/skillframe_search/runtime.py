@@ -158,6 +158,8 @@ class SearchSkill(Skill):
         wrench = self._wrench[self._row, index]
         if self._in_start_attitude:
             place, rate, wrench = (rotate_spatial(self._turn, values) for values in (place, rate, wrench))
+        if not self._shift.any():
+            return place, rate, wrench
         # the learning point follows the place; the centre of compliance turns about it
         return _at_center(place, self._lever), rate + _swept(rate, self._lever), move_wrench(wrench, self._lever)
 
