@@ -269,8 +269,8 @@ def test_the_coupler_s_row_fails_if_a_pair_tips_over_or_a_stiff_one_aligns_as_we
     monkeypatch.setattr(lmc, "stiff", lambda document, part, stiffness: {"number": "stiff"})
     monkeypatch.setattr(lmc, "by_hand", lambda **given: {"number": "hand"})
     monkeypatch.setattr(lmc, "pictures", lambda document: [])
-    monkeypatch.setattr(lmc, "_align", lambda job, params, document, coc: [
-        rigid if document["number"] == "stiff" else flange or document["number"] != 3] * 2)  # fmt: skip
+    monkeypatch.setattr(lmc, "_flush", lambda job, params, given: [
+        rigid if each["number"] == "stiff" else flange or each["number"] != 3 for each, _ in given])  # fmt: skip
     assert lmc.hose(RowRun(settings={"world.friction": 0.2})).verdict == expected
 
 

@@ -156,8 +156,8 @@ def _two_arms() -> Iterable[RowType]:
 
     yield row("7", "two arms insert up to a tilt that depends on who gives way where (Table I)",
               "A 4, B 12, C fails at 4, D 8, E 12 degrees",
-              "with joint friction, + sign, fixture at 0.70, 0.75 and 0.80 m (quick: 0.75): each of A to E within 4 "
-              "degrees (two steps) of the published", "table")  # fmt: skip
+              "with joint friction, + sign, fixture at 0.70, 0.75 and 0.80 m (quick: 0.75): each of A to E (quick: B "
+              "to E) within 4 degrees (two steps) of the published", "table")  # fmt: skip
     yield row("8", "C fails because of static friction in the slave's joints", "C fails at 4 degrees",
               "C at 8 degrees, both signs: succeeds without joint friction and with the master's alone, fails with the "
               "slave's alone", "slave")  # fmt: skip
@@ -168,15 +168,16 @@ def _two_arms() -> Iterable[RowType]:
               "with joint friction, + sign: E less than D, and D less than B, in all three lines", "paths")  # fmt: skip
     yield row("11", "the opposite sign of the tilt works as well", "works",
               "signs differ by at most 2 degrees for A to D: with joint friction in both postures and at 0.70, 0.75, "
-              "0.80 m, without it in a sweep up to 24 degrees (quick: with it, upright, at 0.75 m)",
+              "0.80 m, without it in a sweep up to 24 degrees (quick: B to D with it, upright, at 0.75 m)",
               "signs")  # fmt: skip
     yield row("12", "the pair turns the wrong way only at large angles or low friction", "only there",
-              "with joint friction, A to E, both signs: never at up to 8 degrees and friction of the parts of 0.2 or "
-              "more, and at least once at larger tilts or lower friction", "failures")  # fmt: skip
+              "with joint friction, A to E (quick: B to E), both signs: never at up to 8 degrees and friction of the "
+              "parts of 0.2 or more, and at least once at larger tilts or lower friction", "failures")  # fmt: skip
     yield row("24", "both arms compliant push less hard (from 8 degrees)", "lower forces, no figures",
               "with joint friction, + sign: E inserts with a smaller largest force than B", "forces")  # fmt: skip
     yield row("25", "the learned parameters do best", "learned parameters produce the best results",
-              "with joint friction, + sign: E inserts from at least the largest tilt of A to D", "best")  # fmt: skip
+              "with joint friction, + sign: E inserts from at least the largest tilt of A to D (quick: B to D)",
+              "best")  # fmt: skip
     yield from _grasped(chosen)
     yield RowType(
         name="31", topic="two arms",
@@ -199,7 +200,7 @@ def _grasped(chosen: str) -> Iterable[RowType]:
 
     yield row("43", "two arms insert up to a tilt in the grasp that depends on who gives way where (Table I)",
               "A 4, B 12, C fails at 4, D 8, E 12 degrees",
-              "with joint friction, + sign, fixture at 0.70, 0.75 and 0.80 m (quick: 0.75, without A and C): each of A "
+              "with joint friction, + sign, fixture at 0.70, 0.75 and 0.80 m (quick: 0.75, B and E): each of A "
               "to E within 4 degrees (one step) of the published", "table")  # fmt: skip
     yield row("44", "both arms compliant do best where the peg is tilted in the grasp",
               "less joint motion, shorter time, lower forces; the best results",
@@ -212,7 +213,7 @@ def _search() -> Iterable[RowType]:
     yield RowType(
         name="13", summary="learned search finds the hole (peg) and the socket", published="85 % peg, 67 % socket",
         source=SEARCH, bar="peg at least 75 %, socket at least 60 %, random walk at least 30 points below both (quick: "
-        "the peg alone, in 7 s)",
+        "the peg alone, in 5 s)",
         calibrated=chosen, settings=SEARCHED, group="search",
         run=Lazy("skillframe_papers.rows.search:found"),
     )  # fmt: skip
@@ -235,7 +236,7 @@ def _search() -> Iterable[RowType]:
     yield RowType(
         name="41", summary="a search that exerts the forces it was shown finds more on a soft arm",
         published="trajectory augmented with learned forces", source=SEARCH,
-        bar="arm of 500 N/m, 13.4 s (quick: 7): at least 75 % of the peg's holes (by count), by 95 % intervals more "
+        bar="arm of 500 N/m, 13.4 s (quick: 5): at least 75 % of the peg's holes (by count), by 95 % intervals more "
         "than the same search with a constant push",
         calibrated="the fillet of the part, and the arm's 500 N/m, at which it had been seen", settings=SEARCHED,
         group="search", run=Lazy("skillframe_papers.rows.search:soft"),
@@ -244,7 +245,7 @@ def _search() -> Iterable[RowType]:
         name="42", summary="ergodic control finds the hole (peg) and the socket, too",
         published="two algorithms: sampling and ergodic control", source=SEARCH,
         bar="peg at least 75 %, socket at least 60 % (by count), by 95 % intervals more than the random walk (quick: "
-        "the peg alone, in 7 s)",
+        "the peg alone, in 5 s)",
         calibrated=chosen, settings=SEARCHED, group="search", run=Lazy("skillframe_papers.rows.search:ergodic"),
     )  # fmt: skip
     yield RowType(

@@ -34,7 +34,7 @@ SEED, EACH = 69_000, 2
 BLIND = 5
 SETS, QUICK_SETS = 2, 1
 STARTS, QUICK_STARTS = 12, 2
-SHARE, LONGEST_S, QUICK_LONGEST_S = 0.9, 45.0, 15.0
+SHARE, LONGEST_S, QUICK_LONGEST_S = 0.9, 45.0, 10.0
 BESIDE_M, BELIEVED_M = (0.003, 0.005), 0.004
 OURS, NULL, SPIRAL = "push, learned search on a stall", "the push alone", "push, untaught spiral on a stall"
 
@@ -72,20 +72,22 @@ def exception(job: RowRun) -> RowResult:
     person = TeacherSettings(aim_noise=radians(job.settings["teacher.aim_noise_deg"]))
     sets, count = job.count(SETS, QUICK_SETS), job.count(STARTS, QUICK_STARTS)
     longest = QUICK_LONGEST_S if job.quick else LONGEST_S
-    won, seconds = dict[str, list[list[bool]]](), dict[str, list[float]]()
+    documents, trials = list[dict[str, Document]](), list[Trials]()
     for i in range(sets):
         seed = SEED + 1000 * job.seed + i
         shown = record(load_robot_model("free_tool"), scene, person, count=EACH, seed=seed).demonstrations
         # a quick run's person is the one of rows 13 to 41, whose searches are recorded once
         blind = shown_by(job, felt) if job.quick else demonstrations(felt, BLIND, seed)
-        ways = _documents(list(shown), blind, job.quick)
-        trials = [
+        documents.append(_documents(list(shown), blind, job.quick))
+        trials += [
             Trials(each, draws(count, seed), [np.random.default_rng([seed, 2, k]) for k in range(count)])
-            for each in ways.values()
+            for each in documents[-1].values()
         ]
-        for name, ended in zip(
-            ways, ran(load_robot_model("free_tool"), scene, trials, duration_s=longest), strict=True
-        ):
+    done = iter(ran(load_robot_model("free_tool"), scene, trials, duration_s=longest))
+    won, seconds = dict[str, list[list[bool]]](), dict[str, list[float]]()
+    for i, ways in enumerate(documents):
+        for name in ways:
+            ended = next(done)
             won.setdefault(name, []).append(ended.success.tolist())
             seconds.setdefault(name, []).extend(ended.seconds[ended.success].tolist())
         job.tell(f"set {i}: {', '.join(f'{name} {sum(hits[-1])}' for name, hits in won.items())} of {count}")

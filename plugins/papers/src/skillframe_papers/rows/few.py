@@ -63,7 +63,7 @@ def _found(job: RowRun, given: Given, taught: Sequence[tuple[Demonstration, ...]
     settings = {key: job.settings[key] for key in ("push", "speed", "stiffness")}
     time = min(EARLY_S, float(job.settings["time"]))
     learned = [document("search", given.task, each, time=time, algorithm="sampling", **settings) for each in taught]
-    found = searched(learned, given.task, where, duration_s=time, seed=5 + job.seed)
+    found = searched(given.task.scene, [(each, where) for each in learned], duration_s=time, seed=5 + job.seed)
     return [int(np.isfinite(seconds).sum()) for seconds in found]
 
 

@@ -15,7 +15,7 @@ from skillframe.extend.records import RowResult, RowRun
 from skillframe_papers.rows.insertion import PUBLISHED, Asked, Row, in_the_grasp, largest, raised, side_by_side
 from skillframe_papers.rows.sweep import COARSE, HEIGHTS_M, SECONDS, both, phase_of
 
-NAMES, QUICK_NAMES = ("A", "B", "C", "D", "E"), ("B", "D", "E")
+NAMES, QUICK_NAMES = ("A", "B", "C", "D", "E"), ("B", "E")
 QUICK_DEG = COARSE[::2]
 QUICK_SECONDS, NEAR_DEG, OWN_M = 7.5, 4.0, HEIGHTS_M[1]
 

@@ -24,6 +24,7 @@ from skillframe.frames import Float
 from skillframe.teaching.sessions import record
 from skillframe.teaching.teacher import TeacherSettings
 from skillframe_papers.bars import counted, reached
+from skillframe_papers.rows.blocks import ran_made
 from skillframe_papers.rows.skills import STIFF_TURN_NM_RAD, WRIST, by_hand, stiff
 
 DOWN, X, Y = np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
@@ -169,7 +170,8 @@ def hose(job: RowRun) -> RowResult:
         "the same, stiff in rotation, at the flange": (rigid_ones, None),
         "by hand: straight down, free along x, turning about y": ([by_hand(turn="y", at=WRIST)], "wrist"),
     }  # fmt: skip
-    flush = {name: [all(_align(job, params, d, coc)) for d in made] for name, (made, coc) in given.items()}
+    done = iter(_flush(job, params, [(d, coc) for made, coc in given.values() for d in made]))
+    flush = {name: [next(done) for _ in made] for name, (made, _) in given.items()}
     flange, tip, rigid, straight = flush.values()
     passed = reached(as_told, pairs, SHARE, quick=job.quick) and all(flange) and not all(rigid)
     rows = [("flags and counts as published", counted(as_told, pairs))]
@@ -201,12 +203,13 @@ def _lever(pushes: Sequence[dict[str, Any]], flush: Sequence[bool]) -> str:
     )
 
 
-def _align(job: RowRun, params: dict[str, Any], document: Document, coc: str | None) -> list[bool]:
-    """Whether the coupler lies flush, from both starts, steered where it was learned or about another point."""
-    skill, setup = prepare(load_robot_model("free_tool"), load_world("hose_coupler", params), document, coc)
+def _flush(job: RowRun, params: dict[str, Any], given: Sequence[tuple[Document, str | None]]) -> list[bool]:
+    """Which skills put the coupler flush from both starts, each steered where it was learned or about another point."""
+    robot, scene = load_robot_model("free_tool"), load_world("hose_coupler", params)
     draws = {"start.tilt_y": np.radians([START_DEG, -START_DEG])}
-    rngs = [np.random.default_rng([job.seed, i]) for i in range(2)]
-    return [bool(good) for good in simulate(skill, setup, draws, rngs, duration_s=15.0).success]
+    rngs = [[np.random.default_rng([job.seed, i]) for i in range(2)] for _ in given]
+    made = [prepare(robot, scene, document, coc) for document, coc in given]
+    return [bool(each.success.all()) for each in ran_made(made, [(draws, each) for each in rngs], duration_s=15.0)]
 
 
 def levering(job: RowRun) -> RowResult:

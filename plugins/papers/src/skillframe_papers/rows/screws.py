@@ -109,7 +109,7 @@ def screw(job: RowRun) -> RowResult:
     scene = load_world("bayonet", {"friction": job.settings["world.friction"]})
     person = TeacherSettings(aim_noise=radians(job.settings["teacher.aim_noise_deg"]), force_max=GENTLE_N)
     sets, count = job.count(SETS, QUICK_SETS), job.count(STARTS, QUICK_STARTS)
-    won, told, unable = dict[str, list[list[bool]]](), 0, 0
+    taught, trials, told, unable = list[dict[str, Document]](), list[Trials](), 0, 0
     for i in range(sets):
         seed = SEED + 1000 * job.seed + i
         shown, failed = _shown(scene, person, seed)
@@ -122,13 +122,16 @@ def screw(job: RowRun) -> RowResult:
         ways = {OURS: given, PUSH: without(given, "rotation"), TURN: without(given, "translation")}
         if not job.quick:
             ways |= {LOOSE: paced(given), HAND: _hand(given)}
-        trials = [
+        taught.append(ways)
+        trials += [
             Trials(each, _draws(count, seed), [np.random.default_rng([seed, 2, k]) for k in range(count)])
             for each in ways.values()
         ]
-        done = successes(load_robot_model("panda"), scene, trials, duration_s=LONGEST_S, center="tip")
-        for name, success in zip(ways, done, strict=True):
-            won.setdefault(name, []).append(success.tolist())
+    done = iter(successes(load_robot_model("panda"), scene, trials, duration_s=LONGEST_S, center="tip"))
+    won = dict[str, list[list[bool]]]()
+    for i, ways in enumerate(taught):
+        for name in ways:
+            won.setdefault(name, []).append(next(done).tolist())
         job.tell(f"set {i}: {', '.join(f'{name} {sum(hits[-1])}' for name, hits in won.items())} of {count}")
     return _told(job, {name: Ran(np.array(hits)) for name, hits in won.items()}, told, unable)
 

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.demonstration.record import Demonstration
 from skillframe.document.file import new_document
 from skillframe.document.source import learned
 from skillframe.execution.prepare import load_robot_model, load_world
@@ -60,13 +61,18 @@ Key = tuple[tuple[str, float], ...]
 
 
 @cache
-def _learned(key: Key, seed: int, sets: int, world: str, each: int) -> tuple[Document, ...]:
-    """A skill from each set of `each` demonstrations, from the world's starts in turn."""
+def _shown(key: Key, seed: int, count: int, world: str) -> tuple[Demonstration, ...]:
+    """Demonstrations from the world's starts in turn."""
     values = dict(key)
     scene = load_world(world, {"friction": values["world.friction"]})
     person = TeacherSettings(aim_noise=radians(values["teacher.aim_noise_deg"]))
-    given = record(load_robot_model("free_tool"), scene, person, count=2 * sets, seed=seed).demonstrations
-    kind = registry().skill("lmc")
+    return tuple(record(load_robot_model("free_tool"), scene, person, count=count, seed=seed).demonstrations)
+
+
+@cache
+def _learned(key: Key, seed: int, sets: int, world: str, each: int) -> tuple[Document, ...]:
+    """A skill from each set of two demonstrations, from `each` of them."""
+    given, kind = _shown(key, seed, 2 * sets, world), registry().skill("lmc")
     return tuple(learned(kind, given[2 * i : 2 * i + each], LearnOptions()) for i in range(sets))
 
 

@@ -209,7 +209,7 @@ def _pair(arms: Arms) -> str:
 def signs(job: RowRun) -> RowResult:
     """Row 11: largest tilts of both signs, with the sweep's end out of reach where it can be."""
     found = sweep(job)
-    names = found.names[:5]
+    names, held = found.names[:5], [n for n in found.names[:5] if n != "E"]
     reaches = {f"{found.stiff:g} Nm, {p}": _signed(found, p) for p in found.postures}
     reaches |= {
         f"{found.stiff:g} Nm, fixture at {h:.2f} m": {
@@ -228,8 +228,8 @@ def signs(job: RowRun) -> RowResult:
     top = max((abs(r.tilt_deg) for each in found.beyond.values() for r in each), default=0.0)
     ends = [n for n, each in free.items() if min(each) >= top]
     return RowResult(
-        ours="signs differ by " + ", ".join(f"{n} {worst[n]:g}" for n in "ABCD") + " degrees at most",
-        verdict="pass" if max(worst[n] for n in "ABCD") <= STEP_DEG else "fail", rows=rows,
+        ours="signs differ by " + ", ".join(f"{n} {worst[n]:g}" for n in held) + " degrees at most",
+        verdict="pass" if max(worst[n] for n in held) <= STEP_DEG else "fail", rows=rows,
         head=["largest tilt, + / - [degrees]", *reaches],
         difference=f"Null: E, both arms of which are free, so that nothing holds the pair: by {worst['E']:g} degrees."
         + (f" Without joint friction the sweep ends at {top:g} degrees, where {' and '.join(ends)} are not told apart."
@@ -307,8 +307,8 @@ def best(job: RowRun) -> RowResult:
         verdict="pass" if stuck["E"] >= others else "fail",
         head=("", "published [degrees]", f"{found.stiff:g} Nm, + [degrees]", "0 Nm, + [degrees]"),
         rows=[(n, _number(PUBLISHED[n]["largest_deg"]), f"{stuck[n]:g}", f"{free[n]:g}") for n in stuck],
-        difference="Null: each of A to D in E's place, of which "
-        f"{' and '.join(n for n in 'ABCD' if stuck[n] < max(stuck.values())) or 'none'} miss the bar.",
+        difference="Null: each of the others in E's place, of which "
+        f"{' and '.join(n for n in stuck if n != 'E' and stuck[n] < max(stuck.values())) or 'none'} miss the bar.",
         values={"learned_deg": stuck["E"], "others_deg": others},
     )  # fmt: skip
 
@@ -338,7 +338,7 @@ def _picture(found: Sweep) -> Illustration:
     ours = " E* is ours: E as a relative task." if "E*" in found.names else ""
     caption = (
         "Largest tilt up to which every insertion succeeds; 0 fails at the smallest, and the sweep ends at "
-        f"{max(abs(r.tilt_deg) for r in found.of('A', stuck=True)):g} degrees, without joint friction at "
-        f"{max(abs(r.tilt_deg) for r in found.of('A', stuck=False)):g}.{ours}"
+        f"{max(abs(r.tilt_deg) for r in found.of('B', stuck=True)):g} degrees, without joint friction at "
+        f"{max(abs(r.tilt_deg) for r in found.of('B', stuck=False)):g}.{ours}"
     )
     return Illustration("Table I of the two-arm paper", caption, svg(figure))

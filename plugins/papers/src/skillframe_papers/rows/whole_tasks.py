@@ -65,6 +65,7 @@ TASKS = {
 }
 
 Made = Callable[[], tuple[Skill, Setup]]
+Rngs = list[np.random.Generator]
 
 
 def _methods(shown: list[Demonstration], task: Whole, scene: Scene, names: Iterable[str]) -> dict[str, Made]:
@@ -107,7 +108,7 @@ def _draws(task: Whole, scene: Scene, count: int, seed: int) -> dict[str, Float]
     return draws
 
 
-def _rngs(count: int, seed: int) -> list[np.random.Generator]:
+def _rngs(count: int, seed: int) -> Rngs:
     return [np.random.default_rng([seed, 2, k]) for k in range(count)]
 
 
@@ -117,13 +118,17 @@ def _executed(job: RowRun, name: str) -> dict[str, Ran]:
     scene = load_world(task.world, {**task.params, "friction": job.settings["world.friction"]})
     sets, count = job.count(SETS, QUICK_SETS), job.count(STARTS, QUICK_STARTS)
     won: dict[str, list[list[bool]]] = {way: [] for way in (QUICK_ONLY if job.quick else ("policy", *NULLS, HALVES))}
+    methods, made = list[dict[str, Made]](), list[tuple[Skill, Setup]]()
+    given = list[tuple[Mapping[str, Float], Rngs]]()
     for i in range(sets):
         seed = SEED + 1000 * job.seed + i
         shown = record(load_robot_model("free_tool"), scene, person, count=EACH, seed=seed, duration_s=20.0)
-        methods = _methods(list(shown.demonstrations), task, scene, won)
-        given = [(_draws(task, scene, count, seed), _rngs(count, seed)) for _ in methods]
-        done = ran_made([each() for each in methods.values()], given, duration_s=LONGEST_S)
-        ended = dict(zip(methods, done, strict=True))
+        methods.append(_methods(list(shown.demonstrations), task, scene, won))
+        made += [each() for each in methods[-1].values()]
+        given += [(_draws(task, scene, count, seed), _rngs(count, seed)) for _ in methods[-1]]
+    done = iter(ran_made(made, given, duration_s=LONGEST_S))
+    for i, ways in enumerate(methods):
+        ended = {way: next(done) for way in ways}
         for way, hits in won.items():
             hits.append(ended[way].success.tolist() if way in ended else [False] * count)
         job.tell(f"{name}, set {i}: {', '.join(f'{way} {sum(hits[-1])}' for way, hits in won.items())} of {count}")
