@@ -12,45 +12,49 @@
 #define REACH 4.0  /* cells; how far from a listed cell's centre its triangles lie, at most */
 #define FAR 1e9f
 #define LOOSE 1.15 /* distances beyond the band are at most this much too large */
+#define ALMOST 0.999999 /* of a distance from a plane, beside rounding */
+#define RUN 16     /* triangles, or runs of them, with a box around */
 
-typedef void (*Visit)(void* what, int64_t node, int64_t triangle, const double* corner, const double* place);
+/* `off`: how far the place is from the triangle's plane, a little less than that, so no triangle is passed over. */
+typedef void (*Visit)(void* what, int64_t node, int64_t triangle, const double* corner, const double* place, double off);
 
 /* Call a function at every node (at cell centres: shift 0.5) whose distance from a triangle's plane, and box, is small. */
-static void near_triangle(const Grid* g, const Mesh* mesh, int64_t t, double reach, double shift, Visit visit, void* what) {
+static INLINE void near_triangle(const Grid* g, const Mesh* mesh, int64_t t, double reach, double shift, Visit visit, void* what) {
   const double *corner = mesh->corner + 9 * t, *n = mesh->normal + 21 * t;
   int64_t low[3], high[3], at[3];
   int a = 0;
   for (int x = 0; x < 3; x++) {
-    double least = fmin(corner[x], fmin(corner[3 + x], corner[6 + x])) - reach;
-    double most = fmax(corner[x], fmax(corner[3 + x], corner[6 + x])) + reach;
-    double first = ceil((least - g->origin[x]) / g->cell - shift), last = floor((most - g->origin[x]) / g->cell - shift);
-    if (last < 0 || first > (double)(g->size[x] - 1)) return;
-    low[x] = first > 0 ? (int64_t)first : 0;
-    high[x] = last < (double)(g->size[x] - 1) ? (int64_t)last : g->size[x] - 1;
+    double least = smaller(corner[x], smaller(corner[3 + x], corner[6 + x])) - reach;
+    double most = larger(corner[x], larger(corner[3 + x], corner[6 + x])) + reach;
+    int64_t first = -below(-((least - g->origin[x]) / g->cell - shift)), last = below((most - g->origin[x]) / g->cell - shift);
+    if (last < 0 || first > g->size[x] - 1) return;
+    low[x] = first > 0 ? first : 0;
+    high[x] = last < g->size[x] - 1 ? last : g->size[x] - 1;
     if (fabs(n[x]) > fabs(n[a])) a = x;
   }
   int u = (a + 1) % 3, v = (a + 2) % 3;
-  double place[3], level = dot(n, corner), across = reach / fmax(fabs(n[a]), 0.5);
+  double place[3], level = dot(n, corner), across = reach / larger(fabs(n[a]), 0.5), steep = ALMOST * fabs(n[a]);
   for (at[u] = low[u]; at[u] <= high[u]; at[u]++)
     for (at[v] = low[v]; at[v] <= high[v]; at[v]++) {
       place[u] = g->origin[u] + g->cell * ((double)at[u] + shift);
       place[v] = g->origin[v] + g->cell * ((double)at[v] + shift);
       double height = (level - n[u] * place[u] - n[v] * place[v]) / n[a];
-      double first = ceil((height - across - g->origin[a]) / g->cell - shift);
-      double last = floor((height + across - g->origin[a]) / g->cell - shift);
-      int64_t k = first > (double)low[a] ? (first < 1e9 ? (int64_t)first : high[a] + 1) : low[a];
-      int64_t end = last < (double)high[a] ? (last > -1e9 ? (int64_t)last : -1) : high[a];
+      int64_t k = -below(-((height - across - g->origin[a]) / g->cell - shift));
+      int64_t end = below((height + across - g->origin[a]) / g->cell - shift);
+      if (k < low[a]) k = low[a];
+      if (end > high[a]) end = high[a];
       for (; k <= end; k++) {
         at[a] = k;
         place[a] = g->origin[a] + g->cell * ((double)k + shift);
-        visit(what, node_of(g, at[0], at[1], at[2]), t, corner, place);
+        visit(what, node_of(g, at[0], at[1], at[2]), t, corner, place, steep * fabs(place[a] - height));
       }
     }
 }
 
-static void lower(void* what, int64_t node, int64_t t, const double* corner, const double* place) {
+static INLINE void lower(void* what, int64_t node, int64_t t, const double* corner, const double* place, double off) {
   (void)t;
   float* value = (float*)what + node;
+  if (off > (double)*value) return;
   float d = (float)distance_to(corner, place);
   if (d < *value) *value = d;
 }
@@ -58,61 +62,71 @@ static void lower(void* what, int64_t node, int64_t t, const double* corner, con
 /* Beyond the band: distance by steps to the 26 neighbours, from one corner of the grid and back. */
 static void spread(const Grid* g, float* value) {
   int64_t nx = g->size[0], ny = g->size[1], nz = g->size[2];
-  for (int pass = 0; pass < 2; pass++) {
-    int way = pass ? 1 : -1;
+  float near = (float)(BAND * g->cell), length[13];
+  int64_t step[13], way[13][3];
+  int count = 0;
+  for (int di = 0; di < 2; di++)
+    for (int dj = di ? -1 : 0; dj < 2; dj++)
+      for (int dk = (di || dj) ? -1 : 1; dk < 2; dk++, count++) {
+        way[count][0] = di, way[count][1] = dj, way[count][2] = dk;
+        step[count] = node_of(g, di, dj, dk);
+        length[count] = (float)(g->cell * sqrt((double)(di * di + dj * dj + dk * dk)));
+      }
+  for (int sign = -1; sign < 2; sign += 2)
     for (int64_t a = 0; a < nx; a++)
       for (int64_t b = 0; b < ny; b++)
         for (int64_t c = 0; c < nz; c++) {
-          int64_t i = pass ? nx - 1 - a : a, j = pass ? ny - 1 - b : b, k = pass ? nz - 1 - c : c;
+          int64_t i = sign > 0 ? nx - 1 - a : a, j = sign > 0 ? ny - 1 - b : b, k = sign > 0 ? nz - 1 - c : c;
           float *here = value + node_of(g, i, j, k), best = *here;
-          if (best < (float)(BAND * g->cell)) continue;
-          for (int di = 0; di < 2; di++)
-            for (int dj = di ? -1 : 0; dj < 2; dj++)
-              for (int dk = (di || dj) ? -1 : 1; dk < 2; dk++) {
-                if (!di && dj < 0) continue;
-                int64_t x = i + way * di, y = j + way * dj, z = k + way * dk;
-                if (x < 0 || y < 0 || z < 0 || x >= nx || y >= ny || z >= nz) continue;
-                float d = value[node_of(g, x, y, z)] + (float)(g->cell * sqrt((double)(di * di + dj * dj + dk * dk)));
-                if (d < best) best = d;
-              }
+          if (best < near) continue;
+          int inner = i > 0 && j > 0 && k > 0 && i < nx - 1 && j < ny - 1 && k < nz - 1;
+          for (int n = 0; n < count; n++) {
+            if (!inner) {
+              int64_t x = i + sign * way[n][0], y = j + sign * way[n][1], z = k + sign * way[n][2];
+              if (x < 0 || y < 0 || z < 0 || x >= nx || y >= ny || z >= nz) continue;
+            }
+            float d = here[sign * step[n]] + length[n];
+            best = d < best ? d : best;
+          }
           *here = best;
         }
-  }
 }
 
 /* Add a vote for each node that lies inside as seen along axis a. */
 static void cast(const Grid* g, const Mesh* mesh, int a, uint8_t* crossed, uint8_t* votes) {
   int u = (a + 1) % 3, v = (a + 2) % 3;
-  int64_t step = a == 0 ? g->size[1] * g->size[2] : a == 1 ? g->size[2] : 1;
   double su = g->origin[u] + 3.1e-5 * g->cell, sv = g->origin[v] + 5.7e-5 * g->cell;  /* off the mesh's own corners */
   memset(crossed, 0, (size_t)(g->size[0] * g->size[1] * g->size[2]));
   for (int64_t t = 0; t < mesh->count; t++) {
     const double *p = mesh->corner + 9 * t, *q = p + 3, *r = p + 6;
     double area = (q[u] - p[u]) * (r[v] - p[v]) - (q[v] - p[v]) * (r[u] - p[u]);
     if (area == 0) continue;
-    double lu = fmax(ceil((fmin(p[u], fmin(q[u], r[u])) - su) / g->cell), 0);
-    double lv = fmax(ceil((fmin(p[v], fmin(q[v], r[v])) - sv) / g->cell), 0);
-    double hu = fmin(floor((fmax(p[u], fmax(q[u], r[u])) - su) / g->cell), (double)(g->size[u] - 1));
-    double hv = fmin(floor((fmax(p[v], fmax(q[v], r[v])) - sv) / g->cell), (double)(g->size[v] - 1));
-    for (int64_t i = (int64_t)lu; i <= (int64_t)hu; i++)
-      for (int64_t j = (int64_t)lv; j <= (int64_t)hv; j++) {
+    int64_t lu = -below(-((smaller(p[u], smaller(q[u], r[u])) - su) / g->cell));
+    int64_t lv = -below(-((smaller(p[v], smaller(q[v], r[v])) - sv) / g->cell));
+    int64_t hu = below((larger(p[u], larger(q[u], r[u])) - su) / g->cell);
+    int64_t hv = below((larger(p[v], larger(q[v], r[v])) - sv) / g->cell);
+    if (hu > g->size[u] - 1) hu = g->size[u] - 1;
+    if (hv > g->size[v] - 1) hv = g->size[v] - 1;
+    for (int64_t i = lu > 0 ? lu : 0; i <= hu; i++)
+      for (int64_t j = lv > 0 ? lv : 0; j <= hv; j++) {
         double x = su + g->cell * (double)i, y = sv + g->cell * (double)j;
         double wp = (q[u] - x) * (r[v] - y) - (q[v] - y) * (r[u] - x);
         double wq = (r[u] - x) * (p[v] - y) - (r[v] - y) * (p[u] - x);
         double wr = (p[u] - x) * (q[v] - y) - (p[v] - y) * (q[u] - x);
         if (!((wp > 0 && wq > 0 && wr > 0) || (wp < 0 && wq < 0 && wr < 0))) continue;
-        double k = ceil(((wp * p[a] + wq * q[a] + wr * r[a]) / (wp + wq + wr) - g->origin[a]) / g->cell);
-        if (k > (double)(g->size[a] - 1)) continue;
+        int64_t k = -below(-(((wp * p[a] + wq * q[a] + wr * r[a]) / (wp + wq + wr) - g->origin[a]) / g->cell));
+        if (k > g->size[a] - 1) continue;
         int64_t at[3];
-        at[a] = k > 0 ? (int64_t)k : 0, at[u] = i, at[v] = j;
+        at[a] = k > 0 ? k : 0, at[u] = i, at[v] = j;
         crossed[node_of(g, at[0], at[1], at[2])] ^= 1;
       }
   }
-  int64_t total = g->size[0] * g->size[1] * g->size[2];
-  for (int64_t node = 0; node < total; node++) {
-    int64_t index = (node / step) % g->size[a];
-    if (index) crossed[node] ^= crossed[node - step];
-    votes[node] += crossed[node];
+  int64_t runs = a == 2 ? g->size[0] * g->size[1] : a == 1 ? g->size[0] : 1;  /* a line along z, or a plane, or all */
+  int64_t step = a == 2 ? 1 : a == 1 ? g->size[2] : g->size[1] * g->size[2], length = step * g->size[a];
+  for (int64_t run = 0; run < runs; run++) {
+    uint8_t *row = crossed + run * length, *vote = votes + run * length;
+    for (int64_t n = step; n < length; n++) row[n] ^= row[n - step];
+    for (int64_t n = 0; n < length; n++) vote[n] += row[n];
   }
 }
 
@@ -143,14 +157,17 @@ EXPORT int64_t skillframe_mark(const Grid* g, double tolerance, uint64_t* listed
         double v[8], mean = 0, slope[3] = {0, 0, 0}, low = FAR, high = -FAR, off = 0;
         for (int c = 0; c < 8; c++) {
           v[c] = g->value[node_of(g, i + (c >> 2), j + (c >> 1 & 1), k + (c & 1))];
-          mean += v[c] / 8, low = fmin(low, v[c]), high = fmax(high, v[c]);
-          for (int x = 0; x < 3; x++) slope[x] += (c >> (2 - x) & 1 ? 0.25 : -0.25) * v[c];
+          low = smaller(low, v[c]), high = larger(high, v[c]);
         }
         if (low > g->cell || high < -2 * g->cell) continue;
         for (int c = 0; c < 8; c++) {
+          mean += v[c] / 8;
+          for (int x = 0; x < 3; x++) slope[x] += (c >> (2 - x) & 1 ? 0.25 : -0.25) * v[c];
+        }
+        for (int c = 0; c < 8; c++) {
           double plane = mean;
           for (int x = 0; x < 3; x++) plane += (c >> (2 - x) & 1 ? 0.5 : -0.5) * slope[x];
-          off = fmax(off, fabs(v[c] - plane));
+          off = larger(off, fabs(v[c] - plane));
         }
         if (off <= tolerance && fabs(sqrt(dot(slope, slope)) - g->cell) <= 4 * tolerance) continue;
         int64_t node = node_of(g, i, j, k);
@@ -172,12 +189,14 @@ EXPORT void skillframe_gaps(const Grid* g, uint8_t* gap) {
       for (int64_t k = 0; k + 1 < g->size[2]; k++) {
         int64_t node = node_of(g, i, j, k);
         const float* v = g->value + node;
-        float low = fminf(fminf(fminf(v[0], v[1]), fminf(v[sy], v[sy + 1])),
-                          fminf(fminf(v[sx], v[sx + 1]), fminf(v[sx + sy], v[sx + sy + 1])));
+        const float* corner[4] = {v, v + sy, v + sx, v + sx + sy};
+        float low = v[0];
+        for (int c = 0; c < 4; c++)
+          for (int z = 0; z < 2; z++) low = corner[c][z] < low ? corner[c][z] : low;
         double cells = (double)low / g->cell;
         int listed = (int)(g->listed[node >> 6] >> (node & 63) & 1);
         if (listed ? cells > 0.87 : cells >= 0)
-          gap[node] = (uint8_t)(1 + fmin(254, fmax(0, floor((cells / LOOSE - 1.8) / CLEAR))));
+          gap[node] = (uint8_t)(1 + smaller(254, larger(0, (double)below((cells / LOOSE - 1.8) / CLEAR))));
       }
 }
 
@@ -192,17 +211,21 @@ static int64_t rank_of(const Grid* g, int64_t node) {
   return word & bit ? (int64_t)g->before[node >> 6] + __builtin_popcountll(word & (bit - 1)) : -1;
 }
 
-static void shorten(void* what, int64_t node, int64_t t, const double* corner, const double* place) {
+static INLINE void shorten(void* what, int64_t node, int64_t t, const double* corner, const double* place, double off) {
   Lists* lists = what;
   int64_t rank = rank_of(lists->grid, node);
   (void)t;
-  if (rank >= 0) lists->nearest[rank] = fminf(lists->nearest[rank], (float)distance_to(corner, place));
+  if (rank < 0 || off > (double)lists->nearest[rank]) return;
+  float away = (float)distance_to(corner, place);
+  if (away < lists->nearest[rank]) lists->nearest[rank] = away;
 }
 
-static void enlist(void* what, int64_t node, int64_t t, const double* corner, const double* place) {
+static INLINE void enlist(void* what, int64_t node, int64_t t, const double* corner, const double* place, double off) {
   Lists* lists = what;
   int64_t rank = rank_of(lists->grid, node);
-  if (rank < 0 || distance_to(corner, place) > (double)lists->nearest[rank] + 1.7321 * lists->grid->cell) return;
+  if (rank < 0) return;
+  double most = (double)lists->nearest[rank] + 1.7321 * lists->grid->cell;
+  if (off > most || distance_to(corner, place) > most) return;
   if (lists->triangle) lists->triangle[lists->grid->start[rank] + lists->count[rank]] = (int32_t)t;
   lists->count[rank]++;
 }
@@ -215,24 +238,53 @@ EXPORT void skillframe_lists(const Grid* g, const Mesh* mesh, float* nearest, in
   for (int64_t t = 0; t < mesh->count; t++) near_triangle(g, mesh, t, REACH * g->cell, 0.5, enlist, &lists);
 }
 
-/* Exact signed distances of points (count, 3) from a closed mesh, triangle by triangle. */
-EXPORT void skillframe_exact(const Mesh* mesh, int64_t count, const double* point, double* out) {
+/* Least and largest corner of some triangles (count), and of what is there already. */
+static void widen(const double* corner, int64_t count, double* box) {
+  for (int64_t n = 0; n < 3 * count; n++)
+    for (int x = 0; x < 3; x++) {
+      box[x] = smaller(box[x], corner[3 * n + x]);
+      box[3 + x] = larger(box[3 + x], corner[3 * n + x]);
+    }
+}
+
+/* How far a point is from a box along the axis in which that is most; 0 inside. No triangle in the box is nearer. */
+static INLINE double outside(const double* box, const double* p) {
+  double away = 0;
+  for (int x = 0; x < 3; x++) away = larger(away, larger(box[x] - p[x], p[x] - box[3 + x]));
+  return away;
+}
+
+/* Exact signed distances of points (count, 3) from a closed mesh; returns 1 where there is no memory.
+
+   Boxes are those of one triangle, of `RUN` that follow each other, and of `RUN` such runs. */
+EXPORT int skillframe_exact(const Mesh* mesh, int64_t count, const double* point, double* out) {
+  int64_t total = mesh->count, runs = (total + RUN - 1) / RUN, wide = (runs + RUN - 1) / RUN;
+  double* box = malloc(sizeof(double) * 6 * (size_t)(total + runs + wide + 1));
+  if (!box) return 1;
+  double *of_run = box + 6 * total, *of_wide = of_run + 6 * runs;
+  for (int64_t n = 0; n < 6 * (total + runs + wide); n++) box[n] = n % 6 < 3 ? FAR : -FAR;
+  for (int64_t t = 0; t < total; t++) {
+    widen(mesh->corner + 9 * t, 1, box + 6 * t);
+    widen(mesh->corner + 9 * t, 1, of_run + 6 * (t / RUN));
+    widen(mesh->corner + 9 * t, 1, of_wide + 6 * (t / RUN / RUN));
+  }
   for (int64_t i = 0; i < count; i++) {
     const double* p = point + 3 * i;
     double best = FAR, c[3], d[3];
-    for (int64_t t = 0; t < mesh->count; t++) {
-      const double* corner = mesh->corner + 9 * t;
-      double away = 0;
-      for (int x = 0; x < 3 && away < best; x++) {
-        double low = fmin(corner[x], fmin(corner[3 + x], corner[6 + x]));
-        double high = fmax(corner[x], fmax(corner[3 + x], corner[6 + x]));
-        away = fmax(away, fmax(low - p[x], p[x] - high));
+    for (int64_t w = 0; w < wide; w++) {
+      if (outside(of_wide + 6 * w, p) >= best) continue;
+      for (int64_t r = RUN * w; r < RUN * (w + 1) && r < runs; r++) {
+        if (outside(of_run + 6 * r, p) >= best) continue;
+        for (int64_t t = RUN * r; t < RUN * (r + 1) && t < total; t++) {
+          if (outside(box + 6 * t, p) >= best) continue;
+          int feature = nearest_on(mesh->corner + 9 * t, p, c);
+          for (int x = 0; x < 3; x++) d[x] = p[x] - c[x];
+          double size = sqrt(dot(d, d));
+          if (size < best) best = size, out[i] = dot(d, mesh->normal + 21 * t + 3 * feature) < 0 ? -size : size;
+        }
       }
-      if (away >= best) continue;
-      int feature = nearest_on(corner, p, c);
-      for (int x = 0; x < 3; x++) d[x] = p[x] - c[x];
-      double size = sqrt(dot(d, d));
-      if (size < best) best = size, out[i] = dot(d, mesh->normal + 21 * t + 3 * feature) < 0 ? -size : size;
     }
   }
+  free(box);
+  return 0;
 }

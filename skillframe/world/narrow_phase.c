@@ -17,8 +17,6 @@
 #define TURNING 0.010    /* m; by how much normals of 90 degrees apart count as farther apart in place, over sqrt 2 */
 #define SURELY 0.5       /* cells; what interpolates to more is outside, whatever edge is near (it is off by a quarter) */
 
-#define INLINE inline __attribute__((always_inline))
-
 static const Part* parts[PARTS];
 
 typedef struct {

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #define EXPORT __attribute__((visibility("default")))
+#define INLINE inline __attribute__((always_inline))
 #define CLEAR 0.25 /* cells; a gap of 1 + n says that every point within n of these is outside */
 
 typedef struct {
@@ -42,6 +43,16 @@ typedef struct {
 static inline double dot(const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 static inline double larger(double a, double b) { return a > b ? a : b; }
+
+static inline double smaller(double a, double b) { return a < b ? a : b; }
+
+/* The largest whole number that is not above x, which is held to what one has room for. */
+static inline int64_t below(double x) {
+  if (!(x > -1e15)) return -1000000000000000;
+  if (x > 1e15) return 1000000000000000;
+  int64_t whole = (int64_t)x;
+  return whole - ((double)whole > x);
+}
 
 static inline int64_t node_of(const Grid* g, int64_t i, int64_t j, int64_t k) {
   return (i * g->size[1] + j) * g->size[2] + k;

@@ -297,8 +297,14 @@ def _bits(words: NDArray[np.uint64]) -> NDArray[np.uint8]:
 
 
 def exact_distances(triangles: Triangles, points: Float) -> Float:
-    """Signed distances (P,) of points (P, 3) from a closed mesh, triangle by triangle [m]."""
+    """Signed distances (P,) of points (P, 3) from a closed mesh, triangle by triangle [m].
+
+    Raises:
+        SkillframeError: there is no compiler, or no memory.
+    """
     points = np.ascontiguousarray(points, dtype=np.float64)
     out = np.empty(len(points))
-    _require().skillframe_exact(ctypes.byref(_mesh(triangles)), ctypes.c_int64(len(points)), _at(points), _at(out))
+    mesh, count = _mesh(triangles), ctypes.c_int64(len(points))
+    if _require().skillframe_exact(ctypes.byref(mesh), count, _at(points), _at(out)):
+        raise SkillframeError(f"{len(triangles.corners):,} triangles do not fit into memory a second time")
     return out
