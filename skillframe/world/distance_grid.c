@@ -15,17 +15,27 @@
 #define ALMOST 0.999999 /* of a distance from a plane, beside rounding */
 #define RUN 16     /* triangles, or runs of them, with a box around */
 
-/* `off`: how far the place is from the triangle's plane, a little less than that, so no triangle is passed over. */
+/* Least and largest corner of some triangles (count), and of what is there already. */
+static void widen(const double* corner, int64_t count, double* box) {
+  for (int64_t n = 0; n < 3 * count; n++)
+    for (int x = 0; x < 3; x++) {
+      box[x] = smaller(box[x], corner[3 * n + x]);
+      box[3 + x] = larger(box[3 + x], corner[3 * n + x]);
+    }
+}
+
+/* `off`: how far the place is from the triangle's plane, or box, and a little less: the triangle itself is no nearer. */
 typedef void (*Visit)(void* what, int64_t node, int64_t triangle, const double* corner, const double* place, double off);
 
 /* Call a function at every node (at cell centres: shift 0.5) whose distance from a triangle's plane, and box, is small. */
 static INLINE void near_triangle(const Grid* g, const Mesh* mesh, int64_t t, double reach, double shift, Visit visit, void* what) {
   const double *corner = mesh->corner + 9 * t, *n = mesh->normal + 21 * t;
   int64_t low[3], high[3], at[3];
+  double box[6] = {FAR, FAR, FAR, -FAR, -FAR, -FAR};
   int a = 0;
+  widen(corner, 1, box);
   for (int x = 0; x < 3; x++) {
-    double least = smaller(corner[x], smaller(corner[3 + x], corner[6 + x])) - reach;
-    double most = larger(corner[x], larger(corner[3 + x], corner[6 + x])) + reach;
+    double least = box[x] - reach, most = box[3 + x] + reach;
     int64_t first = -below(-((least - g->origin[x]) / g->cell - shift)), last = below((most - g->origin[x]) / g->cell - shift);
     if (last < 0 || first > g->size[x] - 1) return;
     low[x] = first > 0 ? first : 0;
@@ -43,10 +53,12 @@ static INLINE void near_triangle(const Grid* g, const Mesh* mesh, int64_t t, dou
       int64_t end = below((height + across - g->origin[a]) / g->cell - shift);
       if (k < low[a]) k = low[a];
       if (end > high[a]) end = high[a];
+      double beside = larger(larger(box[u] - place[u], place[u] - box[3 + u]), larger(box[v] - place[v], place[v] - box[3 + v]));
       for (; k <= end; k++) {
         at[a] = k;
         place[a] = g->origin[a] + g->cell * ((double)k + shift);
-        visit(what, node_of(g, at[0], at[1], at[2]), t, corner, place, steep * fabs(place[a] - height));
+        double off = larger(beside, larger(box[a] - place[a], place[a] - box[3 + a]));
+        visit(what, node_of(g, at[0], at[1], at[2]), t, corner, place, larger(ALMOST * off, steep * fabs(place[a] - height)));
       }
     }
 }
@@ -201,14 +213,20 @@ EXPORT void skillframe_gaps(const Grid* g, uint8_t* gap) {
 }
 
 typedef struct {
+  int32_t rank, triangle;
+} Listed;
+
+typedef struct {
   const Grid* grid;
   float* nearest;
-  int32_t *count, *triangle;
+  int32_t* count;
+  Listed* found;
+  int64_t many, room;
 } Lists;
 
-static int64_t rank_of(const Grid* g, int64_t node) {
+static INLINE int64_t rank_of(const Grid* g, int64_t node) {
   uint64_t word = g->listed[node >> 6], bit = (uint64_t)1 << (node & 63);
-  return word & bit ? (int64_t)g->before[node >> 6] + __builtin_popcountll(word & (bit - 1)) : -1;
+  return word & bit ? (int64_t)g->before[node >> 6] + ones(word & (bit - 1)) : -1;
 }
 
 static INLINE void shorten(void* what, int64_t node, int64_t t, const double* corner, const double* place, double off) {
@@ -223,28 +241,53 @@ static INLINE void shorten(void* what, int64_t node, int64_t t, const double* co
 static INLINE void enlist(void* what, int64_t node, int64_t t, const double* corner, const double* place, double off) {
   Lists* lists = what;
   int64_t rank = rank_of(lists->grid, node);
-  if (rank < 0) return;
+  if (rank < 0 || !lists->found) return;
   double most = (double)lists->nearest[rank] + 1.7321 * lists->grid->cell;
   if (off > most || distance_to(corner, place) > most) return;
-  if (lists->triangle) lists->triangle[lists->grid->start[rank] + lists->count[rank]] = (int32_t)t;
+  if (lists->many == lists->room) {
+    Listed* more = realloc(lists->found, sizeof(Listed) * 2 * (size_t)lists->room);
+    if (!more) free(lists->found);
+    lists->found = more, lists->room *= 2;
+    if (!more) return;
+  }
+  lists->found[lists->many].rank = (int32_t)rank, lists->found[lists->many++].triangle = (int32_t)t;
   lists->count[rank]++;
 }
 
-/* The lists of a grid's marked cells. With `triangle` NULL they are counted alone, with `nearest` (cells,) for later. */
-EXPORT void skillframe_lists(const Grid* g, const Mesh* mesh, float* nearest, int32_t* count, int32_t* triangle) {
-  Lists lists = {g, nearest, count, triangle};
-  for (int64_t t = 0; !triangle && t < mesh->count; t++)
-    near_triangle(g, mesh, t, REACH * g->cell, 0.5, shorten, &lists);
-  for (int64_t t = 0; t < mesh->count; t++) near_triangle(g, mesh, t, REACH * g->cell, 0.5, enlist, &lists);
+/* What is surely farther from each marked cell's centre than a triangle is: from the values at its corners. */
+static void bound(const Grid* g, int64_t cells, float* nearest) {
+  int64_t total = g->size[0] * g->size[1] * g->size[2];
+  int64_t sx = g->size[1] * g->size[2], sy = g->size[2], corner[8] = {0, 1, sy, sy + 1, sx, sx + 1, sx + sy, sx + sy + 1};
+  for (int64_t node = 0, rank = 0; node < total && rank < cells; node++) {
+    if (!(g->listed[node >> 6] >> (node & 63) & 1)) continue;
+    double least = FAR;
+    for (int c = 0; c < 8; c++) least = smaller(least, fabs((double)g->value[node + corner[c]]));
+    nearest[rank++] = (float)(1.0001 * (least + 0.8661 * g->cell));
+  }
 }
 
-/* Least and largest corner of some triangles (count), and of what is there already. */
-static void widen(const double* corner, int64_t count, double* box) {
-  for (int64_t n = 0; n < 3 * count; n++)
-    for (int x = 0; x < 3; x++) {
-      box[x] = smaller(box[x], corner[3 * n + x]);
-      box[3 + x] = larger(box[3 + x], corner[3 * n + x]);
-    }
+static double most_of(const float* values, int64_t count) {
+  double most = 0;
+  for (int64_t i = 0; i < count; i++) most = larger(most, values[i]);
+  return most;
+}
+
+/* Find the lists of a grid's marked cells: how many there are in each, and all of them, by triangle; -1 without memory. */
+EXPORT int64_t skillframe_lists(const Grid* g, const Mesh* mesh, int64_t cells, float* nearest, int32_t* count, Listed** found) {
+  Lists lists = {g, nearest, count, malloc(sizeof(Listed) << 16), 0, 1 << 16};
+  bound(g, cells, nearest);
+  double reach = smaller(REACH * g->cell, most_of(nearest, cells));
+  for (int64_t t = 0; t < mesh->count; t++) near_triangle(g, mesh, t, reach, 0.5, shorten, &lists);
+  reach = smaller(REACH * g->cell, 1.0001 * (most_of(nearest, cells) + 1.7321 * g->cell));
+  for (int64_t t = 0; t < mesh->count; t++) near_triangle(g, mesh, t, reach, 0.5, enlist, &lists);
+  *found = lists.found;
+  return lists.found ? lists.many : -1;
+}
+
+/* Put what was found into the list of its cell, from `start`, the lists' ends where the next goes, and forget it. */
+EXPORT void skillframe_sort(int64_t many, Listed* found, int32_t* start, int32_t* triangle) {
+  for (int64_t i = 0; i < many; i++) triangle[start[found[i].rank]++] = found[i].triangle;
+  free(found);
 }
 
 /* How far a point is from a box along the axis in which that is most; 0 inside. No triangle in the box is nearer. */

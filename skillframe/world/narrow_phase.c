@@ -80,7 +80,7 @@ static double in_cell(const Part* part, const Grid* g, int64_t node, const doubl
   if (value > SURELY * g->cell) return value;
   uint64_t word = g->listed[node >> 6], bit = (uint64_t)1 << (node & 63);
   if (word & bit)
-    return in_list(part, g, (int64_t)g->before[node >> 6] + __builtin_popcountll(word & (bit - 1)), p, normal);
+    return in_list(part, g, (int64_t)g->before[node >> 6] + ones(word & (bit - 1)), p, normal);
   if (value < 0) {
     double z00 = v[1] - v[0], z01 = v[sy + 1] - v[sy], z10 = v[sx + 1] - v[sx], z11 = v[sx + sy + 1] - v[sx + sy];
     double z0 = z00 + w[1] * (z01 - z00), z1 = z10 + w[1] * (z11 - z10);

@@ -54,6 +54,13 @@ static inline int64_t below(double x) {
   return whole - ((double)whole > x);
 }
 
+/* How many bits are set, without the instruction for it, which not every processor has. */
+static inline int ones(uint64_t word) {
+  word -= word >> 1 & 0x5555555555555555u;
+  word = (word & 0x3333333333333333u) + (word >> 2 & 0x3333333333333333u);
+  return (int)(((word + (word >> 4)) & 0x0f0f0f0f0f0f0f0fu) * 0x0101010101010101u >> 56);
+}
+
 static inline int64_t node_of(const Grid* g, int64_t i, int64_t j, int64_t k) {
   return (i * g->size[1] + j) * g->size[2] + k;
 }

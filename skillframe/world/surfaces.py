@@ -151,7 +151,7 @@ def library() -> ctypes.CDLL | None:
     found = opened()
     if found is None or found.skillframe_version() != mujoco.mj_version():
         return None
-    found.skillframe_mark.restype = ctypes.c_int64
+    found.skillframe_mark.restype = found.skillframe_lists.restype = ctypes.c_int64
     found.skillframe_mark.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
     table = (ctypes.c_void_p * 1).in_dll(_engine(), "mjCOLLISIONFUNC")
     found.skillframe_install(ctypes.byref(table))
@@ -279,12 +279,14 @@ def grid_of(triangles: Triangles, low: Float, high: Float, cell: float) -> Dista
     bits = np.bitwise_count(listed) if hasattr(np, "bitwise_count") else _bits(listed)
     before = (np.cumsum(bits, dtype=np.uint32) - bits).astype(np.uint32)
     made.before = _at(before).value
-    nearest, many = np.full(max(count, 1), 1e9, dtype=np.float32), np.zeros(max(count, 1), dtype=np.int32)
-    found.skillframe_lists(ctypes.byref(made), ctypes.byref(mesh), _at(nearest), _at(many), None)
+    nearest, many, pairs = np.zeros(count, dtype=np.float32), np.zeros(count, dtype=np.int32), ctypes.c_void_p()
+    listed_at = _at(nearest), _at(many), ctypes.byref(pairs)
+    total = int(found.skillframe_lists(ctypes.byref(made), ctypes.byref(mesh), ctypes.c_int64(count), *listed_at))
+    if total < 0:
+        raise SkillframeError("lists of triangles for contact do not fit into memory; take a mesh of fewer triangles")
     start = np.concatenate([[0], np.cumsum(many)]).astype(np.int32)
-    triangle = np.zeros(max(int(start[-1]), 1), dtype=np.int32)
-    made.start, many[:] = _at(start).value, 0
-    found.skillframe_lists(ctypes.byref(made), ctypes.byref(mesh), _at(nearest), _at(many), _at(triangle))
+    triangle, next_ = np.zeros(max(total, 1), dtype=np.int32), start.copy()
+    found.skillframe_sort(ctypes.c_int64(total), pairs, _at(next_), _at(triangle))
     return DistanceGrid(
         origin=grid.origin, cell=cell, value=value, gap=gap, listed=listed, before=before, start=start,
         triangle=triangle, disagree=disagree.value / value.size,
