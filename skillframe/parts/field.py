@@ -18,7 +18,7 @@ from skillframe.world.surfaces import DistanceGrid, Surface, Triangles, exact_di
 
 LEAST_CELL, MOST_NODES = 1.2e-4, 3e6
 _COARSE_NODES = 2e5
-_MARGIN = 4.37  # cells around the part; no node is to lie on a face
+_MARGIN = 4.37  # cells around the part, as narrow_phase.c knows; no node is to lie on a face
 _APART = 0.8  # of the spacing of points
 _LOOKED_AT, _NEAR = 3000, 1e-4  # points, and how far from the surface [m]
 

@@ -15,6 +15,7 @@
 #define MOST 24          /* contacts of a pair */
 #define CANDIDATES 4096
 #define TURNING 0.010    /* m; by how much normals of 90 degrees apart count as farther apart in place, over sqrt 2 */
+#define AROUND 4.27      /* cells around a whole part, within its widest grid; a tenth of one less than there are */
 #define SURELY 0.5       /* cells; what interpolates to more is outside, whatever edge is near (it is off by a quarter) */
 
 static const Part* parts[PARTS];
@@ -170,21 +171,20 @@ static int is_clear(const Shape* in, const double* centre, double radius) {
     apply(&in->across, centre, p);
     return in_box(in->half, p, w) > radius;
   }
+  const View* whole = in->view + (in->view[1].cells[0] > 0);
+  double beside = 0;
+  for (int x = 0; x < 3; x++) {
+    double at = dot(whole->turn + 3 * x, centre) + whole->shift[x];
+    double away = larger(AROUND - at, at - whole->cells[x] + AROUND) * whole->grid->cell;
+    if (away > 0) beside += away * away;
+  }
+  if (beside > radius * radius) return 1;
   for (int level = 0; level < 2; level++) {
     const View* view = in->view + level;
     int64_t node = cell_at(view, centre, w);
     if (node >= 0) return CLEAR * view->grid->cell * ((double)view->grid->gap[node] - 1) > radius;
   }
-  for (int level = 0; level < 2; level++) {
-    const View* view = in->view + level;
-    double away = 0;
-    for (int x = 0; x < 3; x++) {
-      double at = dot(view->turn + 3 * x, centre) + view->shift[x];
-      away = larger(away, larger(-at, at - view->cells[x]));
-    }
-    if (view->cells[0] > 0 && !(away * view->grid->cell > radius)) return 0;
-  }
-  return 1;
+  return 0;
 }
 
 /* Add what the points of one part find in the other; `sign` turns gradients to normals from the first to the second. */
@@ -227,7 +227,7 @@ static int choose(int found, double apart, mjPreContact* con) {
         away[x] = c->pos[x] - taken.pos[x];
         turned[x] = TURNING * (c->normal[x] - taken.normal[x]);
       }
-      c->apart = fmin(c->apart, sqrt(dot(away, away)) + sqrt(dot(turned, turned)));
+      c->apart = smaller(sqrt(dot(away, away)) + sqrt(dot(turned, turned)), c->apart);
       if (c->apart > apart && (next < 0 || c->apart > candidates[next].apart)) next = i;
     }
   }
@@ -256,7 +256,7 @@ static int collide(const mjModel* m, mjData* d, mjPreContact* con, int g1, int g
   if (!one || !two) return 0;
   int found = look(one, &f1, two, NULL, &f2, -1.0, 0);
   found = look(two, &f2, one, NULL, &f1, 1.0, found);
-  return choose(found, fmin(one->apart, two->apart), con);
+  return choose(found, smaller(one->apart, two->apart), con);
 }
 
 /* A box, as a table, and a part: the part's points alone, since no edge of a table is sampled. */
