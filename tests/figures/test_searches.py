@@ -4,6 +4,9 @@ Truths are closed forms over [-1, 1]^d. The error of a border is the volume wher
 over the volume of the true one. Sobol points beside it: the same surrogate from as many of them.
 """
 
+from heapq import heapify, heappop, heappush
+from itertools import islice
+
 import numpy as np
 import pytest
 from scipy.stats import qmc
@@ -68,8 +71,8 @@ def mapped(truth, dimension, seed):
 @pytest.mark.parametrize(
     ("truth", "dimension", "seeds", "most"),
     [
-        (ellipsoid, 2, 20, 0.05), (lobes, 2, 20, 0.05), (wedge, 2, 20, None), (ellipsoid, 3, 5, None),
-        (lobes, 3, 3, None), (ellipsoid, 4, 2, 0.1), (lobes, 4, 1, None),
+        (ellipsoid, 2, 20, 0.05), (lobes, 2, 20, 0.05), (wedge, 2, 10, None), (ellipsoid, 3, 6, None),
+        (lobes, 3, 5, None), (ellipsoid, 4, 3, 0.1), (lobes, 4, 2, None),
     ],
 )  # fmt: skip
 def test_a_border_is_found_with_half_the_error_of_sobol_points(truth, dimension, seeds, most):
@@ -110,41 +113,113 @@ def wide_dent(rng, dimension):
     return dent(rng, dimension, slope=1.0)
 
 
+def broken(kind, dimension, seed, degrees=None):
+    """Size found over the smallest, trials, and the first trial of all that failed within 10 % of the smallest."""
+    rng = np.random.default_rng([SEED, seed, dimension])
+    truth, least = kind(rng, dimension) if degrees is None else kind(rng, dimension, 1.0 / np.tan(np.radians(degrees)))
+    seen = sobol(dimension, seed)[: LOOKS[dimension]]
+    tried = [seen]
+    search = breaking.search(Looked(seen, truth(seen)), np.zeros(dimension), breaking.BUDGET[dimension])
+    try:
+        batch = next(search)
+        while True:
+            tried.append(batch.points)
+            batch = search.send(Looked(batch.points, truth(batch.points)))
+    except StopIteration as end:
+        points = np.concatenate(tried)
+        there = np.flatnonzero(~truth(points) & (np.linalg.norm(points, axis=1) <= 1.1 * least))
+        found = np.linalg.norm(end.value.points, axis=1)
+        size = found[0] / least if len(found) else np.inf
+        return size, end.value.trials, there[0] + 1 if len(there) else np.inf
+
+
+def told(name, dimension, found):
+    """A row of the table. How many of the truths were met, and met within 10 %."""
+    sizes, spent, first = (np.array(column) for column in zip(*found, strict=True))
+    met, near = int(np.sum(np.isfinite(sizes))), int(np.sum(sizes <= 1.1))
+    row(
+        f"{name}, {dimension}-D", f"{near} of {len(sizes)} within 10 %, {met} met",
+        f"worst of those {sizes[np.isfinite(sizes)].max():.2f}, {np.median(spent):.0f} trials after {LOOKS[dimension]}",
+        f"met after {np.median(first):.0f} in all (median), within 600 in {np.sum(first <= 600)}, "
+        f"within 1024 in {np.sum(first <= 1024)}; at most {max(spent)}",
+    )  # fmt: skip
+    return met, near
+
+
+BROKEN = range(300, 360)
+"""Truths: their seeds."""
+
+
 @pytest.mark.parametrize("kind", [planes, dent, wide_dent])
 @pytest.mark.parametrize("dimension", [2, 3, 4, 5, 6])
 def test_a_breaking_point_is_within_a_tenth_of_the_smallest_in_fourteen_of_fifteen(kind, dimension):
-    sizes, spent, first = [], [], []
-    for seed in range(15):
-        rng = np.random.default_rng([SEED, seed, dimension])
-        truth, least = kind(rng, dimension)
-        seen = sobol(dimension, seed)[: LOOKS[dimension]]
-        tried = [seen]
-        search = breaking.search(Looked(seen, truth(seen)), np.zeros(dimension), breaking.BUDGET[dimension])
-        try:
-            batch = next(search)
-            while True:
-                tried.append(batch.points)
-                batch = search.send(Looked(batch.points, truth(batch.points)))
-        except StopIteration as end:
-            points = np.concatenate(tried)
-            there = np.flatnonzero(~truth(points) & (np.linalg.norm(points, axis=1) <= 1.1 * least))
-            first.append(there[0] + 1 if len(there) else np.inf)
-            found = np.linalg.norm(end.value.points, axis=1)
-            sizes.append(found[0] / least if len(found) else np.inf)
-            spent.append(end.value.trials)
-    near = sum(size <= 1.1 for size in sizes)
-    row(
-        f"{kind.__name__}, {dimension}-D", f"{near} of 15 within 10 %, {np.sum(np.isfinite(sizes))} met",
-        f"worst {max(sizes):.2f}, {np.median(spent):.0f} trials after {LOOKS[dimension]} looked at",
-        f"met after {np.median(first):.0f} in all (median), within 600 in {np.sum(np.array(first) <= 600)}, "
-        f"within 1024 in {np.sum(np.array(first) <= 1024)}; at most {max(spent)}",
-    )  # fmt: skip
-    met = np.sum(np.isfinite(sizes))
-    if kind is dent and dimension > 4:  # fails in 0.2 and 0.07 % of all directions: that one is met is luck
-        assert met >= {5: 12, 6: 8}[dimension]  # as many as 900 rays meet by chance
-        assert near >= met - 1
+    met, near = told(kind.__name__, dimension, [broken(kind, dimension, seed) for seed in BROKEN])
+    if kind is dent and dimension > 4:  # fails in 0.2 and 0.08 % of all directions: that one is met is luck
+        chance = covered(ways(dimension, breaking.BUDGET[dimension] - 64), axes(dimension, 30_000, 1)).mean()
+        assert met >= len(BROKEN) * chance - 2.0 * np.sqrt(len(BROKEN) * chance * (1.0 - chance))
+        assert near >= 0.9 * met
     else:
-        assert near >= 14
+        assert near >= 14 / 15 * len(BROKEN)
+
+
+@pytest.mark.parametrize("degrees", [30, 33, 36])
+def test_how_wide_a_dent_in_six_ranges_is_found(degrees):
+    """13 of 15 are found from a half angle of 36 degrees on."""
+    _, near = told(f"dent, {degrees} degrees", 6, [broken(dent, 6, seed, degrees) for seed in BROKEN])
+    assert near >= 13 / 15 * len(BROKEN) or degrees < 36
+
+
+def axes(dimension, count, seed):
+    """(count, d) directions drawn evenly."""
+    drawn = np.random.default_rng([SEED, seed]).standard_normal((count, dimension))
+    return drawn / np.linalg.norm(drawn, axis=1)[:, None]
+
+
+def ways(dimension, count):
+    return np.array(list(islice(breaking.spread(np.zeros(dimension)), count)))
+
+
+def fails_up_to(directions, slope=2.0, tip=0.4):
+    """Cosine of the angle t to its axis up to which a dent is met at a ray's end R: cos t - slope sin t = tip / R."""
+    ends = breaking.reach(np.zeros(directions.shape[1]), directions)
+    return np.cos(np.arccos(tip / ends / np.hypot(1.0, slope)) - np.arctan(slope))
+
+
+def covered(directions, about):
+    """(m,) which dents about (m, d) axes any of the rays meets at its end."""
+    angles = fails_up_to(directions)
+    return np.concatenate([np.any(part @ directions.T > angles, axis=1) for part in np.array_split(about, 20)])
+
+
+def known_best(directions, about, count):
+    """Of directions the `count` that meet most dents about axes, each the best beside those before."""
+    angles = fails_up_to(directions)[:, None]
+    meets = [np.flatnonzero(m) for part in np.array_split(np.arange(len(directions)), 40)
+             for m in directions[part] @ about.T > angles[part]]  # fmt: skip
+    free, picked = np.ones(len(about), dtype=bool), []
+    heap = [(-len(m), i) for i, m in enumerate(meets)]
+    heapify(heap)
+    while len(picked) < count:
+        i = heappop(heap)[1]
+        gain = int(np.sum(free[meets[i]]))
+        if heap and gain < -heap[0][0]:
+            heappush(heap, (-gain, i))
+            continue
+        free[meets[i]] = False
+        picked.append(i)
+    return directions[picked]
+
+
+@pytest.mark.parametrize("dimension", [5, 6])
+def test_ways_meet_almost_as_many_narrow_dents_as_ways_chosen_for_them(dimension):
+    """Chosen greedily for the very dent, by axes that are not those that judge."""
+    about, count = axes(dimension, 40_000, 2), 1024
+    best = known_best(axes(dimension, 12_000, 3), axes(dimension, 200_000, 4), count)
+    designs = best, ways(dimension, count), breaking.directions(dimension)[:count]
+    chosen, ours, even = (covered(design, about).mean() for design in designs)
+    row(f"{count} ways, {dimension}-D", f"meet {ours:.3f}, Sobol {even:.3f}", f"chosen for the dent {chosen:.3f}")
+    assert even < 0.95 * ours
+    assert ours > 0.95 * chosen
 
 
 RANKED = {

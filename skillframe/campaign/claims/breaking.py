@@ -1,12 +1,12 @@
 r"""The smallest disturbance that breaks a skill: rays from where it works, then a local search about the best of them.
 
 A disturbance is a point of the declared ranges; its size is its distance from the nominal point, each quantity counted
-in half widths of its range. Sobol directions are tried just inside the best radius found so far, where most rays work
-and cost one trial; those that fail are bisected, all side by side. Where none fails, more are tried until few trials
-are left: what fails in few directions only is met by chance. Then the three best rays, thirty degrees apart, are bent
-at random and shortened, a batch at a time: a step grows after a hit, shrinks after a miss and begins again once it is
-small (an evolution strategy with one parent a ray). Batches instead of single trials are our choice: a batch of 24
-takes hardly longer than one trial.
+in half widths of its range. Directions as far apart as can be are tried just inside the best radius found so far,
+where most rays work and cost one trial; those that fail are bisected, all side by side. Where none fails, more are
+tried until few trials are left: what fails in few directions only is met by chance. Then the three best rays, thirty
+degrees apart, are bent at random and shortened, a batch at a time: a step grows after a hit, shrinks after a miss and
+begins again once it is small (an evolution strategy with one parent a ray). Batches instead of single trials are our
+choice: a batch of 24 takes hardly longer than one trial.
 
 The last point is tried again with fresh noise. What comes out is the smallest disturbance *found*: a smaller one in a
 direction that no ray met may exist.
@@ -14,8 +14,9 @@ direction that no ray met may exist.
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +39,8 @@ KNOWN = 16
 FACTORS = (0.98, 0.94, 0.88, 0.98, 0.8, 0.98, 0.94, 0.65)
 """Radii of a ray's children over its own."""
 BEGIN, GROW, SHRINK = 0.3, 1.5, 1.6
+POOL, DECIMALS = 14, 6
+"""Binary logarithm of the directions to choose from, and the digits of a score that count."""
 
 
 class BreakingPoints(NamedTuple):
@@ -64,25 +67,44 @@ class Ray:
     step: float = BEGIN
 
 
-def reach(origin: Float, direction: Float) -> float:
-    """How far a ray from a point of the ranges goes until it leaves them."""
+def reach(origin: Float, directions: Float) -> Float:
+    """How far rays (..., d) from a point of the ranges go until they leave them, (...,)."""
     with np.errstate(divide="ignore"):
-        room = np.where(direction > 0.0, 1.0 - origin, np.where(direction < 0.0, -1.0 - origin, np.inf))
-        lengths = np.where(direction != 0.0, room / direction, np.inf)
-    return float(max(0.0, lengths.min()))
+        room = np.where(directions > 0.0, 1.0 - origin, np.where(directions < 0.0, -1.0 - origin, np.inf))
+        lengths = np.where(directions != 0.0, room / directions, np.inf)
+    result: Float = np.maximum(0.0, lengths.min(axis=-1))
+    return result
 
 
-def directions(dimension: int, count: int) -> Float:
-    """(count, d) unit vectors, even over the sphere."""
+def directions(dimension: int) -> Float:
+    """(2^POOL, d) unit vectors, even over the sphere."""
     from scipy.special import ndtri
     from scipy.stats import qmc
 
-    points = qmc.Sobol(dimension, scramble=True, rng=np.random.default_rng(1)).random_base2((count - 1).bit_length())[
-        :count
-    ]
+    points = qmc.Sobol(dimension, scramble=True, rng=np.random.default_rng(1)).random_base2(POOL)
     normal = ndtri(np.clip(points, 1e-9, 1.0 - 1e-9))
     result: Float = normal / np.sqrt(np.sum(normal**2, axis=1, keepdims=True))
     return result
+
+
+def spread(origin: Float) -> Iterator[Float]:
+    """Unit vectors (d,) without end, each as far as can be from those before, that with the longest ray first.
+
+    Of `directions` the next is that whose angle to its nearest predecessor is largest, times the root of how far its
+    ray goes: a failure that widens as it goes out is the wider the farther a ray goes. Root and angle are our choice;
+    scores are rounded, so that last bits of other processors pick the same.
+    """
+    ways = directions(len(origin))
+    weights = np.sqrt(reach(origin, ways))
+    nearest = np.full(len(ways), np.pi)
+    while True:
+        score = np.round(nearest * weights, DECIMALS)
+        if not np.any(score > 0.0):  # all were taken: they begin again, for noise may decide
+            nearest[:] = np.pi
+            continue
+        way = ways[np.argmax(score)]
+        nearest = np.minimum(nearest, np.arccos(np.clip(ways @ way, -1.0, 1.0)))
+        yield way
 
 
 def search(
@@ -127,11 +149,11 @@ def known_rays(seen: Looked, origin: Float) -> list[Ray]:
 def _rays(rays: list[Ray], origin: Float, most: int, say: Say) -> Generator[ToTry, Looked, int]:
     """Find rays that fail, and how near, of `most` ways while none does. Returns the trials it took."""
     best, count = min((ray.radius for ray in rays), default=np.inf), _count(len(origin))
-    ways, spent = directions(len(origin), max(most, count)), 0
+    ways, spent = spread(origin), 0
     while not spent or (not rays and spent + count <= most):
-        new = [Ray(way, min(reach(origin, way), INSIDE * best)) for way in ways[spent : spent + count]]
-        fails = yield from _tried(origin, [(ray.direction, ray.radius) for ray in new])
-        rays += [ray for ray, failed in zip(new, fails, strict=True) if failed]
+        new = [(way, min(float(reach(origin, way)), INSIDE * best)) for way in islice(ways, count)]
+        fails = yield from _tried(origin, new)
+        rays += [Ray(way, radius) for (way, radius), failed in zip(new, fails, strict=True) if failed]
         spent += len(new)
     while live := _live(rays):
         middles = [0.5 * (ray.works + ray.radius) for ray in live]

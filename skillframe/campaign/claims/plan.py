@@ -1,6 +1,6 @@
 """`plan.jsonl`: what a folder's searches were about to run, written before it ran.
 
-    {"stream": "border", "round": 3, "names": [...], "points": [[...]], "explored": 8, "rows": ..., "method": 2,
+    {"stream": "border", "round": 3, "names": [...], "points": [[...]], "explored": 8, "rows": ..., "method": 3,
      "previous": ...}
 
 A line holds a round's points in SI, the hash of the rows they were computed from, and the hash of the line before, so
@@ -25,8 +25,9 @@ from skillframe.files.documents import parse_json
 from skillframe.frames import Float
 
 PLAN = "plan.jsonl"
-METHOD = 2
-"""How searches pick. 1, before the surrogate climbed from two noises, was not written down."""
+METHOD = 3
+"""How searches pick. 1, before the surrogate climbed from two noises, was not written down; 2 took Sobol points on the
+sphere for the ways of a breaking point."""
 FIX = "a plan cannot be repaired: start again in another folder"
 BEGIN = ""
 """What the first line says of the one before."""

@@ -19,7 +19,7 @@ import numpy as np
 from skillframe.campaign.axes import Axis
 from skillframe.campaign.claims.border import ToTry
 from skillframe.campaign.claims.engine import Engine, Looked, rows_of_campaign, succeeded
-from skillframe.campaign.claims.plan import FIX, PLAN, Round, RoundPlan
+from skillframe.campaign.claims.plan import FIX, METHOD, PLAN, Round, RoundPlan
 from skillframe.campaign.claims.question import LOOK, Question, read_question
 from skillframe.campaign.folder import SCENE, load, prepare, sweep, sweep_prepared
 from skillframe.campaign.provenance import file_hash
@@ -85,7 +85,7 @@ def carry_out(
 ) -> Found:  # fmt: skip
     """Run a search to its end: what it plans is written down, then run, then told to it.
 
-    Rounds that the plan holds are taken from there.
+    Rounds that the plan holds are taken from there. The border follows any points; the other searches follow their own.
 
     Args:
         folder: of the question.
@@ -93,6 +93,9 @@ def carry_out(
         search: yields batches in scaled quantities.
         engine: how trials run.
         unusual: told what workers have to say.
+
+    Raises:
+        InputError: another version of skillframe began it, and picked otherwise.
     """
     question = read_question(folder)
     for place in (folder, folder / stream):
@@ -104,10 +107,15 @@ def carry_out(
         while True:
             number += 1
             known = plan.of(stream)
+            points = np.array([question.in_si(point) for point in batch.points])
             if number <= len(known):
                 entry = known[number - 1]
+                if stream != BORDER and entry.method != METHOD and not np.array_equal(points, entry.points):
+                    raise InputError(
+                        folder / stream, "was begun by another version of skillframe, which picked its trials otherwise",
+                        "go on with that version, or start again in another folder",
+                    )  # fmt: skip
             else:
-                points = np.array([question.in_si(point) for point in batch.points])
                 entry = plan.append(stream, points, batch.explored, rows_hash(folder, stream, number))
             run_round(folder, entry, engine, unusual)
             batch = search.send(ended(folder, question, entry, engine.params))

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from scipy.stats import norm, qmc
 from search_fakes import content, everything
 from test_certify import ENGINE, TEXT, asked, inside, written
 
-from skillframe.campaign.claims import border, breaking, matter, procedure
+from skillframe.campaign.claims import border, breaking, matter, plan, procedure
 from skillframe.campaign.claims.engine import Looked
 from skillframe.campaign.claims.plan import PLAN, RoundPlan
 from skillframe.campaign.claims.question import ask_again, begin, read_question
@@ -107,7 +108,7 @@ def test_the_smallest_disturbance_of_two_planes_is_the_nearer_one():
     assert found.trials <= 200 + 32  # rays are bisected to their end
     sizes = np.linalg.norm(found.points, axis=1)
     assert 0.6 <= sizes[0] < 0.63  # radii are bisected to 5 %, then shortened by 2 % at least a hit
-    assert np.all(np.diff(sizes) >= 0.0)
+    assert np.all(np.diff(sizes) >= -1e-12)  # two rays end equally far, and their points are rounded
     assert not truth(found.points).any()
 
 
@@ -129,6 +130,30 @@ def test_where_nothing_fails_there_is_no_breaking_point():
 def test_a_ray_ends_where_the_ranges_do():
     assert breaking.reach(np.array([0.5, 0.0]), np.array([1.0, 0.0])) == pytest.approx(0.5)
     assert breaking.reach(np.array([0.0, 0.0]), np.array([0.6, -0.8])) == pytest.approx(1.25)
+
+
+def test_ways_are_as_far_apart_as_can_be_and_begin_with_a_longest_ray():
+    """In the plane: a corner, the opposite one, the two others, then the middles, to the pool's grain."""
+    ways = np.array(list(islice(breaking.spread(np.zeros(2)), 8)))
+    diagonals = np.abs(ways[:4, 0] * ways[:4, 1])
+    assert diagonals == pytest.approx(0.5, abs=1e-3)
+    assert ways[0] == pytest.approx(-ways[1], abs=0.01)
+    assert np.sort(np.abs(ways[4:]).max(axis=1)) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_sixty_four_ways_in_six_quantities_are_further_apart_than_even_ones():
+    def nearest(ways):
+        return (ways @ ways.T - 2.0 * np.eye(len(ways))).max()
+
+    ways = np.array(list(islice(breaking.spread(np.zeros(6)), 64)))
+    assert nearest(ways) < np.cos(np.radians(40.0)) < nearest(breaking.directions(6)[:64])
+
+
+def test_ways_from_a_corner_lead_into_the_ranges_and_in_one_quantity_they_take_turns():
+    corner = np.array([1.0, 1.0, -1.0])
+    ways = np.array(list(islice(breaking.spread(corner), 40)))
+    assert np.all(ways * corner < 0.0)
+    assert np.sum(list(islice(breaking.spread(np.zeros(1)), 32))) == 0.0
 
 
 def test_indices_of_a_linear_truth_are_the_shares_of_its_variance():
@@ -205,6 +230,20 @@ def test_a_nominal_value_outside_its_range_is_refused_in_words(tmp_path):
     assert nominal(out, read_question(out))["fixture.tilt_y"] == 0.0
     with pytest.raises(InputError, match=r"vary\.fixture.tilt_y: does not contain its nominal value"):
         find_break(out, ENGINE, quiet)
+
+
+def test_a_breaking_point_that_another_version_began_to_look_for_is_not_gone_on_with(tmp_path, monkeypatch):
+    out = asked(tmp_path)
+    procedure.look(out, ENGINE)
+    with monkeypatch.context() as otherwise:
+        otherwise.setattr(breaking, "POOL", 6)
+        otherwise.setattr(plan, "METHOD", 2)
+        before = find_break(out, ENGINE, quiet)
+    with pytest.raises(InputError, match="begun by another version of skillframe"):
+        find_break(out, ENGINE, quiet)
+    with monkeypatch.context() as same:  # what follows from the trials all the same is gone on with
+        same.setattr(breaking, "POOL", 6)
+        assert find_break(out, ENGINE, quiet) == before
 
 
 def test_claims_are_neither_older_than_their_trials_nor_without_end(tmp_path):
