@@ -34,6 +34,7 @@ from skillframe.frames import Float
 BORDER = "border"
 PAIRED = ("matter",)
 """Streams whose rounds share their noise, so that trials of one number are pairs."""
+OTHERWISE = "was begun by another version of skillframe, which picked its trials otherwise"
 Found = TypeVar("Found")
 
 
@@ -111,10 +112,7 @@ def carry_out(
             if number <= len(known):
                 entry = known[number - 1]
                 if stream != BORDER and entry.method != METHOD and not np.array_equal(points, entry.points):
-                    raise InputError(
-                        folder / stream, "was begun by another version of skillframe, which picked its trials otherwise",
-                        "go on with that version, or start again in another folder",
-                    )  # fmt: skip
+                    raise InputError(folder / stream, OTHERWISE, "go on with that version, or start again elsewhere")
             else:
                 entry = plan.append(stream, points, batch.explored, rows_hash(folder, stream, number))
             run_round(folder, entry, engine, unusual)
