@@ -24,6 +24,10 @@ DENSITY = 2700.0
 """Of the held part where the file gives neither mass nor density [kg/m3]: aluminium."""
 
 
+OVERLAP = 1e-5
+"""Overlap of assembled parts that is let pass where the file says nothing [m]: less than a contact sinks by."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FixturePart:
     """`[fixture]`, the part that stands still.
@@ -70,9 +74,13 @@ class ContactKeys:
 
     Attributes:
         friction: Coulomb coefficient [0 to 5].
+        as_meshed: the meshes are the parts: facets and closed holes are not held against the curves once drawn.
+        overlap: mean thickness of what both parts claim in the assembled pose that is let pass [m, 0mm to 0.1mm].
     """
 
     friction: float = 0.2
+    as_meshed: bool = False
+    overlap: float = OVERLAP
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

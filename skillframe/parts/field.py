@@ -2,7 +2,10 @@
 
 The grid's cells are as small as three million of them allow, and not below 0.12 mm: a fine grid where the two parts can
 meet, and a coarse one of the whole part. How exact it is is measured, not assumed: distance as contacts see it against
-that of every triangle, at points near the surface, most of them near edges.
+that of every triangle, at points near the surface, most of them near edges. Where the two take a point for inside and
+outside, the winding number decides: normals of edges at which more than two triangles meet do not tell,
+
+    w(p) = sum of the triangles' solid angles at p / 4 pi,    inside where w > 1/2    (Jacobson et al., TOG 32(4), 2013)
 """
 
 from __future__ import annotations
@@ -11,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.frames import Float
+from skillframe.frames import Float, cross, norm
 from skillframe.parts.points import points_of
 from skillframe.parts.solid import arrays_of
 from skillframe.world.surfaces import DistanceGrid, Surface, Triangles, exact_distances, grid_of, triangles_of
@@ -54,8 +57,22 @@ def error_of(surface: Surface, low: Float, high: Float) -> float:
     some = points[draw.integers(len(points), size=_LOOKED_AT)]
     points = some + draw.uniform(-_NEAR, _NEAR, some.shape)
     exact, seen = exact_distances(surface.triangles, points), surface.look_up(points)
+    for i in np.flatnonzero((exact < 0.0) != (seen < 0.0)).tolist():
+        exact[i] = abs(exact[i]) * (-1.0 if winding_number(surface.triangles, points[i]) > 0.5 else 1.0)
     touches = (np.minimum(exact, seen) < 0.0) & (np.abs(exact) < _NEAR)
     return float(np.abs(seen - exact)[touches].max(initial=0.0))
+
+
+def winding_number(triangles: Triangles, point: Float) -> float:
+    """How often a closed mesh goes round a point (3,): 1 inside, 0 outside.
+
+    Solid angles are those of A. van Oosterom and J. Strackee, IEEE TBME 30(2), 1983.
+    """
+    a, b, c = (triangles.corners[:, k] - point for k in range(3))
+    one, two, three = norm(a), norm(b), norm(c)
+    up = (a * cross(b, c)).sum(axis=1)
+    over = one * two * three + (a * b).sum(axis=1) * three + (b * c).sum(axis=1) * one + (c * a).sum(axis=1) * two
+    return float(np.arctan2(up, over).sum() / (2.0 * np.pi))
 
 
 def memory_of(surface: Surface) -> int:

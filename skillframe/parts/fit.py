@@ -14,13 +14,13 @@ import numpy as np
 
 from skillframe.errors import InputError
 from skillframe.frames import Float, rotation_matrix
-from skillframe.parts.declared import FixtureFile
+from skillframe.parts.declared import OVERLAP, FixtureFile
 from skillframe.parts.scenes import turned
 from skillframe.parts.second_declared import MeshPlace
 from skillframe.parts.solid import MeshPart, arrays_of
 
-TOUCH = 1e-5
-"""Overlap that is let pass [m]: what a contact sinks by."""
+TOUCH = OVERLAP
+"""Parts nearer than this are looked at for an overlap, and parts of a fixture may overlap by it [m]."""
 NEAR = 8e-4
 """Material this near to the held part, sideways, belongs to the mouth [m]."""
 _STEP, _MOST_STEPS, _TURN_STEP = 5e-4, 160, np.radians(2.0)
@@ -95,7 +95,7 @@ def fit(plug: MeshPart, socket: MeshPart, file: FixtureFile) -> PartsFit:
     _check_scales(plug, socket)
     one, two = moved(plug.solid, file.tool.assembled), moved(socket.solid, file.fixture.pose)
     _check_places(plug, socket, one, two)
-    _check_overlap(plug, socket, one, two)
+    _check_overlap(plug, socket, one, two, file.contact.overlap)
     turn, axis = _axis(plug, socket, one, two, file)
     one, two = (_turned(each, turn) for each in (one, two))
     mouth = _mouth(one, two)
@@ -170,14 +170,17 @@ def thickness(common: Any) -> float:
     return 0.0 if common.is_empty() else 2.0 * float(common.volume()) / float(common.surface_area())
 
 
-def _check_overlap(plug: MeshPart, socket: MeshPart, one: Any, two: Any) -> None:
+def _check_overlap(plug: MeshPart, socket: MeshPart, one: Any, two: Any, most: float) -> None:
     bodies = (one ^ two).decompose()
     worst = max(bodies, key=thickness, default=None)
-    if worst is not None and thickness(worst) > TOUCH:
+    if worst is not None and thickness(worst) > most:
         deep, where = 1000.0 * thickness(worst), np.reshape(worst.bounding_box(), (2, 3)).mean(axis=0)
         point = ", ".join(f"{1000.0 * x:.1f}" for x in where)
         what = f"{plug.name} and {socket.name} overlap by {deep:.2g} mm at ({point}) mm"
-        more = f"{deep / (1000.0 * TOUCH):.0f} times what is let pass; move [tool] assembled (press fits are refused)"
+        more = (
+            f"more than the {1000.0 * most:.2g} mm that are let pass; move [tool] assembled (press fits are refused), "
+        )
+        more += "or give contact.overlap up to 0.1 mm"
         if repaired := " and ".join(part.name for part in (plug, socket) if part.places):
             more += f", or close {repaired} where it was drawn: its holes were closed, or sheets left out"
         raise InputError("the assembled pose", what, more)
@@ -193,7 +196,7 @@ def _axis(
         along = np.array(axis, dtype=float) / np.linalg.norm(axis)
         turn = _down(along)
         there = _turned(one, turn), _turned(two, turn)
-        stands = _in_the_way(*there, _way_before(*there, turn, file))
+        stands = _in_the_way(*there, _way_before(*there, turn, file), file.contact.overlap)
         if stands is None:
             return turn, (float(along[0]), float(along[1]), float(along[2]))
         blocked.append((along, *stands))
@@ -217,14 +220,14 @@ def _down(axis: Float) -> Float:
     return rotation_matrix(turn * (np.arctan2(size, float(axis @ down)) / size)) if size > 0.0 else np.eye(3)
 
 
-def _in_the_way(plug: Any, socket: Any, way: WayOut) -> tuple[float, float] | None:
+def _in_the_way(plug: Any, socket: Any, way: WayOut, most: float) -> tuple[float, float] | None:
     """How thick what stands in the way is, and at which lift [m], or None if the held part comes out."""
     whole = float(socket.bounding_box()[5] - plug.bounding_box()[2])
     count = int(np.clip(np.ceil(whole / _STEP), 8, _MOST_STEPS))
     lifts = whole * (np.arange(count) + 1.0) / count if whole > 0.0 else np.zeros(0)
     for lift in _with_turns(lifts, way):
         here = way.at(plug, lift)
-        if here.min_gap(socket, TOUCH) < TOUCH and (deep := thickness(here ^ socket)) > TOUCH:
+        if here.min_gap(socket, TOUCH) < TOUCH and (deep := thickness(here ^ socket)) > most:
             return deep, float(lift)
     return None
 

@@ -133,8 +133,12 @@ def _load(path: Path, hashes: Mapping[str, str]) -> LoadedParts:
     mass, center, inertia, notes = _inertia(found, plug, file)
     check_clearance(found)
     reach = np.reshape(_reach(found).bounding_box(), (2, 3))
-    errors = [mend_error(plug, file.tool.assembled, found, reach), mend_error(socket, file.fixture.pose, found, reach)]
-    check_facets(found, plug, socket)
+    if file.contact.as_meshed:
+        errors = [plug.error, socket.error]
+    else:
+        sides = ((plug, file.tool.assembled), (socket, file.fixture.pose))
+        errors = [mend_error(part, place, found, reach) for part, place in sides]
+        check_facets(found, plug, socket)
     check_walls(found, plug, socket)
     held, standing = (
         side._replace(error=side.error + error)

@@ -152,6 +152,24 @@ def test_a_hole_of_fewer_sides_than_its_play_needs_is_refused(tmp_path):
     refused(pair(tmp_path, plug, socket), "16 sides a turn", "export it finer")
 
 
+def test_meshes_that_are_the_parts_have_no_circle_to_be_held_against(tmp_path):
+    plug, socket = rod(5.0, -12.0, 8.0, 16, outside=True), hole(5.05, 12.0, 16)
+    text = FILE.replace("[contact]\n", "[contact]\nas_meshed = true\n")
+    assert "as_meshed" in text
+    found = pair(tmp_path, plug, socket, text)()
+    # flats of both are 0.05 mm cos(pi / 16) apart, and contact is as exact as the play asks
+    assert found.fit.clearance == pytest.approx(5e-5 * np.cos(np.pi / 16), rel=0.05)
+    assert found.contact_error < 0.25 * found.fit.clearance
+
+
+def test_an_overlap_is_let_pass_as_far_as_the_file_says(tmp_path):
+    plug, socket = round_pair()
+    plug = plug.translate([0.45, 0, 0])  # more than 0.01 and less than 0.1 mm of both in the mean
+    refused(pair(tmp_path, plug, socket), "overlap by", "give contact.overlap")
+    text = FILE.replace("[contact]\n", '[contact]\noverlap = "0.1mm"\n')
+    refused(pair(tmp_path / "let", plug, socket, text), "the play along the way is 0 mm")
+
+
 def test_a_thin_wall_is_refused(tmp_path):
     plug, socket = round_pair()
     slit = box((5.9, -3, -17), (14, 3, 0)) - box((5.9, -0.05, -17), (14, 0.05, 0))

@@ -4,7 +4,7 @@ import manifold3d
 import numpy as np
 import pytest
 
-from skillframe.parts.field import error_of, surface_of
+from skillframe.parts.field import error_of, surface_of, winding_number
 from skillframe.parts.points import points_of
 from skillframe.parts.solid import arrays_of
 from skillframe.world.surfaces import available, exact_distances, triangles_of
@@ -149,3 +149,22 @@ def test_a_ball_has_the_distance_of_a_ball():
     sag = radius * (1.0 - np.cos(np.pi / sides)) * 2.0  # facets of a triangulated sphere lie inside it
     found = surface.look_up(way * (radius - 5e-5))
     assert (found > -5e-5 - 3e-6).all() and (found < -5e-5 + 2.0 * sag).all()
+
+
+def test_a_closed_mesh_goes_once_round_what_is_inside_and_not_round_what_is_not():
+    triangles = triangles_of(*arrays_of(CUBE))
+    points = np.random.default_rng(3).uniform(-6e-3, 6e-3, (200, 3))
+    turns = [winding_number(triangles, point) for point in points]
+    np.testing.assert_allclose(turns, box_distance(points) < 0.0, atol=1e-9)
+
+
+def test_a_sign_that_normals_get_wrong_is_no_contact_error(cube, monkeypatch):
+    """Where more than two triangles meet at an edge, normals cancel: the yardstick is then wrong, not contact."""
+
+    def turned_round(triangles, points):
+        return -exact_distances(triangles, points)
+
+    low, high = np.full(3, -5e-3), np.full(3, 5e-3)
+    right = error_of(cube, low, high)
+    monkeypatch.setattr("skillframe.parts.field.exact_distances", turned_round)
+    assert error_of(cube, low, high) == pytest.approx(right, abs=1e-9)

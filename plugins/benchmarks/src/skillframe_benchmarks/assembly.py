@@ -24,7 +24,7 @@ from skillframe.campaign import evaluate
 from skillframe.campaign.folder import load as load_campaign
 from skillframe.campaign.runner import Options, run_campaign
 from skillframe.demonstration.record import Demonstration
-from skillframe.errors import InputError, SkillframeError, SkillframeWarning
+from skillframe.errors import SkillframeError, SkillframeWarning
 from skillframe.extend.registry import registry
 from skillframe.extend.worlds import make_scene
 from skillframe.files import write_whole
@@ -34,27 +34,8 @@ from skillframe.teaching import sessions
 from skillframe.teaching.teacher import TeacherSettings
 from skillframe_benchmarks.assets import Pair
 from skillframe_benchmarks.methods import METHODS
+from skillframe_benchmarks.places import fitting
 
-FIXTURE = """\
-summary = "AutoMate {name}"
-[fixture]
-mesh = "asset_socket.obj"
-units = "m"
-[tool]
-mesh = "asset_plug.obj"
-units = "m"
-{assembled}density = 8000             # as published
-[contact]
-friction = 0.5             # as published
-[task.start]
-above_mouth = 0.002
-[task.seated]
-height = 0.001
-sideways = 0.002
-tilt = "90deg"             # a loose part may lean in its socket
-"""
-RAISED = (0.0, 2e-5, 5e-5, 1e-4, 2e-4)
-"""Heights by which a plug that overlaps its socket in the published place is raised, until it does not [m] (ours)."""
 SCORES = ("automate_height", "automate_distance")
 UPRIGHT = "2deg"
 """How far a part may lean at the end of a demonstration; nobody shows a part that lies slanting in its hole."""
@@ -199,35 +180,12 @@ def _world(pair: Pair, folder: Path) -> Path:
         if not (folder / mesh.name).exists():
             write_whole(folder / mesh.name, mesh.read_bytes())
     if not fixture.exists():
-        write_whole(fixture, _fitting(pair, folder).encode())
+        write_whole(fixture, fitting(pair, folder).encode())
     if not (folder / "parts.png").exists():
         write_whole(folder / "parts.png", picture_of(make_scene(registry().world(str(fixture)), {})))
     if not (folder / "parts.json").exists():
         _keep(folder / "parts.json", values(load(fixture)) | {"way_out_m": pair.way_out})
     return fixture
-
-
-def _fitting(pair: Pair, folder: Path) -> str:
-    """The text of the fixture file, the plug raised as far as it has to be, or not at all where that does not help."""
-    texts = [_text(pair, raised) for raised in RAISED]
-    for text in texts:
-        trial = folder / "raised.toml"
-        write_whole(trial, text.encode())
-        try:
-            load(trial)
-        except InputError as error:
-            if error.where != "the assembled pose":
-                return text
-        else:
-            return text
-        finally:
-            trial.unlink()
-    return texts[0]
-
-
-def _text(pair: Pair, raised: float) -> str:
-    place = f"assembled = {{ xyz = [0, 0, {raised:g}] }}  # raised: the meshes overlap\n" if raised else ""
-    return FIXTURE.format(name=pair.name, assembled=place)
 
 
 def _shown(fixture: Path, folder: Path, plan: Plan) -> list[Demonstration]:

@@ -1,0 +1,123 @@
+"""Where a plug that overlaps its socket in the published place stands instead, and the fixture file that says so.
+
+    1. raised by some hundredths of a millimetre
+    2. moved by v, |v| <= 0.8 mm, to where V(v) + a |v| is least, V the volume that both parts claim
+    3. left, with `overlap` up to 20 um let pass, less than contacts sink by
+
+The first that loads is taken. What counts as seated stays about the published place: it is narrower by what the plug
+was moved, so that whoever is seated is within 1 mm of the published height and 2 mm beside it. All of it is ours.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from skillframe.errors import InputError
+from skillframe.files import write_whole
+from skillframe.frames import Float
+from skillframe.parts.load import load
+from skillframe.parts.solid import read_part
+from skillframe_benchmarks.assets import Pair
+
+FIXTURE = """\
+summary = "AutoMate {name}"
+[fixture]
+mesh = "asset_socket.obj"
+units = "m"
+[tool]
+mesh = "asset_plug.obj"
+units = "m"
+{assembled}density = 8000             # as published
+[contact]
+friction = 0.5             # as published
+as_meshed = true           # what is published are the meshes
+{overlap}[task.start]
+above_mouth = 0.002
+[task.seated]
+height = {height:g}
+sideways = {sideways:g}
+tilt = "90deg"             # a loose part may lean in its socket
+"""
+HEIGHT_M, SIDEWAYS_M = 0.001, 0.002
+"""How near the published place is seated [m]."""
+RAISED = (0.0, 2e-5, 5e-5, 1e-4, 2e-4)
+"""Heights by which a plug that overlaps its socket in the published place is raised [m] (ours)."""
+MOVED_M, OVERLAP_M = 8e-4, 2e-5
+"""How far it is moved at most, and the overlap that is let pass where nothing else helps [m] (ours)."""
+PLACE = "the assembled pose"
+_STARTS = ((0.0, 0.0, 0.0), (0.03, 0.0, 0.0), (0.0, 0.03, 0.02), (0.0, 0.0, 0.05))  # mm
+_FIRST_MM, _PRICE, _TRIES = 0.05, 1e-6, 150  # size of the first simplex; mm3 for each mm moved
+
+
+def text(pair: Pair, moved: tuple[float, float, float] = (0.0, 0.0, 0.0), overlap: float = 0.0) -> str:
+    """A fixture file of a pair, its plug moved from the published place [m], with an overlap that is let pass [m]."""
+    x, y, z = (round(value, 7) for value in moved)
+    place = f"assembled = {{ xyz = [{x:g}, {y:g}, {z:g}] }}  # moved: the meshes overlap\n" if any(moved) else ""
+    let = f"overlap = {overlap:g}  # the meshes overlap\n" if overlap else ""
+    return FIXTURE.format(
+        name=pair.name, assembled=place, overlap=let, height=HEIGHT_M - abs(z), sideways=SIDEWAYS_M - math.hypot(x, y)
+    )
+
+
+def fitting(pair: Pair, folder: Path) -> str:
+    """The text of the first fixture file that loads, or that is refused for another reason than an overlap.
+
+    Where all overlap, that of the published place.
+
+    Args:
+        pair: the two parts.
+        folder: where copies of their meshes are.
+    """
+    for each in _texts(pair):
+        if _loads(each, folder):
+            return each
+    return text(pair)
+
+
+def _loads(said: str, folder: Path) -> bool:
+    trial = folder / "trial.toml"
+    write_whole(trial, said.encode())
+    try:
+        load(trial)
+    except InputError as error:
+        return error.where != PLACE
+    finally:
+        trial.unlink()
+    return True
+
+
+def _texts(pair: Pair) -> Iterator[str]:
+    for raised in RAISED:
+        yield text(pair, (0.0, 0.0, raised))
+    moved = free_place(pair)
+    if 0.0 < float(np.linalg.norm(moved)) <= MOVED_M:
+        x, y, z = moved.tolist()
+        yield text(pair, (x, y, z))
+    yield text(pair, overlap=OVERLAP_M)
+
+
+def free_place(pair: Pair) -> Float:
+    """How far (3,) the plug has to be moved from the published place until it overlaps least [m].
+
+    Raises:
+        InputError: a mesh cannot be read.
+    """
+    from scipy.optimize import minimize
+
+    plug, socket = read_part(pair.plug, "m", held=True).solid, read_part(pair.socket, "m").solid
+
+    def cost(moved: Float) -> float:
+        volume = abs(float((plug.translate([1e-3 * x for x in moved]) ^ socket).volume()))
+        return 1e9 * volume + _PRICE * float(np.linalg.norm(moved))
+
+    found = []
+    for start in np.array(_STARTS):
+        first = np.vstack([start, start + _FIRST_MM * np.eye(3)])
+        options = {"maxfev": _TRIES, "xatol": 1e-3, "fatol": 1e-7, "initial_simplex": first}
+        found.append(minimize(cost, start, method="Nelder-Mead", options=options))
+    best: Float = 1e-3 * min(found, key=lambda each: float(each.fun)).x
+    return best
