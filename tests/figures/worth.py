@@ -2,6 +2,7 @@
 
     python -m tests.figures.worth hump_low --sets 20 --first 9000
     python -m tests.figures.worth all --sets 20 --first 9600 --workers 2 --out sets.jsonl
+    python -m tests.figures.worth all --kinds "noise 8" "noise 15" --learners --methods LMC bisector "true push"
 
 A set is an instance of a task (geometry, friction and the whole fixture's attitude are drawn) with three uneven
 demonstrations by one simulated person of each kind. Every method is run from five drawn starts with the fixture moved
@@ -10,6 +11,8 @@ moved ("in place"). All methods run on the same draws, in one simulation. A set 
 Sets are the unit of the intervals, because the draws of a set share their push.
 
 "all" runs every task, the bayonet's own methods among them. Sets that are in FILE already are not run again.
+`--methods` runs rows of these names alone, and `--learners` without a kind leaves the played methods out. People of 15
+degrees of noise are asked for by name, teach LMC and three averages alone, and are nobody of "whoever shows it".
 """
 
 from __future__ import annotations
@@ -35,6 +38,7 @@ from tests.figures.worth_skills import LONGEST, Row
 
 PEOPLE = ("noise 8", "bias 10", "hesitating", "wrong first")
 PLAYED = ("replay", "mean path", "dmp", "gmr", "seds", "acp")
+SHAKY, OF_SHAKY = "noise 15", ("LMC", "bisector", "mean motion", "mean force")
 FEW = "noise 8"  # the kind of person whose one and two demonstrations are learned as well
 TUNING = [(k, with_force) for k in (500.0, 1000.0, 2000.0, 4000.0) for with_force in (True, False)]
 
@@ -45,7 +49,8 @@ def rows_of_set(
     """Every method by "person|method"."""
     rows: dict[str, Row] = {f"|{name}": row for name, row in hand_written(turn, scene.task).items()}
     for kind, given in shown.items():
-        rows |= {f"{kind}|{name}": row for name, row in pushes(given).items()}
+        taught = pushes(given)
+        rows |= {f"{kind}|{name}": taught[name] for name in (OF_SHAKY if kind == SHAKY else taught)}
         if kind in learners:
             rows |= {f"{kind}|{n}": r for n, r in played(given, PLAYED, rows[f"{kind}|LMC"].stiffness).items()}
         for count in (1, 2) if kind == FEW else ():
@@ -68,12 +73,17 @@ def tuning_rows(shown: dict[str, list[Demonstration]]) -> dict[str, Row]:
     return rows
 
 
-def run_set(family: str, seed: int, kinds: Sequence[str], learners: Sequence[str], tune: bool = False) -> Any:
+def run_set(
+    family: str, seed: int, kinds: Sequence[str], learners: Sequence[str], tune: bool = False,
+    methods: Sequence[str] | None = None,
+) -> Any:  # fmt: skip
     """One instance: for each person and method, whether each run reached the goal, the run in place last."""
     scene, turn, rng = drawn(family, seed)
     floors = FLOORS.get(family, SHORT)
     shown, failed = demonstrations(scene, turn, rng, kinds, EACH, floors)
     rows = tuning_rows(shown) if tune else rows_of_set(shown, turn, scene, learners)
+    if methods:
+        rows = {key: row for key, row in rows.items() if key.split("|")[1] in methods}
     done = executed(scene, rows, turn, rng, seed, LONGER_S.get(family, LONGEST), floors)
     return {"family": family, "seed": seed, "failed": failed, "results": done}
 
@@ -96,7 +106,7 @@ def one(family: str, seed: int, args: argparse.Namespace) -> dict[str, Any]:
     """A set of any family, as `run_set`."""
     if family == "bayonet":
         return bayonets.run_set(seed)
-    return run_set(family, seed, args.kinds, args.learners, args.tune)
+    return run_set(family, seed, args.kinds, args.learners, args.tune, args.methods)
 
 
 def sets_of(families: Sequence[str], args: argparse.Namespace) -> list[dict[str, Any]]:
@@ -127,6 +137,7 @@ def main(given: Sequence[str]) -> None:
     parser.add_argument("--first", type=int, default=9000, help="seed of the first set")
     parser.add_argument("--kinds", nargs="+", default=PEOPLE, choices=KINDS)
     parser.add_argument("--learners", nargs="*", default=[FEW], help="kinds of people whom learners of motions see")
+    parser.add_argument("--methods", nargs="+", help="names of the rows to run; all if left out")
     parser.add_argument("--directions", action="store_true", help="of humps: only what is learned, nothing executed")
     parser.add_argument("--tune", action="store_true", help="only played methods, with every stiffness")
     parser.add_argument("--workers", type=int, default=1)
@@ -137,7 +148,8 @@ def main(given: Sequence[str]) -> None:
             print("\n".join(directions(seed, args.family, args.kinds)), flush=True)
         return
     runs = sets_of(list(FAMILIES) if args.family == "all" else [args.family], args)
-    print("\n".join(side_by_side(runs, args.kinds) if args.family == "all" else table(runs)))
+    whole = [kind for kind in args.kinds if kind != SHAKY]
+    print("\n".join(side_by_side(runs, whole) if args.family == "all" else table(runs)))
 
 
 if __name__ == "__main__":

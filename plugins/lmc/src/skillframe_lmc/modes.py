@@ -48,13 +48,30 @@ MOST = 2  # times the second largest mode is what the largest counts for
 SAME_SIDE = 0.5  # |sum| / sum of |.| of what the modes pushed sideways: 1 if all to one side, 0 if they balance
 
 
-def contact_modes(motions: Sequence[Motion]) -> list[Sectors]:
-    """The modes of a part's demonstrations, the largest first. Empty if too few intervals were in contact."""
+def groups(motions: Sequence[Motion]) -> list[Sectors]:
+    """All intervals in contact of a part's demonstrations in groups N, the largest first, down to single intervals."""
     pooled = [_touching(sectors(without_wrong_try(motion))) for motion in motions]
     motion = np.concatenate([each.motion for each in pooled])
     push = np.concatenate([each.push for each in pooled])
     alike = (push @ push.T >= SAME_PUSH) & (motion @ motion.T >= SAME_MOTION)
-    return [_some(motion, push, rows) for rows in _largest(alike)]
+    left, found = np.ones(len(alike), dtype=bool), list[Sectors]()
+    while left.any():
+        rows = np.flatnonzero(alike[np.argmax((alike & left).sum(axis=1) * left)] & left)
+        found.append(_some(motion, push, rows))
+        left[rows] = False
+    return found
+
+
+def contact_modes(motions: Sequence[Motion]) -> list[Sectors]:
+    """The modes of a part's demonstrations, the largest first. Empty if too few intervals were in contact."""
+    each = groups(motions)
+    sizes = [len(group.contact) for group in each]
+    count = 0
+    while count < len(each) and sizes[count] >= FEWEST:
+        if _enough(sizes[:count], sizes[count], sum(sizes[count:])):
+            break
+        count += 1
+    return each[:count]
 
 
 def choose_of(modes: Sequence[Sectors], settings: Settings) -> Choice:
@@ -102,18 +119,6 @@ def _touching(given: Sectors) -> Sectors:
 
 def _some(motion: Float, push: Float, rows: NDArray[np.intp]) -> Sectors:
     return Sectors(motion[rows], push[rows], np.ones(len(rows), dtype=bool))
-
-
-def _largest(alike: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
-    """Rows of the largest groups of `alike` (K, K), one after another, until they hold `SHARE` of what counts."""
-    left, found = np.ones(len(alike), dtype=bool), list[NDArray[np.intp]]()
-    while left.any():
-        rows = np.flatnonzero(alike[np.argmax((alike & left).sum(axis=1) * left)] & left)
-        if len(rows) < FEWEST or _enough([len(each) for each in found], len(rows), int(left.sum())):
-            break
-        found.append(rows)
-        left[rows] = False
-    return found
 
 
 def _enough(sizes: Sequence[int], following: int, rest: int) -> bool:

@@ -25,6 +25,8 @@ class Settings:
             only an estimate and whose approach says little about the push.
         contact_modes: count contact modes for the translation, whatever the time that each was slid on; false weighs by
             intervals, demonstration by demonstration.
+        expected: where contact modes decide, take the push to be expected from all groups of intervals; false takes the
+            deepest.
         faces: give way in translation where faces turned a quarter of the push aside; false goes by the motion alone.
         concatenated: the papers' way of taking several demonstrations together, without what we put in its place: all
             intervals vote as those of one demonstration. No contact modes, no heading of the demonstrations, no second
@@ -53,6 +55,7 @@ class Settings:
     torque_min_nm: float = 0.08
     contact_only: bool = False
     contact_modes: bool = True
+    expected: bool = True
     faces: bool = True
     concatenated: bool = False
     quantile: float = 0.8

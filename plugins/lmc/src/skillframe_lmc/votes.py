@@ -1,8 +1,9 @@
 """Whose votes decide the push: intervals, contact modes, or the contact alone.
 
-Intervals vote demonstration by demonstration (`directions`). Where contact modes push to one side, they vote in their
-place (`modes`). Where all agree on no push, the contact is asked alone. With `concatenated` all intervals vote as those
-of one demonstration, as the papers print it, and none of that is done.
+Whether a push exists is a vote. Intervals vote demonstration by demonstration (`directions`). Where contact modes push
+to one side, they vote in their place (`modes`), and which push it is, all groups of intervals say together
+(`expected`). Where all agree on no push, the contact is asked alone. With `concatenated` all intervals vote as those of
+one demonstration, as the papers print it, and none of that is done.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from skillframe.frames import unit
 from skillframe_lmc.directions import Choice, choose
+from skillframe_lmc.expected import expected_push
 from skillframe_lmc.heading import heading
 from skillframe_lmc.intervals import Motion, touching
 from skillframe_lmc.modes import choose_of, contact_modes, one_sided
@@ -49,7 +51,10 @@ def voted(
         return Votes(choose([concatenated(given)], settings), given)
     choice = choose(given, settings, heading(moving, turned and name == "translation"))
     modes = _modes(moving, choice) if settings.contact_modes and not turned else []
-    return Votes(choose_of(modes, settings) if modes else choice, given, modes)
+    choice = choose_of(modes, settings) if modes else choice
+    if modes and settings.expected and choice.direction is not None:
+        choice = choice._replace(direction=expected_push(moving))
+    return Votes(choice, given, modes)
 
 
 def touched(
