@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from skillframe_dualarm.dual_peg import REACH
+from skillframe_papers.published import SEARCHED
 from skillframe_papers.rows import grasped, search
 from skillframe_papers.rows.blocks import Blocks
 from skillframe_papers.rows.insertion import Row, at_start, in_the_grasp
@@ -78,6 +79,37 @@ def test_learned_forces_must_find_enough_and_more_than_a_constant_push(ours, nul
 def test_ergodic_control_must_find_enough_and_more_than_the_random_walk(ours, null, expected, monkeypatch):
     monkeypatch.setattr(search, "tried", lambda *_: searched(ours, null))
     assert search.ergodic(JOB).verdict == expected
+
+
+def test_what_several_rows_ask_is_searched_once_and_the_first_goals_are_those_of_all(monkeypatch):
+    runs = []
+
+    def once(scene, given, *, duration_s, seed):
+        runs.append([len(where) for _, where in given])
+        return [np.arange(len(where), dtype=float) for _, where in given]
+
+    monkeypatch.setattr(search, "_KEPT", {})
+    monkeypatch.setattr(search, "shown_by", lambda job, task: ())
+    monkeypatch.setattr(search, "document", lambda *_, **settings: settings)
+    monkeypatch.setattr(search, "searched", once)
+    job = RowRun(settings=SEARCHED)
+    asked = [search.Asked("peg", search.WALK, 30), search.Asked("peg", search.SAMPLES, 60)]
+    walk, samples = search.tried(job, [*asked, asked[0]])[:2]
+    assert (len(walk.seconds), len(samples.seconds)) == (30, 60)
+    (first,) = search.tried(job, [search.Asked("peg", search.SAMPLES, 30)])
+    np.testing.assert_array_equal(first.seconds, samples.seconds[:30])
+    search.tried(job, [search.Asked("socket", search.WALK, 30), search.Asked(search.OFF, search.SPIRAL, 60)])
+    assert runs == [[30, 60], [30], [60]]  # the peg's, then two worlds
+
+
+def test_what_is_found_after_the_time_a_search_was_planned_for_is_not_found(monkeypatch):
+    monkeypatch.setattr(search, "_KEPT", {})
+    monkeypatch.setattr(search, "shown_by", lambda job, task: ())
+    monkeypatch.setattr(search, "document", lambda *_, **settings: settings)
+    monkeypatch.setattr(search, "searched", lambda *_, **__: [np.array([6.9, 7.1, 20.1])] * 2)
+    job = RowRun(settings=SEARCHED)
+    early, late = search.tried(job, [search.Asked(search.OFF, search.SPIRAL, 3), search.Asked("peg", search.SPIRAL, 3)])
+    assert early.seconds.tolist() == [6.9, np.inf, np.inf] and late.seconds.tolist() == [6.9, 7.1, np.inf]
 
 
 class Says(Skill):
