@@ -16,6 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 Float = NDArray[np.float64]
 """An array of double-precision numbers; docstrings give its shape."""
 _NEXT, _AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])
+_BESIDE_DIAGONAL, _SKEWED = np.array([1, 2, 3, 5, 6, 7]), np.array([2, 1, 2, 0, 1, 0])
+_SKEW_SIGNS = np.array([-1.0, 1.0, 1.0, -1.0, -1.0, 1.0])
 _LOWER, _UPPER = np.array([7, 2, 3]), np.array([5, 6, 1])  # of the antisymmetric part of a flat 3 x 3 matrix
 
 
@@ -58,11 +60,9 @@ def cross(a: Float, b: Float) -> Float:
 
 def skew(v: Float) -> Float:
     """Matrix (..., 3, 3) of the cross product with v (..., 3)."""
-    result = np.zeros((*v.shape[:-1], 3, 3))
-    result[..., 0, 1], result[..., 0, 2] = -v[..., 2], v[..., 1]
-    result[..., 1, 0], result[..., 1, 2] = v[..., 2], -v[..., 0]
-    result[..., 2, 0], result[..., 2, 1] = -v[..., 1], v[..., 0]
-    return result
+    result = np.zeros((*v.shape[:-1], 9))
+    result[..., _BESIDE_DIAGONAL] = v.take(_SKEWED, -1) * _SKEW_SIGNS
+    return result.reshape(*v.shape[:-1], 3, 3)
 
 
 def norm(v: Float) -> Float:
@@ -91,7 +91,7 @@ def rotation_vector(rotation: Float) -> Float:
     factor = np.where(sine > 1e-9, angle / np.maximum(sine, 1e-9), 1.0)
     result: Float = w * factor[..., None]
     near_pi = (sine < 1e-4) & (cosine < 0.0)
-    if near_pi.any():
+    if np.count_nonzero(near_pi):
         result[near_pi] = _rotation_vector_near_pi(rotation[near_pi], w[near_pi], angle[near_pi])
     return result
 
@@ -112,17 +112,20 @@ _UPRIGHT = np.eye(3)
 def rotation_matrix(vector: ArrayLike) -> Float:
     """Exponential of rotation vectors (..., 3): Rodrigues' formula, exact to rounding for every angle."""
     v = np.asarray(vector, dtype=float)
-    if not v.any():  # what does not turn, which is most of what is asked in a tick
+    if not np.count_nonzero(v):  # what does not turn, which is most of what is asked in a tick
         still = np.empty((*v.shape[:-1], 3, 3))
         still[...] = _UPRIGHT
         return still
     angle = norm(v)
     small = angle < 1e-6
-    safe = np.where(small, 1.0, angle)
-    a = np.where(small, 1.0 - angle**2 / 6.0, np.sin(safe) / safe)[..., None, None]
-    b = np.where(small, 0.5 - angle**2 / 24.0, (1.0 - np.cos(safe)) / safe**2)[..., None, None]
+    if np.count_nonzero(small):
+        safe = np.where(small, 1.0, angle)
+        a = np.where(small, 1.0 - angle**2 / 6.0, np.sin(safe) / safe)
+        b = np.where(small, 0.5 - angle**2 / 24.0, (1.0 - np.cos(safe)) / safe**2)
+    else:
+        a, b = np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle**2
     k = skew(v)
-    result: Float = np.eye(3) + a * k + b * (k @ k)
+    result: Float = _UPRIGHT + a[..., None, None] * k + b[..., None, None] * (k @ k)
     return result
 
 

@@ -86,7 +86,7 @@ class Composition(Skill):
             self._enter(observation, self._due)
             self._due = None
         command = self._ask(observation)
-        if command.status.any():
+        if np.count_nonzero(command.status):
             command = self._after(observation, command)
         return command
 
@@ -128,13 +128,14 @@ class Composition(Skill):
                 child.restart(rows, observation, [self._rngs[i][part] for i in rows.tolist()])
         first = int(self.current[0])
         self._shared = first if bool((self.current == first).all()) else None
+        self._entered: list[int] = np.unique(self.current).tolist()
 
     def _ask(self, observation: Observation) -> Command:
         """The command of each trial's own part."""
         if self._shared is not None:
             command = self._answer(self._shared, observation)
             return command._replace(impedance=Impedance(command.impedance.stiffness))
-        answers = [(p, self._answer(p, observation)) for p in np.unique(self.current).tolist()]
+        answers = [(part, self._answer(part, observation)) for part in self._entered]
         return _picked(self.current, answers)
 
     def _answer(self, part: int, observation: Observation) -> Command:

@@ -25,6 +25,7 @@ from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_
 from skillframe_lmc.phase import Part, Phase, read_phase
 from skillframe_lmc.stall import StallWatch
 
+RUNNING = int(Status.RUNNING)  # a look into the enumeration takes as long as a sum over the batch
 PUSHING = 0.5  # of the lead limit: less is not yet a push that could stall
 
 
@@ -132,9 +133,8 @@ class LmcSkill(Skill):
         far = _dot(travel, travel) > stop.travel_limit_m**2
         if self._turn.exists:
             far |= np.abs(self._turn.progress) > stop.turn_limit_rad
-        running = self._status == Status.RUNNING
-        ending = running & (stalled | over | late | far)
-        for i in np.flatnonzero(ending).tolist():
+        ending = (self._status == RUNNING) & (stalled | over | late | far)
+        for i in np.flatnonzero(ending).tolist() if np.count_nonzero(ending) else ():
             self._status[i], self._reason[i] = self._verdict(
                 i, bool(over[i]), bool(far[i]), bool(stalled[i]), travel[i], float(np.sqrt(_dot(force, force)[i]))
             )

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from skillframe.document.frame import read_frame
 from skillframe.extend.records import Document
-from skillframe.frames import Float, Pose, move_wrench, rotate, rotate_spatial, rotation_matrix
+from skillframe.frames import Float, Pose, cross, move_wrench, rotate, rotate_spatial, rotation_matrix
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons, rows_of
 from skillframe_search.phase import Phase, read_phase
 from skillframe_search.plan import NUMBERS, keyed, plan
@@ -26,6 +26,7 @@ from skillframe_search.watch import Watch
 
 GROWTH_S = 0.2  # the push grows for this long after the touch
 HOLD = 1000.0  # N/m along the push in the approach and at the end
+RUNNING = int(Status.RUNNING)  # a look into the enumeration takes as long as a sum over the batch
 HELD = 0.5  # of the distance commanded: who reached less was held by friction, not slowed by it
 PER_TRIAL = (  # arrays with a row per trial
     "_turn", "_push", "_place", "_rate", "_wrench", "_length", "_lever", "_began", "_touched", "_lead", "_status",
@@ -100,7 +101,7 @@ class SearchSkill(Skill):
 
     def step(self, observation: Observation) -> Command:
         """Approach, search or hold, row by row."""
-        running = self._status == Status.RUNNING
+        running = self._status == RUNNING
         fallen = self._watch.look(observation) & np.isfinite(self._touched)
         self._begin(observation, running)
         self._judge(observation, running & np.isfinite(self._touched), fallen)
@@ -109,7 +110,7 @@ class SearchSkill(Skill):
     def _begin(self, observation: Observation, running: NDArray[np.bool_]) -> None:
         """Those who touch the surface for the first time begin to search."""
         new = running & np.isinf(self._touched) & self._watch.touched()
-        if new.any():
+        if np.count_nonzero(new):
             self._touched[new] = observation.time[new]
             self._watch.settle(new)
             self._stiffness = self._stiffness.copy()
@@ -117,20 +118,21 @@ class SearchSkill(Skill):
 
     def _command(self, observation: Observation) -> Command:
         status = self._status
-        searching = (status == Status.RUNNING) & np.isfinite(self._touched)
-        nearing = (status == Status.RUNNING) & ~searching
+        running = status == RUNNING
+        searching = running & np.isfinite(self._touched)
+        nearing = running & ~searching
         elapsed = np.where(searching, observation.time - np.where(searching, self._touched, 0.0), 0.0)
-        place, rate, wrench = self._on_plan(elapsed)
+        place, rate, wrench, turned = self._on_plan(elapsed)
         self._measure(observation, place, searching)
         grown = np.where(searching, np.clip(elapsed / GROWTH_S, 0.0, 1.0), 0.0)[:, None]
         self._advance(observation.dt, nearing)
         along = np.where(searching, self._watch.depth, self._lead)
         position = self._home.position + place[:, :3] + along[:, None] * self._push
-        rotation = rotation_matrix(place[:, 3:]) @ self._home.rotation
+        rotation = turned @ self._home.rotation
         twist = np.where(searching[:, None], rate, 0.0)
         twist[:, :3] += np.where(nearing, self._stop.approach_speed, 0.0)[:, None] * self._push
-        ended = status != Status.RUNNING
-        if ended.any():
+        ended = ~running
+        if np.count_nonzero(ended):
             position = np.where(ended[:, None], self._end.position, position)
             rotation = np.where(ended[:, None, None], self._end.rotation, rotation)
         gain = Impedance(self._stiffness)
@@ -149,8 +151,8 @@ class SearchSkill(Skill):
         onwards = np.minimum(self._lead + self._stop.approach_speed * dt, most)
         self._lead = np.where(nearing, onwards, self._lead)
 
-    def _on_plan(self, elapsed: Float) -> tuple[Float, Float, Float]:
-        """Place, rate and wrench (N, 6) at seconds since the touch, in base axes, the wrench at the centre."""
+    def _on_plan(self, elapsed: Float) -> tuple[Float, Float, Float, Float]:
+        """Place, rate and wrench (N, 6) at seconds since the touch, base axes, at the centre, and the place's turn."""
         last = self._place.shape[1] - 1
         index = np.minimum((elapsed / STEP_S).astype(int), last)
         rate = self._rate[self._row, index]
@@ -161,7 +163,9 @@ class SearchSkill(Skill):
         if not self._shift.any():
             return place, rate, wrench
         # the learning point follows the place; the centre of compliance turns about it
-        return _at_center(place, self._lever), rate + _swept(rate, self._lever), move_wrench(wrench, self._lever)
+        turned = rotation_matrix(place[:, 3:])
+        place = _at_center(place, turned, self._lever)
+        return place, rate + _swept(rate, self._lever), move_wrench(wrench, self._lever), turned
 
     def _judge(self, observation: Observation, searching: NDArray[np.bool_], fallen: NDArray[np.bool_]) -> None:
         """End the trials that have fallen in or met a limit. The first reason stays."""
@@ -170,8 +174,8 @@ class SearchSkill(Skill):
         over = squared > stop.force_limit_n**2
         late = searching & (observation.time - self._touched >= stop.time_s)
         lost = ~searching & ((self._watch.depth > stop.approach_m) | (self._waited(observation)))
-        ending = (self._status == Status.RUNNING) & (fallen | over | late | lost)
-        for i in np.flatnonzero(ending).tolist():
+        ending = (self._status == RUNNING) & (fallen | over | late | lost)
+        for i in np.flatnonzero(ending).tolist() if np.count_nonzero(ending) else ():
             found, hard = bool(fallen[i]), bool(over[i])
             seconds = float(observation.time[i] - (self._touched[i] if searching[i] else self._began[i]))
             self._status[i], self._reason[i] = self._verdict(i, found, hard, bool(late[i]), seconds, float(squared[i]))
@@ -208,16 +212,15 @@ def _dot(a: Float, b: Float) -> Float:
     return result
 
 
-def _at_center(place: Float, lever: Float) -> Float:
-    """Displacement of the centre of compliance: that of the learning point, and its own turn about it."""
-    turned = rotate(rotation_matrix(place[:, 3:]), lever) - lever
-    return np.concatenate([place[:, :3] + turned, place[:, 3:]], axis=1)
+def _at_center(place: Float, turned: Float, lever: Float) -> Float:
+    """Displacement of the centre of compliance: that of the learning point, and its own turn (N, 3, 3) about it."""
+    result = place.copy()
+    result[:, :3] += rotate(turned, lever) - lever
+    return result
 
 
 def _swept(rate: Float, lever: Float) -> Float:
     """What the turning adds to the centre's velocity, to first order in the turn since the start."""
-    w, r = rate[:, 3:], lever
-    x = w[:, 1] * r[:, 2] - w[:, 2] * r[:, 1]
-    y = w[:, 2] * r[:, 0] - w[:, 0] * r[:, 2]
-    z = w[:, 0] * r[:, 1] - w[:, 1] * r[:, 0]
-    return np.concatenate([np.stack([x, y, z], axis=1), np.zeros_like(w)], axis=1)
+    result = np.zeros_like(rate)
+    result[:, :3] = cross(rate[:, 3:], lever)
+    return result

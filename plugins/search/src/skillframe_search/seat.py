@@ -35,6 +35,7 @@ from skillframe_search.reach import Reach
 from skillframe_search.seat_document import PUSH, SEARCH, Seat, part_of, read_seat
 
 APPROACH, PUSHING, SEARCHING = 0, 1, 2
+RUNNING = int(Status.RUNNING)  # a look into the enumeration takes as long as a sum over the batch
 FARTHEST_M = 0.08  # an approach may be longer than the demonstrated one by this
 REST_S = 0.3  # without progress, near the end
 ENTERED_M = 0.002  # deeper than the first contact was by this is in the hole: rocked before it is searched for
@@ -102,9 +103,9 @@ class Seating(Composition):
             np.where(moved, observation.time, self._since),
         )
         command = self._followed(observation, super().step(observation))
-        self._look(observation, command.status == Status.RUNNING)
-        if self._status.any():
-            told = np.where(self._status == Status.RUNNING, "", self._reason)
+        self._look(observation, command.status == RUNNING)
+        if np.count_nonzero(self._status):
+            told = np.where(self._status == RUNNING, "", self._reason)
             command = command._replace(status=self._status.copy(), reason=told)
         return command._replace(feedforward=command.feedforward + self._added(observation))
 
@@ -147,7 +148,7 @@ class Seating(Composition):
     def _look(self, observation: Observation, running: NDArray[np.bool_]) -> None:
         """Whose push has stalled, is at the end, or has gone past it, and whose search has sunk."""
         time = observation.time
-        here = running & (self._status == Status.RUNNING)
+        here = running & (self._status == RUNNING)
         if self._due is not None:
             here &= self._due == END
         idle = time - self._since
@@ -155,13 +156,13 @@ class Seating(Composition):
         still = here & ~lost & (self.current == PUSHING)
         patience = np.where(self._in_hole(), self._seat.patience_s, self._seat.stall_s)
         still &= (idle >= patience) | ((self._deep >= -self._seat.short_m) & (idle >= REST_S))
-        for i in np.flatnonzero(still).tolist():
+        for i in _rows(still):
             self.leave(i, float(time[i]), Status.SUCCESS, f"no progress for {idle[i]:.1f} s")
         sunk = self._deep - self._rim - self._seat.sunk_m - np.tan(self._seat.tilt_rad) * self._aside(observation)
-        for i in np.flatnonzero(here & ~lost & (self.current == SEARCHING) & (sunk > 0.0)).tolist():
+        for i in _rows(here & ~lost & (self.current == SEARCHING) & (sunk > 0.0)):
             deeper = 1e3 * float(self._deep[i] - self._rim[i])
             self.leave(i, float(time[i]), Status.SUCCESS, f"sank {deeper:.1f} mm")
-        for i in np.flatnonzero(lost).tolist():
+        for i in _rows(lost):
             self._return(i, float(time[i]))
 
     def _return(self, row: int, time: float) -> None:
@@ -191,8 +192,11 @@ class Seating(Composition):
 
     def _followed(self, observation: Observation, command: Command) -> Command:
         """The command, its attitude following the measured one where a part in the hole does not turn on purpose."""
-        rows = np.flatnonzero((self.current == PUSHING) & self._in_hole() & ~command.twist[:, 3:].any(axis=1))
-        if not len(rows) or not self._seat.follow_s:
+        inside = (self.current == PUSHING) & self._in_hole()
+        if not np.count_nonzero(inside) or not self._seat.follow_s:
+            return command
+        rows = np.flatnonzero(inside & ~command.twist[:, 3:].any(axis=1))
+        if not len(rows):
             return command
         share = observation.dt / (self._seat.follow_s + observation.dt)
         turn = rotation_vector(observation.pose.rotation[rows] @ np.swapaxes(self._held[rows], -1, -2))
@@ -210,7 +214,7 @@ class Seating(Composition):
         """(N, 6) the wrench that is added to the push: catch, lean and rock."""
         seat, pushing = self._seat, self.current == PUSHING
         added = np.zeros((len(pushing), 6))
-        if not pushing.any():
+        if not np.count_nonzero(pushing):
             return added
         fast = np.maximum(_dot(observation.twist[:, :3], self._way) - seat.catch_m_s, 0.0)
         added[:, :3] = -seat.catch_ns_m * fast[:, None] * self._way
@@ -229,6 +233,11 @@ class Seating(Composition):
             1
         ]
         return np.where(pushing[:, None], added, 0.0)
+
+
+def _rows(chosen: NDArray[np.bool_]) -> list[int]:
+    """Which of (N,), at no cost where there is none."""
+    return np.flatnonzero(chosen).tolist() if np.count_nonzero(chosen) else []
 
 
 def _dot_rows(rows: Float) -> Float:
