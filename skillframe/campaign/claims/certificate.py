@@ -16,7 +16,7 @@ import numpy as np
 from skillframe import __version__
 from skillframe.campaign.claims.claim import Tested, certified, judge
 from skillframe.campaign.claims.engine import rows_of_campaign
-from skillframe.campaign.claims.procedure import CLAIM, FRESH, box_of, claims, read_claim
+from skillframe.campaign.claims.procedure import CLAIM, FRESH, box_of, claims, fresh_name, level, read_claim
 from skillframe.campaign.claims.question import LOOK, QUESTION, Question, read_question
 from skillframe.campaign.claims.rounds import BORDER, looked, rounds_done
 from skillframe.campaign.claims.searches import BREAK, FOUND, found_in
@@ -68,6 +68,9 @@ def outcome(folder: Path, params: type | None = None) -> Outcome:
     place = places[-1]
     claim, rows = read_claim(place), rows_of_campaign(place / FRESH, params)
     _check_fresh(place, claim, params)
+    if (claim["rate"], claim["alpha"]) != (question.rate, level(question, claim["number"])):
+        raise InputError(folder / QUESTION, f"asks for another rate or confidence than {place.name} claims",
+                         "ask it in another folder")  # fmt: skip
     names = list(question.ranges)
     points = np.array([[float(row[name]) for name in names] for row in rows])
     works = np.array([row["success"] for row in rows], dtype=bool)
@@ -83,6 +86,9 @@ def _check_fresh(place: Path, claim: dict[str, Any], params: type | None) -> Non
     same = drawn == {name: list(ends) for name, ends in claim["boxes"][-1].items()}
     if not same or (spec.trials, spec.seed) != (claim["trials"], claim["seed"]):
         raise InputError(place / FRESH, "are not the trials that the claim announced", "test it in another folder")
+    name = load(place.parent / LOOK, params).name
+    if spec.name not in (name, fresh_name(name, place)):  # the name alone: drawn before names held the claim's hash
+        raise InputError(place / CLAIM, "was changed after its trials were drawn", "test it in another folder")
 
 
 def write_certificate(folder: Path, found: Outcome | None, params: type | None = None) -> dict[str, Any]:

@@ -30,7 +30,7 @@ from skillframe.campaign.claims.question import LOOK, Question
 from skillframe.campaign.claims.rounds import is_complete, rounds_done, scene_of
 from skillframe.campaign.claims.surrogate import Surrogate
 from skillframe.campaign.folder import COPIES, campaign_hash, load, prepare, sweep_prepared
-from skillframe.campaign.provenance import file_hashes
+from skillframe.campaign.provenance import file_hash, file_hashes
 from skillframe.campaign.runner import run_campaign
 from skillframe.errors import InputError
 from skillframe.files import write_whole
@@ -67,6 +67,11 @@ def claims(folder: Path) -> list[Path]:
     return sorted((path.parent for path in folder.glob(f"claim*/{CLAIM}")), key=lambda path: int(path.name[5:]))
 
 
+def level(question: Question, number: int) -> float:
+    """Chance of a false claim that a folder's claim, from 1, may spend: half of that before it."""
+    return question.alpha / 2.0 ** (number - 1)
+
+
 def write_claim(folder: Path, question: Question, box: Box, params: type) -> Path:
     """Write the next claim down, before its first trial. Returns its folder."""
     number = len(claims(folder)) + 1
@@ -74,7 +79,7 @@ def write_claim(folder: Path, question: Question, box: Box, params: type) -> Pat
         raise InputError(
             folder, f"has spent its level on {MOST_CLAIMS} claims", "ask again in a new folder, with another seed"
         )
-    alpha = question.alpha / 2.0 ** (number - 1)
+    alpha = level(question, number)
     boxes = [_in_si(question, each) for each in family(box)]
     spec = load(folder / LOOK, params)
     place = folder / f"claim{number}"
@@ -100,6 +105,11 @@ def read_claim(place: Path) -> dict[str, Any]:
     return content
 
 
+def fresh_name(name: str, place: Path) -> str:
+    """Name of the fresh trials' campaign: it holds the claim's hash, so that no claim is changed after them."""
+    return f"{name}; claim {file_hash(place / CLAIM)}"
+
+
 def run_fresh(folder: Path, place: Path, engine: Engine, notify: Notify | None = None) -> None:
     """Run what is missing of a claim's fresh trials."""
     target = place / FRESH
@@ -110,7 +120,10 @@ def run_fresh(folder: Path, place: Path, engine: Engine, notify: Notify | None =
         spec = load(folder / LOOK, engine.params)
         largest = claim["boxes"][-1]
         axes = {name: Axis(kind="uniform", numbers=(float(a), float(b))) for name, (a, b) in largest.items()}
-        fresh = replace(spec, vary={**spec.vary, **axes}, trials=int(claim["trials"]), seed=int(claim["seed"]))
+        fresh = replace(
+            spec, name=fresh_name(spec.name, place), vary={**spec.vary, **axes}, trials=int(claim["trials"]),
+            seed=int(claim["seed"]),
+        )  # fmt: skip
         prepare(fresh, target, partial(scene_of, folder), engine.params)
     run_campaign(target, engine.evaluate, engine.options, notify, engine.params)
 

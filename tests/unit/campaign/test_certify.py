@@ -226,6 +226,24 @@ def test_only_fresh_draws_as_the_claim_announced_them_carry_it(tmp_path, edited)
     assert check_certificate(out, ValleyParams) == ["claim1/claim.json was changed"]
 
 
+@pytest.mark.parametrize(
+    ("file", "before", "after", "said"),
+    [
+        ("claim1/claim.json", '"rate": 0.95', '"rate": 0.9', "was changed after its trials were drawn"),
+        ("question.json", '"rate": 0.95', '"rate": 0.99', "asks for another rate or confidence than claim1 claims"),
+        ("question.json", '"confidence": 0.95', '"confidence": 0.999', "asks for another rate or confidence"),
+    ],
+)
+def test_a_claim_is_not_changed_after_its_trials(tmp_path, file, before, after, said):
+    out = asked(tmp_path)
+    through(out)
+    text = (out / file).read_text()
+    assert text.count(before) == 1
+    (out / file).write_text(text.replace(before, after))
+    with pytest.raises(InputError, match=said):
+        outcome(out, ValleyParams)
+
+
 def test_a_folder_that_was_interrupted_at_any_chunk_ends_as_one_that_was_not(tmp_path):
     whole = tmp_path / "whole"
     whole.mkdir()
