@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from skillframe import __version__
-from skillframe.campaign.claims.claim import Tested, certified, judge
+from skillframe.campaign.claims.claim import Tested, certified, family, judge
 from skillframe.campaign.claims.engine import rows_of_campaign
-from skillframe.campaign.claims.procedure import CLAIM, FRESH, box_of, claims, fresh_name, level, read_claim
+from skillframe.campaign.claims.procedure import CLAIM, FRESH, box_of, claims, level, read_claim
 from skillframe.campaign.claims.question import LOOK, QUESTION, Question, read_question
 from skillframe.campaign.claims.rounds import BORDER, looked, rounds_done
 from skillframe.campaign.claims.searches import BREAK, FOUND, found_in
@@ -32,6 +32,7 @@ CERTIFICATE = "certificate.json"
 TOLD = (BORDER, BREAK)
 """Searches that a certificate tells of, where they have ended."""
 TYPE, PREDICATE = "https://in-toto.io/Statement/v1", "skillframe.certificate/v1"
+AFRESH = "test it in another folder"
 MEANS = (
     "a mean over the box, taken evenly, not a promise at each of its points",
     "in simulation, with the robot, the contact model and the sensors that the campaign's files describe",
@@ -85,10 +86,11 @@ def _check_fresh(place: Path, claim: dict[str, Any], params: type | None) -> Non
     drawn = {name: list(axis.numbers) for name, axis in spec.vary.items() if axis.kind == "uniform"}
     same = drawn == {name: list(ends) for name, ends in claim["boxes"][-1].items()}
     if not same or (spec.trials, spec.seed) != (claim["trials"], claim["seed"]):
-        raise InputError(place / FRESH, "are not the trials that the claim announced", "test it in another folder")
-    name = load(place.parent / LOOK, params).name
-    if spec.name not in (name, fresh_name(name, place)):  # the name alone: drawn before names held the claim's hash
-        raise InputError(place / CLAIM, "was changed after its trials were drawn", "test it in another folder")
+        raise InputError(place / FRESH, "are not the trials that the claim announced", AFRESH)
+    boxes = [box_of(each, list(drawn)) for each in claim["boxes"]]
+    nested = zip(boxes, family(boxes[-1]), strict=True)
+    if not all(np.allclose(one, other, rtol=1e-9, atol=1e-12) for one, other in nested):  # units were converted once
+        raise InputError(place / CLAIM, "was changed: its boxes do not lie in each other as a claim's do", AFRESH)
 
 
 def write_certificate(folder: Path, found: Outcome | None, params: type | None = None) -> dict[str, Any]:

@@ -30,7 +30,7 @@ from skillframe.campaign.claims.question import LOOK, Question
 from skillframe.campaign.claims.rounds import is_complete, rounds_done, scene_of
 from skillframe.campaign.claims.surrogate import Surrogate
 from skillframe.campaign.folder import COPIES, campaign_hash, load, prepare, sweep_prepared
-from skillframe.campaign.provenance import file_hash, file_hashes
+from skillframe.campaign.provenance import file_hashes
 from skillframe.campaign.runner import run_campaign
 from skillframe.errors import InputError
 from skillframe.files import write_whole
@@ -105,11 +105,6 @@ def read_claim(place: Path) -> dict[str, Any]:
     return content
 
 
-def fresh_name(name: str, place: Path) -> str:
-    """Name of the fresh trials' campaign: it holds the claim's hash, so that no claim is changed after them."""
-    return f"{name}; claim {file_hash(place / CLAIM)}"
-
-
 def run_fresh(folder: Path, place: Path, engine: Engine, notify: Notify | None = None) -> None:
     """Run what is missing of a claim's fresh trials."""
     target = place / FRESH
@@ -120,10 +115,7 @@ def run_fresh(folder: Path, place: Path, engine: Engine, notify: Notify | None =
         spec = load(folder / LOOK, engine.params)
         largest = claim["boxes"][-1]
         axes = {name: Axis(kind="uniform", numbers=(float(a), float(b))) for name, (a, b) in largest.items()}
-        fresh = replace(
-            spec, name=fresh_name(spec.name, place), vary={**spec.vary, **axes}, trials=int(claim["trials"]),
-            seed=int(claim["seed"]),
-        )  # fmt: skip
+        fresh = replace(spec, vary={**spec.vary, **axes}, trials=int(claim["trials"]), seed=int(claim["seed"]))
         prepare(fresh, target, partial(scene_of, folder), engine.params)
     run_campaign(target, engine.evaluate, engine.options, notify, engine.params)
 

@@ -226,11 +226,22 @@ def test_only_fresh_draws_as_the_claim_announced_them_carry_it(tmp_path, edited)
     assert check_certificate(out, ValleyParams) == ["claim1/claim.json was changed"]
 
 
+def test_a_smaller_box_is_not_changed_after_its_trials(tmp_path):
+    out = asked(tmp_path)
+    through(out)
+    claim = json.loads((out / "claim1" / "claim.json").read_text())
+    claim["boxes"][0] = claim["boxes"][1]
+    (out / "claim1" / "claim.json").write_text(json.dumps(claim))
+    with pytest.raises(InputError, match="its boxes do not lie in each other as a claim's do"):
+        outcome(out, ValleyParams)
+
+
 @pytest.mark.parametrize(
     ("file", "before", "after", "said"),
     [
-        ("claim1/claim.json", '"rate": 0.95', '"rate": 0.9', "was changed after its trials were drawn"),
-        ("question.json", '"rate": 0.95', '"rate": 0.99', "asks for another rate or confidence than claim1 claims"),
+        ("claim1/claim.json", '"rate": 0.95', '"rate": 0.9', "asks for another rate or confidence than claim1"),
+        ("claim1/claim.json", '"alpha": 0.05', '"alpha": 0.15', "asks for another rate or confidence than claim1"),
+        ("question.json", '"rate": 0.95', '"rate": 0.99', "asks for another rate or confidence than claim1"),
         ("question.json", '"confidence": 0.95', '"confidence": 0.999', "asks for another rate or confidence"),
     ],
 )
