@@ -71,8 +71,8 @@ def mapped(truth, dimension, seed):
 @pytest.mark.parametrize(
     ("truth", "dimension", "seeds", "most"),
     [
-        (ellipsoid, 2, 20, 0.05), (lobes, 2, 20, 0.05), (wedge, 2, 10, None), (ellipsoid, 3, 6, None),
-        (lobes, 3, 5, None), (ellipsoid, 4, 3, 0.1), (lobes, 4, 2, None),
+        (ellipsoid, 2, 20, 0.05), (lobes, 2, 20, 0.05), (wedge, 2, 8, None), (ellipsoid, 3, 5, None),
+        (lobes, 3, 3, None), (ellipsoid, 4, 1, 0.1), (lobes, 4, 1, None),
     ],
 )  # fmt: skip
 def test_a_border_is_found_with_half_the_error_of_sobol_points(truth, dimension, seeds, most):
