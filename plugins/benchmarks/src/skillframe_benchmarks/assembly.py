@@ -37,8 +37,8 @@ from skillframe_benchmarks.methods import METHODS
 from skillframe_benchmarks.places import fitting
 
 SCORES = ("automate_height", "automate_distance")
-UPRIGHT = "2deg"
-"""How far a part may lean at the end of a demonstration; nobody shows a part that lies slanting in its hole."""
+UPRIGHT, IN_PLACE = {"world.tilt": "2deg"}, {"world.sideways": "0.5mm"}
+"""How a demonstration is to end: nobody shows a part that lies slanting, or far along a slot that is open (ours)."""
 LOOKS_M = 5e-4
 """How exactly a person sees where the mouth is, who could not show it by pushing alone [m] (ours)."""
 DONE, REFUSED, UNLEARNED = "done.json", "refused.json", "unlearned.json"
@@ -197,21 +197,26 @@ def _shown(fixture: Path, folder: Path, plan: Plan) -> list[Demonstration]:
 
 
 def _recorded(fixture: Path, plan: Plan) -> Recording:
-    """Demonstrations that end upright. Where the first attempt at that fails, because parts lean, that end seated.
+    """Demonstrations that end upright and in place. Where the first attempt fails, because parts lean, just in place.
 
-    Where nobody who only pushes gets there either, by a person who looks.
+    Where who only pushes does not get there either, because parts slide, by a person who looks; else seated, by the one
+    or the other.
     """
-    scene, draws = scene_of(str(fixture), {"world.tilt": UPRIGHT}, depth=1)
-    try:
-        return sessions.record(
-            robot_of(plan.robot), scene, TeacherSettings(), count=2, seed=plan.seed, draws=draws, attempts=1
-        )
-    except SkillframeError:
-        pass
+    looking = TeacherSettings(looks=LOOKS_M)
+    for teacher, ends, attempts in (
+        (TeacherSettings(), IN_PLACE | UPRIGHT, 1), (TeacherSettings(), IN_PLACE, 1), (looking, IN_PLACE, 2),
+    ):  # fmt: skip
+        scene, draws = scene_of(str(fixture), ends, depth=1)
+        try:
+            return sessions.record(
+                robot_of(plan.robot), scene, teacher, count=2, seed=plan.seed, draws=draws, attempts=attempts
+            )
+        except SkillframeError:
+            continue
     try:
         return record(fixture, plan.robot, count=2, seed=plan.seed)
     except SkillframeError:
-        return record(fixture, plan.robot, teacher=TeacherSettings(looks=LOOKS_M), count=2, seed=plan.seed)
+        return record(fixture, plan.robot, teacher=looking, count=2, seed=plan.seed)
 
 
 def _learned(name: str, shown: list[Demonstration], folder: Path) -> Path:

@@ -5,6 +5,7 @@ Primitives and a search as their exception strategy are the papers' structure. H
     approach   to a place above the first contact, then                                              `reach`
     push       the learned skill, with what is added to it below; at rest and within `short` of the end: SUCCESS
     search     where it came to rest short of the end, about the nominal axis; on success the push starts again
+    centre     at rest near the end, aside of the nominal axis: drawn back as far as the walls let it     `centre`
     lost       more than `lost` beyond the end is beside the hole: lift, return over the axis, push again
 
 What is added to the push is a wrench F at the centre of compliance, u the way, rho the turn from the nominal attitude:
@@ -30,11 +31,12 @@ from skillframe.extend.registry import registry
 from skillframe.frames import Float, Pose, norm, rotation_matrix, rotation_vector
 from skillframe.sequence import END, Composition, Part
 from skillframe.skill import Command, Observation, Skill, Status
+from skillframe_search.centre import Centre
 from skillframe_search.contact import surface_axes
 from skillframe_search.reach import Reach
 from skillframe_search.seat_document import PUSH, SEARCH, Seat, part_of, read_seat
 
-APPROACH, PUSHING, SEARCHING = 0, 1, 2
+APPROACH, PUSHING, SEARCHING, CENTRING = 0, 1, 2, 3
 RUNNING = int(Status.RUNNING)  # a look into the enumeration takes as long as a sum over the batch
 FARTHEST_M = 0.08  # an approach may be longer than the demonstrated one by this
 REST_S = 0.3  # without progress, near the end
@@ -72,7 +74,8 @@ class Seating(Composition):
         self._upright = rotation_matrix(np.array(seat.attitude))
         self._end, self._start = (np.array(place) + self._upright @ shift for place in (seat.end, seat.start))
         self._axes = surface_axes(self._way)
-        super().__init__([Part("approach", self._reach), Part("push", push), Part("search", search)])
+        parts = [Part("approach", self._reach), Part("push", push), Part("search", search)]
+        super().__init__([*parts, Part("centre", lambda: Centre(self._ends, self._way, seat.centre_n))])
 
     def _reach(self) -> Skill:
         seat, above = self._seat, -self._seat.above_m * self._way
@@ -86,7 +89,7 @@ class Seating(Composition):
         if self._seat.place == "start":
             self._ends += observation.pose.position - self._start
         self._tried = np.zeros(n, dtype=np.intp)
-        self._searched, self._urged = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+        self._searched, self._urged, self._centred = (np.zeros(n, dtype=bool) for _ in range(3))
         self._held = observation.pose.rotation.copy()
         self._best, self._since, self._rim = np.full(n, -np.inf), observation.time.copy(), np.zeros(n)
         super().start(observation, rngs)
@@ -97,6 +100,7 @@ class Seating(Composition):
     def step(self, observation: Observation) -> Command:
         """Let the parts answer, look how the push gets on, and add to it."""
         self._deep = _dot(observation.pose.position - self._ends, self._way)
+        self._off = self._aside(observation)
         moved = self._deep > self._best + self._seat.progress_m
         self._best, self._since = (
             np.where(moved, self._deep, self._best),
@@ -120,13 +124,21 @@ class Seating(Composition):
             if status != Status.SUCCESS:
                 return END, status, reason
             self._searched[row] |= part == SEARCHING
+            self._centred[row] = part == CENTRING  # a search, or a new approach, leaves it somewhere else
             return PUSHING, Status.RUNNING, f"begins, as the {self.parts[part].name} ended: {reason}"
         left = -1e3 * float(self._deep[row])
         entered = self._deep[row] > -self._seat.contact_m + ENTERED_M
         if status == Status.SUCCESS and left > 1e3 * self._seat.short_m and entered and not self._urged[row]:
             self._urged[row] = True
             return PUSHING, Status.RUNNING, f"goes on and rocks, {left:.1f} mm short of the end: {reason}"
+        if status == Status.SUCCESS and self._near()[row] and self._beyond(row) and self._tried[row] < self._seat.tries:
+            self._tried[row] += 1
+            aside = 1e3 * float(self._off[row])
+            return APPROACH, Status.RUNNING, f"lifts and returns, {aside:.1f} mm aside of the nominal axis: {reason}"
         if status == Status.SUCCESS and self._near()[row]:
+            aside = 1e3 * float(self._off[row])
+            if self._seat.centre_n and not self._centred[row] and aside > 1e3 * self._seat.aside_m:
+                return CENTRING, Status.RUNNING, f"begins, {aside:.1f} mm aside of the nominal axis: {reason}"
             return END, status, f"seated, {abs(left):.1f} mm from the demonstrated end: {reason}"
         if status != Status.SUCCESS:
             return END, status, reason
@@ -135,6 +147,12 @@ class Seating(Composition):
             return END, Status.FAILURE, f"stalled {left:.1f} mm short of the demonstrated end{tried}: {reason}"
         self._tried[row] += 1
         return SEARCHING, Status.RUNNING, f"begins, as the push stalled {left:.1f} mm short of the end: {reason}"
+
+    def _beyond(self, row: int) -> bool:
+        """Whether a part that was drawn back still rests farther aside than the fixture may be off, and `aside_m`."""
+        seat = self._seat
+        most = np.sqrt(2.0) * (seat.shift_m + seat.tilt_rad * seat.contact_m) + seat.aside_m
+        return bool(self._centred[row] and self._off[row] > most)
 
     def _near(self) -> NDArray[np.bool_]:
         result: NDArray[np.bool_] = self._deep >= -(self._seat.short_m + self._seat.height_m)
@@ -158,7 +176,7 @@ class Seating(Composition):
         still &= (idle >= patience) | ((self._deep >= -self._seat.short_m) & (idle >= REST_S))
         for i in _rows(still):
             self.leave(i, float(time[i]), Status.SUCCESS, f"no progress for {idle[i]:.1f} s")
-        sunk = self._deep - self._rim - self._seat.sunk_m - np.tan(self._seat.tilt_rad) * self._aside(observation)
+        sunk = self._deep - self._rim - self._seat.sunk_m - np.tan(self._seat.tilt_rad) * self._off
         for i in _rows(here & ~lost & (self.current == SEARCHING) & (sunk > 0.0)):
             deeper = 1e3 * float(self._deep[i] - self._rim[i])
             self.leave(i, float(time[i]), Status.SUCCESS, f"sank {deeper:.1f} mm")

@@ -39,6 +39,8 @@ class Seat:
         short_m: nearer to the end than this and at rest is seated; lost_m: beyond the end by more is beside the hole.
         tries: searches and returns before it gives up.
         progress_m: less than this is a stall, after stall_s on the rim, after patience_s once a search is over.
+        centre_n, aside_m: at rest near the end, but farther than aside_m from the nominal axis, it is drawn back until
+            more than centre_n holds it; 0 does not.
         sunk_m: deeper than the stall by this is in the hole, beside what the tilt makes of the way across.
         catch_m_s, catch_ns_m: faster along the way than this is braked, with this damping.
         upright_nm_rad: pulls upright until a search is over; lean_nm_rad: always, beyond `tilt_rad`.
@@ -67,6 +69,8 @@ class Seat:
     progress_m: float = 0.0003
     stall_s: float = 0.5
     patience_s: float = 1.5
+    centre_n: float = 8.0
+    aside_m: float = 0.001
     sunk_m: float = 0.0008
     catch_m_s: float = 0.03
     catch_ns_m: float = 400.0

@@ -42,6 +42,8 @@ def _parts(seat: Seat) -> list[str]:
         "most; adds that a tilted hole guides the part",
         f"rock: turns {seat.rock_nm:g} Nm round at {seat.rock_hz:g} Hz where the part rests after a search; "
         "adds that it does not jam",
+        f"centre: at the end, but more than {1e3 * seat.aside_m:g} mm from the nominal axis, it is drawn back until "
+        f"{seat.centre_n:g} N hold it; adds that a part in a slot that is open at an end is where it was shown",
         f"lost: more than {1e3 * (seat.lost_m + seat.height_m):.1f} mm past the end is beside the hole: it returns",
     ]
 

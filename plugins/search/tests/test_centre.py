@@ -1,0 +1,72 @@
+"""A part that rests at its depth is drawn back over the nominal axis, as far as its contacts let it."""
+
+import numpy as np
+import pytest
+from skillframe_search.centre import ACROSS, Centre
+from skillframe_search.seat import CENTRING
+
+from plugins.search.tests.test_seat import DOWN, SEAT, Played
+from skillframe.frames import Pose
+from skillframe.skill import Observation, Status
+
+END = np.array([[0.4, 0.0, 0.2]])
+
+
+def drawn(wall_m, seconds=1.0):
+    """The last command and place of a tool 3 mm aside that follows, and touches a wall so far from the axis [m]."""
+    skill, x = Centre(END, DOWN, 8.0), 0.003
+    for k in range(round(seconds / 0.01)):
+        pose = Pose(END + np.array([[x, 0.0, 0.0]]), np.eye(3)[None])
+        wanted = skill.step(seen).pose.position[0, 0] - 0.4 if k else x
+        wrench = np.zeros((1, 6))
+        wrench[0, 0] = ACROSS * max(wall_m - wanted, 0.0)
+        seen = Observation(np.array([0.01 * k]), 0.01, pose, np.zeros((1, 6)), wrench)
+        if not k:
+            skill.start(seen, [np.random.default_rng(0)])
+        command = skill.step(seen)
+        if command.status[0]:
+            break
+        x = max(float(command.pose.position[0, 0]) - 0.4, wall_m)
+    return command, x
+
+
+def test_a_part_that_nothing_holds_arrives_over_the_axis():
+    command, x = drawn(-1.0)
+    assert command.status[0] == Status.SUCCESS and x == pytest.approx(0.0, abs=1e-9)
+    assert "drawn back by 3.0 of 3.0 mm" in command.reason[0]
+
+
+def test_a_wall_ends_it_where_it_holds_with_more_than_the_stated_force():
+    command, x = drawn(0.0028)
+    assert command.status[0] == Status.SUCCESS and x == pytest.approx(0.0028)
+    assert "drawn back by 0.2 of 3.0 mm, held with" in command.reason[0]
+
+
+def test_it_presses_along_the_way_and_is_stiff_across_it_alone():
+    command, _ = drawn(-1.0, seconds=0.01)
+    stiffness = command.impedance.stiffness
+    assert stiffness[2, 2] == 0.0 and stiffness[0, 0] == stiffness[1, 1] == ACROSS
+    assert command.feedforward[0, :3] @ DOWN > 0.0
+
+
+def rests(aside, **changes):
+    played = Played(**changes)
+    played.go()
+    played.deep[:], played.aside[:] = 0.0, aside
+    return played, played.go(SEAT.stall_s + 0.05)
+
+
+def test_at_the_end_and_aside_it_is_drawn_back_once_and_then_done():
+    played, command = rests(0.0015)
+    assert not command.status.any()
+    assert played.go(2.0).status.tolist() == [Status.SUCCESS] * 3  # a hole's walls hold it where it is
+    names = [text.split(":")[0] for _, text in played.skill.journal(0)]
+    assert names == ["push", played.skill.parts[CENTRING].name, "push", "ended"]
+    assert rests(0.0015, centre_n=0.0)[1].status.all() and rests(0.0005)[1].status.all()
+
+
+def test_farther_aside_than_the_fixture_may_be_off_is_no_seat():
+    played, _ = rests(0.02)
+    played.go(SEAT.stall_s + 2.0)
+    names = [text.split(":")[0] for _, text in played.skill.journal(0)]
+    assert names[:4] == ["push", "centre", "push", "approach"]
