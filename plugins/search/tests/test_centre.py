@@ -15,9 +15,9 @@ END = np.array([[0.4, 0.0, 0.2]])
 def drawn(wall_m, seconds=1.0):
     """The last command and place of a tool 3 mm aside that follows, and touches a wall so far from the axis [m]."""
     skill, x = Centre(END, DOWN, 8.0), 0.003
+    wanted = x
     for k in range(round(seconds / 0.01)):
         pose = Pose(END + np.array([[x, 0.0, 0.0]]), np.eye(3)[None])
-        wanted = skill.step(seen).pose.position[0, 0] - 0.4 if k else x
         wrench = np.zeros((1, 6))
         wrench[0, 0] = ACROSS * max(wall_m - wanted, 0.0)
         seen = Observation(np.array([0.01 * k]), 0.01, pose, np.zeros((1, 6)), wrench)
@@ -26,7 +26,8 @@ def drawn(wall_m, seconds=1.0):
         command = skill.step(seen)
         if command.status[0]:
             break
-        x = max(float(command.pose.position[0, 0]) - 0.4, wall_m)
+        wanted = float(command.pose.position[0, 0]) - 0.4
+        x = max(wanted, wall_m)
     return command, x
 
 
