@@ -62,6 +62,7 @@ def documents(shown: Sequence[Demonstration]) -> dict[str, Document]:
         "- lean": _with_seat(whole, lean_nm_rad=0.0, upright_nm_rad=0.0),
         "- rock": _with_seat(whole, rock_nm=0.0),
         "- follow": _with_seat(whole, follow_s=0.0),
+        "- centre": _with_seat(whole, centre_n=0.0),
     }
     return made
 
