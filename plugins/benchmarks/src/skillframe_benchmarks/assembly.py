@@ -37,8 +37,8 @@ from skillframe_benchmarks.methods import METHODS
 from skillframe_benchmarks.places import fitting
 
 SCORES = ("automate_height", "automate_distance")
-UPRIGHT, IN_PLACE = {"world.tilt": "2deg"}, {"world.height": "0.4mm", "world.sideways": "0.5mm"}
-"""How a demonstration is to end: nobody shows a part slanting, short of its depth, or along a slot (ours)."""
+UPRIGHT, IN_PLACE = {"world.tilt": "2deg"}, {"world.sideways": "0.5mm"}
+"""How a demonstration is to end: nobody shows a part slanting, or far along an open slot (ours)."""
 LOOKS_M = 5e-4
 """How exactly a person sees where the mouth is, who could not show it by pushing alone [m] (ours)."""
 DONE, REFUSED, UNLEARNED = "done.json", "refused.json", "unlearned.json"
