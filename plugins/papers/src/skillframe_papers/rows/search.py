@@ -123,7 +123,7 @@ class Asked(NamedTuple):
 
     task: str
     method: Method
-    count: int
+    first: int
 
 
 _KEPT: dict[tuple[Key, int, Asked], Tried] = {}
@@ -148,8 +148,8 @@ def tried(job: RowRun, asked: Sequence[Asked]) -> list[Tried]:
 def _kept(key: Key, seed: int, asked: Asked) -> Tried | None:
     """What was tried before, on as many goals or on more."""
     for (where, known, before), found in _KEPT.items():
-        if (where, known, before[:2]) == (key, seed, asked[:2]) and before.count >= asked.count:
-            return Tried(found.seconds[: asked.count], found.document)
+        if (where, known, before[:2]) == (key, seed, asked[:2]) and before.first >= asked.first:
+            return Tried(found.seconds[: asked.first], found.document)
     return None
 
 
