@@ -160,10 +160,10 @@ class SearchSkill(Skill):
         wrench = self._wrench[self._row, index]
         if self._in_start_attitude:
             place, rate, wrench = (rotate_spatial(self._turn, values) for values in (place, rate, wrench))
-        if not self._shift.any():
-            return place, rate, wrench
-        # the learning point follows the place; the centre of compliance turns about it
         turned = rotation_matrix(place[:, 3:])
+        if not self._shift.any():
+            return place, rate, wrench, turned
+        # the learning point follows the place; the centre of compliance turns about it
         place = _at_center(place, turned, self._lever)
         return place, rate + _swept(rate, self._lever), move_wrench(wrench, self._lever), turned
 
