@@ -3,8 +3,8 @@ r"""Where the border of success lies, from trials that are picked near it.
 After the first trials, each round fits the surrogate, takes three quarters of its points where the straddle score is
 largest and a quarter from the Sobol sequence, which goes on where the first trials ended and finds what the surrogate
 does not expect. It ends once the predicted labels over a fixed cloud of points changed by less than `CLOSE` of the
-predicted set in two rounds running, or at the budget. Batches are small: a large one picks its last points from a
-guess that its first ones would have changed.
+predicted set in two rounds running, and is not empty where some trial worked, or at the budget. Batches are small: a
+large one picks its last points from a guess that its first ones would have changed.
 
 Rows that were picked so are no sample: no rate, interval or test may be made of them.
 """
@@ -105,7 +105,8 @@ def search(
         surrogate, before = Surrogate(seen.points, seen.works), labels
         labels = surrogate.mean(even) > 0.0
         changed = float(np.mean(labels != before) / max(np.mean(labels), 1.0 / len(even)))
-        calm = calm + 1 if changed < CLOSE else 0
+        lost = bool(seen.works.any() and not labels.any())  # what was seen to work is taken for noise
+        calm = calm + 1 if changed < CLOSE and not lost else 0
         say(_progress(changed, len(seen.works), to_go(changed, calm, len(seen.works), batch, budget)))
     return Border(
         len(seen.works), explored, changed, calm >= RUNNING, float(np.mean(labels)), edges_of(surrogate, dimension)

@@ -80,6 +80,15 @@ def test_the_border_of_an_ellipse_is_found_and_the_ends_of_the_ranges_that_it_pa
     assert found.explored == 64 + sum(batch_share(found.trials - 64))
 
 
+def test_a_search_does_not_settle_where_what_was_seen_to_work_is_predicted_to_fail(monkeypatch):
+    """A surrogate that takes the trials that work for noise, and says that nothing works."""
+    monkeypatch.setattr(Surrogate, "mean", lambda self, points: -np.ones(len(points)))
+    seen = Looked(SOBOL[:64], SOBOL[:64, 0] > 0.9)
+    found, _ = answered(border.search(seen, 64, lambda a, b: SOBOL[a:b], 160), lambda p: p[:, 0] > 0.9)
+    assert seen.works.any()
+    assert (found.settled, found.trials, found.share) == (False, 160, 0.0)
+
+
 def batch_share(left):
     """A quarter of each round, rounded up, of batches of an eighth of the budget of 192."""
     sizes = [min(24, left - first) for first in range(0, left, 24)]
