@@ -105,8 +105,9 @@ def search(
         surrogate, before = Surrogate(seen.points, seen.works), labels
         labels = surrogate.mean(even) > 0.0
         changed = float(np.mean(labels != before) / max(np.mean(labels), 1.0 / len(even)))
-        lost = bool(seen.works.any() and not labels.any())  # what was seen to work is taken for noise
-        calm = calm + 1 if changed < CLOSE and not lost else 0
+        if seen.works.any() and not labels.any():  # what was seen to work is taken for noise: no border is known
+            changed = 1.0
+        calm = calm + 1 if changed < CLOSE else 0
         say(_progress(changed, len(seen.works), to_go(changed, calm, len(seen.works), batch, budget)))
     return Border(
         len(seen.works), explored, changed, calm >= RUNNING, float(np.mean(labels)), edges_of(surrogate, dimension)
