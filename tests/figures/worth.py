@@ -55,7 +55,10 @@ def rows_of_set(
             rows |= {f"{kind}|{n}": r for n, r in played(given, PLAYED, rows[f"{kind}|LMC"].stiffness).items()}
         for count in (1, 2) if kind == FEW else ():
             few = pushes(given[:count])
-            rows |= {f"{kind}, {count} shown|{name}": few[name] for name in ("LMC", "bisector", "bisector, unit force")}
+            rows |= {
+                f"{kind}, {count} shown|{name}": few[name]
+                for name in ("LMC", "LMC, deepest push", "bisector", "bisector, unit force")
+            }
     return rows
 
 

@@ -38,7 +38,8 @@ BLEND: dict[str, dict[str, Any]] = {
 def pushes(shown: Sequence[Demonstration]) -> dict[str, Row]:
     """LMC and the averages."""
     lmc = lmc_row(shown)
-    rows = {"LMC": lmc, "LMC, free across": push_along(lmc.push)}
+    deepest = lmc_row(shown, expected=False)
+    rows = {"LMC": lmc, "LMC, free across": push_along(lmc.push), "LMC, deepest push": deepest}
     return rows | {name: push_along(given) for name, given in averages(shown).items()}
 
 

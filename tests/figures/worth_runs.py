@@ -54,8 +54,8 @@ def table(runs: Sequence[dict[str, Any]]) -> list[str]:
     return lines
 
 
-NOT_NULLS = ("true push", "axis, push and turn", "LMC", "LMC, free across")
-"""Rows that no null is: what is known to be right, and what LMC learned."""
+NOT_NULLS = ("true push", "axis, push and turn", "LMC", "LMC, free across", "LMC, deepest push")
+"""Rows that no null is: what is known to be right, and what LMC learned, with its rule before as an ablation."""
 
 
 WHOEVER = "whoever shows it"
