@@ -135,7 +135,7 @@ def _lines(path: Path | None) -> list[str]:
 def main(given: Sequence[str]) -> None:
     """Run the sets of a family, or of all, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("family", choices=["all", *sorted(FAMILIES)])
+    parser.add_argument("families", nargs="+", choices=["all", *sorted(FAMILIES)], help="several make one table")
     parser.add_argument("--sets", type=int, default=20)
     parser.add_argument("--first", type=int, default=9000, help="seed of the first set")
     parser.add_argument("--kinds", nargs="+", default=PEOPLE, choices=KINDS)
@@ -146,13 +146,14 @@ def main(given: Sequence[str]) -> None:
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--out", type=Path, help="file of the sets, a JSON line each")
     args = parser.parse_args(given)
+    families = list(FAMILIES) if "all" in args.families else args.families
     if args.directions:
         for seed in range(args.first, args.first + args.sets):
-            print("\n".join(directions(seed, args.family, args.kinds)), flush=True)
+            print("\n".join(line for family in families for line in directions(seed, family, args.kinds)), flush=True)
         return
-    runs = sets_of(list(FAMILIES) if args.family == "all" else [args.family], args)
+    runs = sets_of(families, args)
     whole = [kind for kind in args.kinds if kind != SHAKY]
-    print("\n".join(side_by_side(runs, whole) if args.family == "all" else table(runs)))
+    print("\n".join(side_by_side(runs, whole) if len(families) > 1 else table(runs)))
 
 
 if __name__ == "__main__":
