@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -134,35 +133,6 @@ def test_where_nothing_fails_there_is_no_breaking_point():
     )
     assert found.points.shape == (0, 2)
     assert len(points) == 8 + 5 * 32  # directions, all but the last few of the 200
-
-
-def test_a_ray_ends_where_the_ranges_do():
-    assert breaking.reach(np.array([0.5, 0.0]), np.array([1.0, 0.0])) == pytest.approx(0.5)
-    assert breaking.reach(np.array([0.0, 0.0]), np.array([0.6, -0.8])) == pytest.approx(1.25)
-
-
-def test_ways_are_as_far_apart_as_can_be_and_begin_with_a_longest_ray():
-    """In the plane: a corner, the opposite one, the two others, then the middles, to the pool's grain."""
-    ways = np.array(list(islice(breaking.spread(np.zeros(2)), 8)))
-    diagonals = np.abs(ways[:4, 0] * ways[:4, 1])
-    assert diagonals == pytest.approx(0.5, abs=1e-3)
-    assert ways[0] == pytest.approx(-ways[1], abs=0.01)
-    assert np.sort(np.abs(ways[4:]).max(axis=1)) == pytest.approx(1.0, abs=1e-3)
-
-
-def test_sixty_four_ways_in_six_quantities_are_further_apart_than_even_ones():
-    def nearest(ways):
-        return (ways @ ways.T - 2.0 * np.eye(len(ways))).max()
-
-    ways = np.array(list(islice(breaking.spread(np.zeros(6)), 64)))
-    assert nearest(ways) < np.cos(np.radians(40.0)) < nearest(breaking.directions(6)[:64])
-
-
-def test_ways_from_a_corner_lead_into_the_ranges_and_in_one_quantity_they_take_turns():
-    corner = np.array([1.0, 1.0, -1.0])
-    ways = np.array(list(islice(breaking.spread(corner), 40)))
-    assert np.all(ways * corner < 0.0)
-    assert np.sum(list(islice(breaking.spread(np.zeros(1)), 32))) == 0.0
 
 
 def test_indices_of_a_linear_truth_are_the_shares_of_its_variance():
