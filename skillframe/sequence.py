@@ -128,14 +128,14 @@ class Composition(Skill):
                 child.restart(rows, observation, [self._rngs[i][part] for i in rows.tolist()])
         first = int(self.current[0])
         self._shared = first if bool((self.current == first).all()) else None
-        self._entered: list[int] = np.unique(self.current).tolist()
+        self._current_parts: list[int] = np.unique(self.current).tolist()
 
     def _ask(self, observation: Observation) -> Command:
         """The command of each trial's own part."""
         if self._shared is not None:
             command = self._answer(self._shared, observation)
             return command._replace(impedance=Impedance(command.impedance.stiffness))
-        answers = [(part, self._answer(part, observation)) for part in self._entered]
+        answers = [(part, self._answer(part, observation)) for part in self._current_parts]
         return _picked(self.current, answers)
 
     def _answer(self, part: int, observation: Observation) -> Command:
