@@ -11,7 +11,7 @@ import numpy as np
 from skillframe.conformance.play import Rows
 from skillframe.errors import SkillframeError
 from skillframe.extend.records import WorldType
-from skillframe.frames import Pose, matrix_from_quaternion, rotation_matrix
+from skillframe.frames import Float, Pose, matrix_from_quaternion, rotation_matrix
 
 if TYPE_CHECKING:
     from skillframe.world.scene import Scene, State, Task
@@ -28,7 +28,7 @@ def states_of(scene: Scene) -> State:
     """States (N) around the start, and ever nearer to where `goal_error` is smallest. The same every time."""
     from skillframe.world.scene import State
 
-    rng = np.random.default_rng(11)
+    rng, moved = np.random.default_rng(11), np.random.default_rng(12)
     base = matrix_from_quaternion(scene.start_quaternion if scene.task.aligned is None else scene.task.aligned)
     middle, spread = np.append(np.array(scene.start_tip, dtype=float), np.zeros(3)), np.repeat(SPREAD, 3)
     away = scene.goal_error(State(Pose(middle[None, :3], base[None]), np.zeros((1, 6))))[0]
@@ -37,25 +37,40 @@ def states_of(scene: Scene) -> State:
     for _ in range(ROUNDS):
         drawn = middle + spread * rng.normal(size=(TRIED, 6))
         wrench = rng.normal(size=(TRIED, 6)) * np.repeat([20.0, 1.0], 3) * rng.integers(0, 2, (TRIED, 1))
-        parts.append(State(Pose(drawn[:, :3], rotation_matrix(drawn[:, 3:]) @ base), wrench))
+        parts.append(State(Pose(drawn[:, :3], rotation_matrix(drawn[:, 3:]) @ base), wrench, _travels(scene, moved)))
         distance, angle = scene.goal_error(parts[-1])
         best = drawn[np.argsort(distance + RADIAN_M * angle, kind="stable")[:BEST]]
         middle, spread = best.mean(0), np.maximum(best.std(0), np.maximum(SLOWEST * spread, SMALLEST))
     return _joined(parts)
 
 
+def _travels(scene: Scene, rng: np.random.Generator) -> dict[str, Float]:
+    """How far second parts have moved (`TRIED`,) by name: within their range, mostly near its ends, where goals lie."""
+    from skillframe.world.scene import Mover
+
+    found = {}
+    for part in (each for each in scene.sprung if isinstance(each, Mover)):
+        for name in part.quantities:
+            low, high = part.range or (0.0 if part.joint == "free" else -SPREAD[1], SPREAD[1])
+            near = (high - low) * rng.uniform(size=TRIED) ** 3
+            found[name] = np.where(rng.integers(0, 2, TRIED) == 0, low + near, high - near)
+    return found
+
+
 def _joined(parts: list[State]) -> State:
     from skillframe.world.scene import State
 
     position, rotation = (np.concatenate([getattr(p.tip, name) for p in parts]) for name in Pose._fields)
-    return State(Pose(position, rotation), np.concatenate([p.wrench for p in parts]))
+    second = {name: np.concatenate([p.second[name] for p in parts]) for name in parts[0].second}
+    return State(Pose(position, rotation), np.concatenate([p.wrench for p in parts]), second)
 
 
 def some(state: State, rows: Rows) -> State:
     """Some of several states."""
     from skillframe.world.scene import State
 
-    return State(Pose(state.tip.position[rows], state.tip.rotation[rows]), state.wrench[rows])
+    second = {name: values[rows] for name, values in state.second.items()}
+    return State(Pose(state.tip.position[rows], state.tip.rotation[rows]), state.wrench[rows], second)
 
 
 def rows_alone(scene: Scene) -> Iterator[str]:
