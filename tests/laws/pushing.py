@@ -85,3 +85,18 @@ class Hold(Skill):
             status[:], reason[:] = self.end[1], self.end[2]
         push = np.broadcast_to(self.feedforward(time), (count, 6))
         return Command(self.pose, np.zeros((count, 6)), self.impedance, push, status, reason)
+
+
+class Wrenches(Skill):
+    """Constant wrenches (N, 6) in base, a stiffness (6, 6) about the attitude at the start, and a damping (6, 6)."""
+
+    def __init__(self, wrenches, stiffness, damping):
+        self.wrenches, self.impedance = wrenches, Impedance(stiffness, damping)
+
+    def start(self, observation, rngs):
+        self.rotation = observation.pose.rotation.copy()
+
+    def step(self, observation):
+        count = len(self.wrenches)
+        pose, zero = Pose(observation.pose.position, self.rotation), np.zeros((count, 6))
+        return Command(pose, zero, self.impedance, self.wrenches, np.zeros(count, dtype=int), no_reasons(count))

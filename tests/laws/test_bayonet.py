@@ -7,30 +7,10 @@ import pytest
 
 from skillframe.execution.executor import Setup, simulate
 from skillframe.execution.prepare import load_robot_model, load_world
-from skillframe.frames import Pose
-from skillframe.skill import Command, Impedance, Skill, no_reasons
+from tests.laws.pushing import Wrenches
 
 pytestmark = pytest.mark.slow
 REACH, PUSH_N, FRICTION = 0.03, 20.0, 0.2
-
-
-class Wrenches(Skill):
-    """Pushes and turns with constant wrenches (N, 6) against a damper, upright, and gives way in all else."""
-
-    def __init__(self, wrenches):
-        self._wrenches = wrenches
-
-    def start(self, observation, rngs):
-        upright, damper = np.zeros((6, 6)), np.diag([150.0] * 3 + [1.0, 1.0, 0.2])
-        upright[3, 3] = upright[4, 4] = 20.0
-        self._impedance, self._home = Impedance(upright, damper), observation.pose.rotation.copy()
-
-    def step(self, observation):
-        n = len(self._wrenches)
-        pose = Pose(observation.pose.position, self._home)
-        return Command(
-            pose, np.zeros((n, 6)), self._impedance, self._wrenches, np.zeros(n, dtype=np.int64), no_reasons(n)
-        )
 
 
 def reached(lead_deg, angles_deg, start=0.0):
@@ -39,11 +19,12 @@ def reached(lead_deg, angles_deg, start=0.0):
     angles = np.radians(angles_deg)
     wrenches = np.zeros((len(angles), 6))
     wrenches[:, 2], wrenches[:, 5] = -PUSH_N * np.sin(angles), PUSH_N * REACH * np.cos(angles)
+    upright, damper = np.diag([0.0] * 3 + [20.0, 20.0, 0.0]), np.diag([150.0] * 3 + [1.0, 1.0, 0.2])
     setup = Setup(robot=load_robot_model("free_tool"), scene=scene,
                   center_of_compliance=np.array(scene.tool.frames["tip"]), stop_when=scene.goal)  # fmt: skip
     draws = {"start.tilt_z": np.full(len(angles), start)}
     rngs = np.random.default_rng(0).spawn(len(angles))
-    return simulate(Wrenches(wrenches), setup, draws, rngs, duration_s=6.0).success
+    return simulate(Wrenches(wrenches, upright, damper), setup, draws, rngs, duration_s=6.0).success
 
 
 def test_a_push_and_turn_lock_it_where_their_angle_lies_inside_every_friction_cone():

@@ -8,29 +8,10 @@ from scipy.optimize import brentq
 
 from skillframe.execution.executor import Setup, simulate
 from skillframe.execution.prepare import load_robot_model, load_world
-from skillframe.frames import Pose
-from skillframe.skill import Command, Impedance, Skill, no_reasons
+from tests.laws.pushing import Wrenches
 
 pytestmark = pytest.mark.slow
 PUSH_N, SPRING, LENGTH, RADIUS, OPENING = 20.0, 0.6, 0.1, 0.005, 60.0
-
-
-class Pushes(Skill):
-    """Pushes with constant forces (N, 3) against a damper, upright, and gives way in all else."""
-
-    def __init__(self, forces):
-        self._wrenches = np.column_stack([forces, np.zeros_like(forces)])
-
-    def start(self, observation, rngs):
-        upright, damper = np.diag([0.0] * 3 + [20.0] * 3), np.diag([150.0] * 3 + [1.0] * 3)
-        self._impedance, self._home = Impedance(upright, damper), observation.pose.rotation.copy()
-
-    def step(self, observation):
-        n = len(self._wrenches)
-        pose = Pose(observation.pose.position, self._home)
-        return Command(
-            pose, np.zeros((n, 6)), self._impedance, self._wrenches, np.zeros(n, dtype=np.int64), no_reasons(n)
-        )
 
 
 def left_open(angles_deg, begin=0.028):
@@ -41,13 +22,15 @@ def left_open(angles_deg, begin=0.028):
     hinge = {"opening": radians(OPENING), "spring": SPRING, "stuck": 0.0}
     scene = load_world("lid", {**hinge, "length": LENGTH, "radius": RADIUS})
     angles, n = np.radians(angles_deg), len(angles_deg)
-    forces = PUSH_N * np.column_stack([np.sin(angles), np.zeros(n), -np.cos(angles)])
+    wrenches = np.zeros((n, 6))
+    wrenches[:, 0], wrenches[:, 2] = PUSH_N * np.sin(angles), -PUSH_N * np.cos(angles)
+    upright, damper = np.diag([0.0] * 3 + [20.0] * 3), np.diag([150.0] * 3 + [1.0] * 3)
     setup = Setup(robot=load_robot_model("free_tool"), scene=scene,
                   center_of_compliance=np.array(scene.tool.frames["tip"]))  # fmt: skip
     along = begin * np.array([cos(radians(OPENING)), 0.0, sin(radians(OPENING))])
     draws = {f"start.offset_{a}": np.full(n, along[i]) for i, a in enumerate("xyz")}
     rngs = np.random.default_rng(0).spawn(n)
-    result = simulate(Pushes(forces), setup, draws, rngs, duration_s=6.0)
+    result = simulate(Wrenches(wrenches, upright, damper), setup, draws, rngs, duration_s=6.0)
     return np.degrees(result.final_error_rad)
 
 
@@ -62,7 +45,9 @@ def test_the_lid_shuts_to_where_the_push_s_moment_is_the_spring_s():
     weight = 0.05 * 9.81 * 0.5 * (LENGTH + 0.004)
 
     def at_rest(push):
-        moment = lambda a: PUSH_N * lever * cos(push - a - above) + weight * cos(a) - SPRING * (radians(OPENING) - a)  # noqa: E731
+        def moment(a):
+            return PUSH_N * lever * cos(push - a - above) + weight * cos(a) - SPRING * (radians(OPENING) - a)
+
         return degrees(brentq(moment, 0.0, radians(OPENING))) if moment(0.0) < 0.0 else 0.0
 
     angles = [65.0, 85.0, 95.0, 105.0]

@@ -20,11 +20,11 @@ from math import acos, atan, cos, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.frames import Float, matrix_from_quaternion, quaternion_from_matrix
-from skillframe.world.scene import Geom, Mover, Scene, State, Task, Vector
+from skillframe.frames import Float, matrix_from_quaternion
+from skillframe.world.scene import Geom, Mover, Scene, State, Task
 from skillframe.world.shapes import FIXTURE_COLOUR, TOOL_COLOUR, quaternion_about, shaft
 from skillframe.world.worlds.common import TOOL_DOWN, WRIST_TO_TIP, require, tool
-from skillframe.world.worlds.turned import turned
+from skillframe.world.worlds.turned import as_vector, turned, turned_quaternion
 
 WIDTH, THICK = 0.12, 0.004
 LIP, LIP_THICK = 0.008, 0.004  # how far the lip stands up, and its thickness [m]
@@ -72,7 +72,7 @@ def build(params: LidParams) -> Scene:
     middle = 0.5 * (low + high)
     along, normal = _axes(params.opening)
     start = (params.length - params.radius - BEGIN) * along + (params.radius + CLEAR) * normal
-    upright = matrix_from_quaternion(quaternion_about("y", -params.opening)) @ matrix_from_quaternion(TOOL_DOWN)
+    lean = matrix_from_quaternion(quaternion_about("y", -params.opening))
     ball = Geom(kind="sphere", size=(params.radius,), position=(0.0, 0.0, WRIST_TO_TIP), rgba=TOOL_COLOUR)
 
     def left(state: State) -> Float:
@@ -92,8 +92,8 @@ def build(params: LidParams) -> Scene:
             sprung=(_lid(params),),
             tool=tool((ball, shaft(0.003, 0.01, WRIST_TO_TIP - params.radius)), hand="grip"),
             friction=params.friction,
-            start_tip=_vector(start),
-            start_quaternion=_quaternion(upright),
+            start_tip=as_vector(start),
+            start_quaternion=turned_quaternion(lean, TOOL_DOWN),
             goal=shut,
             goal_error=lambda state: (np.zeros(len(state.tip.position)), left(state)),
             task=Task(
@@ -133,27 +133,18 @@ def _lid(params: LidParams) -> Mover:
     turn = quaternion_about("y", -params.opening)
     half = 0.5 * (params.length + LIP_THICK)
     plate = Geom(
-        kind="box", size=(half, 0.5 * WIDTH, 0.5 * THICK), position=_vector(half * along - 0.5 * THICK * normal),
+        kind="box", size=(half, 0.5 * WIDTH, 0.5 * THICK), position=as_vector(half * along - 0.5 * THICK * normal),
         quaternion=turn, rgba=LID_COLOUR,
     )  # fmt: skip
     lip = Geom(
         kind="box", size=(0.5 * LIP_THICK, 0.5 * WIDTH, 0.5 * LIP), quaternion=turn, rgba=LID_COLOUR,
-        position=_vector((params.length + 0.5 * LIP_THICK) * along + 0.5 * LIP * normal),
+        position=as_vector((params.length + 0.5 * LIP_THICK) * along + 0.5 * LIP * normal),
     )  # fmt: skip
     squares = np.array([2.0 * half, WIDTH, THICK]) ** 2
     own = MASS / 12.0 * np.diag(squares.sum() - squares)
     axes = matrix_from_quaternion(turn)
     return Mover(
         name=NAME, geoms=(plate, lip), joint="hinge", axis=(0.0, 1.0, 0.0), mass=MASS,
-        center_of_mass=_vector(half * along - 0.5 * THICK * normal), inertia=axes @ own @ axes.T,
+        center_of_mass=as_vector(half * along - 0.5 * THICK * normal), inertia=axes @ own @ axes.T,
         stiffness=params.spring, damping=0.02, friction=params.stuck, range=(0.0, params.opening),
     )  # fmt: skip
-
-
-def _vector(values: Float) -> Vector:
-    return (float(values[0]), float(values[1]), float(values[2]))
-
-
-def _quaternion(rotation: Float) -> tuple[float, float, float, float]:
-    x, y, z, w = quaternion_from_matrix(rotation)
-    return (float(x), float(y), float(z), float(w))

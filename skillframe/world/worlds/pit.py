@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float, unit
-from skillframe.world.scene import Geom, Scene, State, Task, Vector
+from skillframe.world.scene import Geom, Scene, State, Task
 from skillframe.world.shapes import TOOL_COLOUR, shaft, slope
 from skillframe.world.worlds.common import TOOL_DOWN, WRIST_TO_TIP, require, tool
-from skillframe.world.worlds.turned import turned
+from skillframe.world.worlds.turned import as_vector, turned
 
 LENGTH, WIDTH = 0.12, 0.24
 FAR, CLEAR = 0.025, 0.002  # from the middle to a start, and off every face [m]
@@ -72,12 +72,12 @@ def build(params: PitParams) -> Scene:
             fixture=tuple(slope(s, a, LENGTH, WIDTH) for s, a in faces),
             tool=tool((ball, shaft(0.004, 0.01, WRIST_TO_TIP - params.radius)), hand="grip"),
             friction=params.friction,
-            start_tip=_vector(start),
+            start_tip=as_vector(start),
             start_quaternion=TOOL_DOWN,
             goal=in_pit,
             goal_error=lambda state: (np.clip(off(state).max(axis=-1), 0.0, None), np.zeros(len(state.tip.position))),
             task=Task(
-                direction=_vector(unit(push)), hand="sliding",
+                direction=as_vector(unit(push)), hand="sliding",
                 starts=tuple({f"start.offset_{a}": float(each[i]) for i, a in enumerate("xyz")} for each in up),
             ),
         ),
@@ -89,7 +89,3 @@ def _resting(normals: Float, radius: float) -> Float:
     """The centre (3,) of a ball that touches all faces, or of two the one nearest to the origin."""
     centre: Float = np.linalg.lstsq(normals, np.full(len(normals), radius), rcond=None)[0]
     return centre
-
-
-def _vector(values: Float) -> Vector:
-    return (float(values[0]), float(values[1]), float(values[2]))

@@ -27,8 +27,8 @@ def turned(scene: Scene, vector: Vector) -> Scene:
         scene,
         fixture=tuple(_geom(geom, turn) for geom in scene.fixture),
         sprung=tuple(_mover(part, turn) for part in scene.sprung),
-        start_tip=_vector(turn @ np.array(scene.start_tip)),
-        start_quaternion=_quaternion(turn, scene.start_quaternion),
+        start_tip=as_vector(turn @ np.array(scene.start_tip)),
+        start_quaternion=turned_quaternion(turn, scene.start_quaternion),
         goal=_seen(scene.goal, turn),
         goal_error=_seen(scene.goal_error, turn),
         task=_task(scene.task, turn),
@@ -36,15 +36,15 @@ def turned(scene: Scene, vector: Vector) -> Scene:
 
 
 def _geom(geom: Geom, turn: Float) -> Geom:
-    place = _vector(turn @ np.array(geom.position))
-    return replace(geom, position=place, quaternion=_quaternion(turn, geom.quaternion))
+    place = as_vector(turn @ np.array(geom.position))
+    return replace(geom, position=place, quaternion=turned_quaternion(turn, geom.quaternion))
 
 
 def _mover(part: Sprung | Mover, turn: Float) -> Mover:
     assert isinstance(part, Mover)
     return replace(
-        part, geoms=tuple(_geom(geom, turn) for geom in part.geoms), anchor=_vector(turn @ np.array(part.anchor)),
-        axis=_vector(turn @ np.array(part.axis)), center_of_mass=_vector(turn @ np.array(part.center_of_mass)),
+        part, geoms=tuple(_geom(geom, turn) for geom in part.geoms), anchor=as_vector(turn @ np.array(part.anchor)),
+        axis=as_vector(turn @ np.array(part.axis)), center_of_mass=as_vector(turn @ np.array(part.center_of_mass)),
         inertia=turn @ part.inertia @ turn.T,
     )  # fmt: skip
 
@@ -58,8 +58,8 @@ def _task(task: Task, turn: Float) -> Task:
                 vector = turn @ np.array([start.get(f"start.{kind}_{a}", 0.0) for a in "xyz"])
                 moved |= {f"start.{kind}_{a}": float(vector[i]) for i, a in enumerate("xyz")}
         starts.append(moved)
-    way = None if task.turn is None else _vector(turn @ np.array(task.turn))
-    return replace(task, direction=_vector(turn @ np.array(task.direction)), turn=way, starts=tuple(starts))
+    way = None if task.turn is None else as_vector(turn @ np.array(task.turn))
+    return replace(task, direction=as_vector(turn @ np.array(task.direction)), turn=way, starts=tuple(starts))
 
 
 def _seen(look: Callable[[State], _T], turn: Float) -> Callable[[State], _T]:
@@ -73,10 +73,12 @@ def _seen(look: Callable[[State], _T], turn: Float) -> Callable[[State], _T]:
     return asked
 
 
-def _vector(values: Float) -> Vector:
+def as_vector(values: Float) -> Vector:
+    """Three numbers as plain values."""
     return (float(values[0]), float(values[1]), float(values[2]))
 
 
-def _quaternion(turn: Float, given: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+def turned_quaternion(turn: Float, given: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    """An attitude after a turn (3, 3) about the fixture's axes."""
     x, y, z, w = quaternion_from_matrix(turn @ matrix_from_quaternion(given))
     return (float(x), float(y), float(z), float(w))
