@@ -7,11 +7,12 @@ import math
 import numpy as np
 import pytest
 import synthetic as syn
+from skillframe_lmc import expected, sphere
 from skillframe_lmc.expected import doubt, expected_push, explained
 from skillframe_lmc.sectors import Sectors
 from test_modes import FIRST_PUSH, GRID, PHI, RAMP, below, humps, legs, motions, part
 
-from skillframe.frames import Float
+from skillframe.frames import Float, unit
 
 
 def at(degrees_below: float, aside: float = 0.0) -> Float:
@@ -65,6 +66,32 @@ def test_a_flight_between_two_contacts_draws_the_push_towards_its_way() -> None:
     assert below(part(grounded)) == pytest.approx(0.5 * FIRST_PUSH, abs=GRID)
     assert 0.5 * FIRST_PUSH + 1.0 < below(part(flown)) < 26.0
     assert below(part(flown, expected=False)) == pytest.approx(below(part(grounded, expected=False)), abs=0.1)
+
+
+@pytest.mark.parametrize("air", [None, 60.0])
+def test_the_push_is_the_mean_over_the_sphere_and_not_its_most_credible_point(
+    monkeypatch: pytest.MonkeyPatch, air: float | None
+) -> None:
+    """Summed over all cells of 0.8 degrees: 4 doubtful intervals say up to 30 degrees, and 12 up to 84.
+
+    The most credible push is 15 below the floor, the mean some 30, and farther with a flight of 60. It is told by cells
+    of 1.6 degrees, of which the first and last count or not: half a degree.
+    """
+    given, flight = [group(0.0, 84.0, 12), group(0.0, 30.0, 4)], None if air is None else at(air)[0]
+    monkeypatch.setattr(expected, "groups", lambda motions: given)
+    monkeypatch.setattr(expected, "_in_air", lambda motions: flight)
+    _, cells = sphere.whole(256)
+    credible = np.ones(len(cells))
+    for each in given:
+        e = doubt(len(each.contact))
+        credible *= e + (1.0 - e) * explained(cells, each)
+    if flight is not None:
+        off = np.degrees(np.arccos(np.clip(cells @ flight, -1.0, 1.0)))
+        credible *= 0.1 + 0.9 * np.exp(-0.5 * (off / 15.0) ** 2)
+    credible[credible < 0.1 * credible.max()] = 0.0
+    mean = unit(credible @ cells)
+    assert math.degrees(math.acos(min(1.0, float(expected_push([]) @ mean)))) < 0.5
+    assert math.degrees(math.acos(float(mean @ at(15.0)[0]))) > 5.0
 
 
 def test_a_small_group_that_is_no_face_has_no_veto() -> None:
