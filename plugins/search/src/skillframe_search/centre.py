@@ -63,9 +63,9 @@ class Centre(Skill):
         gone = SPEED * (observation.time - self._began)
         held = -(observation.wrench[:, :3] * self._back).sum(axis=1)
         self._felt += (held - self._felt) * (observation.dt / (SMOOTHING_S + observation.dt))
-        for i in np.flatnonzero(self._status == Status.RUNNING).tolist():
-            if self._felt[i] > self._most or gone[i] > self._length[i] + SPEED * SETTLE_S:
-                self._status[i], self._reason[i] = Status.SUCCESS, self._told(observation, i)
+        done = (self._felt > self._most) | (gone > self._length + SPEED * SETTLE_S)
+        for i in np.flatnonzero(done & (self._status == Status.RUNNING)).tolist():
+            self._status[i], self._reason[i] = Status.SUCCESS, self._told(observation, i)
         wrench = np.zeros((len(gone), 6))
         wrench[:, :3] = PRESS_N * self._way
         place = self._home.position + np.minimum(gone, self._length)[:, None] * self._back
