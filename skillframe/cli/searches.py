@@ -129,13 +129,14 @@ def _look(folder: Path, engine: Engine) -> None:
 
 
 def _tell_border(folder: Path, found: dict[str, Any]) -> int:
-    end = f"the last round changed {100.0 * (found['changed'] or 0.0):.1f} % of it"
     alike = _alike(found["trials"], found["successes"])
     if alike:
         click.echo(f"border      none was met: {alike}")
     else:
-        click.echo(f"border      found after {found['trials']} trials; {end}"
-                   + ("" if found["settled"] else ", which is not yet settled"))  # fmt: skip
+        wrong = f"about {100.0 * found['doubt']:.2g} % of what works may be predicted wrong"
+        click.echo(
+            f"border      {'found' if found['settled'] else 'not settled'} after {found['trials']} trials; {wrong}"
+        )
     click.echo(f"works       in {100.0 * found['share_that_works']:.3g} % of the declared ranges, as predicted")
     for name, (low, high) in found["reaches"].items():
         ends = [word for word, there in (("low", low), ("high", high)) if there]

@@ -1,10 +1,10 @@
 r"""Where the border of success lies, from trials that are picked near it.
 
-After the first trials, each round fits the surrogate, takes three quarters of its points where the straddle score is
-largest and a quarter from the Sobol sequence, which goes on where the first trials ended and finds what the surrogate
-does not expect. It ends once the predicted labels over a fixed cloud of points changed by less than `CLOSE` of the
-predicted set in two rounds running, and is not empty where some trial worked, or at the budget. Batches are small: a
-large one picks its last points from a guess that its first ones would have changed.
+After the first trials, each round fits the surrogate, takes three quarters of its points where they tell most of the
+border and a quarter from the Sobol sequence, which goes on where the first trials ended and finds what the surrogate
+does not expect. It ends once the surrogate expects to be wrong on less than `CLOSE` of the set in two rounds running,
+or at the budget. Batches are small: a large one picks its last points from a guess that its first ones would have
+changed.
 
 Rows that were picked so are no sample: no rate, interval or test may be made of them.
 """
@@ -16,6 +16,7 @@ from collections.abc import Callable, Generator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skillframe.campaign.claims.engine import Looked, Say
 from skillframe.campaign.claims.surrogate import Surrogate
@@ -47,7 +48,8 @@ class Border(NamedTuple):
     Attributes:
         trials: all that were looked at.
         explored: how many of them are even over the ranges.
-        changed: share of the predicted set that the last round changed; None before two rounds.
+        doubt: volume that is expected to be predicted wrong, over that of the set: the mean of min(p, 1 - p) over the
+            mean of p, p being how sure it is that most trials succeed; see `doubt_of`.
         settled: whether it ended by itself, and not at the budget.
         share: of the ranges' volume in which trials are predicted to succeed.
         edges: (d, 2) whether the predicted set reaches the low and the high end of each range.
@@ -55,7 +57,7 @@ class Border(NamedTuple):
 
     trials: int
     explored: int
-    changed: float | None
+    doubt: float
     settled: bool
     share: float
     edges: tuple[tuple[bool, bool], ...]
@@ -91,40 +93,54 @@ def search(
         say: told how far it is.
     """
     dimension = seen.points.shape[1]
-    even, number, calm, changed = cloud(dimension), 0, 0, None
+    even, number, calm = cloud(dimension), 0, 0
     batch, surrogate = batch_size(dimension, budget), Surrogate(seen.points, seen.works)
-    labels = surrogate.mean(even) > 0.0
+    sure = surrogate.above(even)
     while len(seen.works) < budget and calm < RUNNING:
         number += 1
         count = min(batch, budget - len(seen.works))
         share = math.ceil(count / EXPLORED)
         offered = cloud(dimension, CANDIDATES, number)
-        picks = offered[surrogate.straddle(offered, count - share)]
+        picks = offered[surrogate.telling(offered, count - share)]
         ended = yield ToTry(np.concatenate([sobol(explored, explored + share), picks]), share)
         seen, explored = seen.with_more(ended), explored + share
-        surrogate, before = Surrogate(seen.points, seen.works), labels
-        labels = surrogate.mean(even) > 0.0
-        changed = float(np.mean(labels != before) / max(np.mean(labels), 1.0 / len(even)))
-        if seen.works.any() and not labels.any():  # what was seen to work is taken for noise: no border is known
-            changed = 1.0
-        calm = calm + 1 if changed < CLOSE else 0
-        say(_progress(changed, len(seen.works), to_go(changed, calm, len(seen.works), batch, budget)))
-    return Border(
-        len(seen.works), explored, changed, calm >= RUNNING, float(np.mean(labels)), edges_of(surrogate, dimension)
-    )
+        surrogate = Surrogate(seen.points, seen.works)
+        sure = surrogate.above(even)
+        doubt = doubt_of(sure, seen.works)
+        calm = calm + 1 if doubt < CLOSE else 0
+        say(_progress(doubt, len(seen.works), to_go(doubt, calm, len(seen.works), batch, budget)))
+    share_that_works, edges = float(np.mean(sure > 0.5)), edges_of(surrogate, dimension)
+    return Border(len(seen.works), explored, doubt_of(sure, seen.works), calm >= RUNNING, share_that_works, edges)
 
 
-def to_go(changed: float, calm: int, trials: int, batch: int, budget: int) -> int:
+def doubt_of(sure: Float, works: NDArray[np.bool_]) -> float:
+    """`Border.doubt`, at most 1.
+
+    Where no trial works it is the share of the ranges that is expected to; where some do and no place is predicted to,
+    what was seen to work is taken for noise, and no border is known.
+
+    Args:
+        sure: (m,) at even points, how sure it is that most trials succeed.
+        works: (n,) whether each trial succeeded.
+    """
+    if not works.any():
+        return float(np.mean(sure))
+    if not np.any(sure > 0.5):
+        return 1.0
+    return min(1.0, float(np.mean(np.minimum(sure, 1.0 - sure)) / np.mean(sure)))
+
+
+def to_go(doubt: float, calm: int, trials: int, batch: int, budget: int) -> int:
     """A guess of the trials that are left: the error falls as one over the trials, and the end takes calm rounds."""
     if calm >= RUNNING:
         return 0
     rounds = batch * (RUNNING - calm)
-    falling = trials * (changed / CLOSE - 1.0) if changed > CLOSE else 0.0
+    falling = trials * (doubt / CLOSE - 1.0) if doubt > CLOSE else 0.0
     return max(0, min(max(rounds, math.ceil(falling / 8) * 8), budget - trials))
 
 
-def _progress(changed: float, trials: int, left: int) -> str:
-    within = f"border within {100.0 * max(changed, 0.001):.2g} % after {trials} trials"
+def _progress(doubt: float, trials: int, left: int) -> str:
+    within = f"border within {100.0 * max(doubt, 0.001):.2g} % after {trials} trials"
     return f"{within}, about {left} trials to go" if left else within
 
 

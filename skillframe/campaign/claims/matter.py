@@ -5,7 +5,7 @@ known (Homma and Saltelli 1996); Jansen's estimate (1999) with even points a, b 
 
     S_i = sum (f(a) - f(a_i))^2 / (2 n var f).
 
-f is the surrogate's mean, kept between -1 and 1. An index is a guess: it ranks. What is claimed comes from fresh
+f is the surrogate's success probability. An index is a guess: it ranks. What is claimed comes from fresh
 independent trials over the ranges and the same trials, their noise included, with one quantity held at its nominal
 value: McNemar's test over the pairs, corrected by Holm over the quantities, and the interval of Agresti and Min (2005,
 "Simple improved confidence intervals for comparing matched proportions", Statistics in Medicine 24) for the
@@ -62,11 +62,7 @@ def indices(surrogate: Surrogate, dimension: int) -> Float:
     both = 2.0 * qmc.Sobol(2 * dimension, scramble=True, rng=np.random.default_rng(0)).random(POINTS) - 1.0
     a, b = both[:, :dimension], both[:, dimension:]
 
-    def predicted(points: Float) -> Float:
-        result: Float = np.clip(surrogate.mean(points), -1.0, 1.0)
-        return result
-
-    here = predicted(a)
+    here = surrogate.success(a)
     spread = float(np.var(here))
     if spread < 1e-12:
         return np.zeros(dimension)
@@ -74,7 +70,7 @@ def indices(surrogate: Surrogate, dimension: int) -> Float:
     for i in range(dimension):
         swapped = a.copy()
         swapped[:, i] = b[:, i]
-        found[i] = np.mean((here - predicted(swapped)) ** 2) / (2.0 * spread)
+        found[i] = np.mean((here - surrogate.success(swapped)) ** 2) / (2.0 * spread)
     return found
 
 

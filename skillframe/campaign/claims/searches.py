@@ -55,7 +55,7 @@ def map_border(folder: Path, engine: Engine, say: Say = print) -> dict[str, Any]
     ranks = matter.ranks(seen)
     return _written(folder, BORDER, {
         "trials": found.trials, "successes": int(seen.works.sum()), "explored": found.explored,
-        "changed": found.changed, "settled": found.settled, "share_that_works": found.share,
+        "doubt": found.doubt, "settled": found.settled, "share_that_works": found.share,
         "smallest_island": border.ISLANDS / found.explored,
         "reaches": {name: list(found.edges[i]) for i, name in enumerate(names)},
         "index": {name: float(ranks[i]) for i, name in enumerate(names)},

@@ -1,34 +1,37 @@
-r"""A smooth guess of where a skill works, from trials that did and did not: least-squares Gaussian process on labels.
+r"""A smooth guess of where a skill works, from trials that did and did not: a Gaussian process classifier.
 
-Labels y are 1 and -1. With the Matern covariance of order 5/2, one length l_i per quantity (Rasmussen and Williams
-2006, "Gaussian processes for machine learning", equation 4.17),
+A trial at x succeeds with probability Phi(f(x)), Phi being the normal distribution function and f a hidden function of
+the d quantities. The covariance of f is the Matern one of order 5/2, with one length l_i per quantity and an amplitude
+a (Rasmussen and Williams 2006, "Gaussian processes for machine learning", equation 4.17),
 
-    k(r) = (1 + sqrt(5) r + 5 r^2 / 3) exp(-sqrt(5) r),      r^2 = sum ((x_i - x'_i) / l_i)^2,
+    k(r) = a^2 (1 + sqrt(5) r + 5 r^2 / 3) exp(-sqrt(5) r),      r^2 = sum ((x_i - x'_i) / l_i)^2,
 
-and noise variance s^2 on the labels, the mean at x is k(x, X) (K + s^2 I)^-1 y. Lengths and noise maximise the marginal
-likelihood (their equation 2.30) over a fixed ladder, one coordinate after the other, from two noises: from one alone
-the climb may end on a lower hill, where lengths are so short that no trial tells of its neighbours. Prior mean 0, that
-is "unknown", and variance 1 are our choice. Nothing that is claimed rests on it: it proposes, fresh trials decide.
+so that a sharp border is a smooth f that passes 0 steeply. What labels say of it is found by `propagation`. Lengths and
+amplitude maximise the evidence of `laplace` over fixed ladders, one coordinate after the other, from two places: from
+one alone the climb may end on a lower hill. The mean of f before any trial is 0, that is "unknown". Ladders and
+beginnings are our choice. Nothing that is claimed rests on it: it proposes, fresh trials decide.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import solve_triangular
+from scipy.special import log_ndtr, ndtr
 
+from skillframe.campaign.claims.laplace import JITTER, evidence
+from skillframe.campaign.claims.propagation import posterior
 from skillframe.frames import Float
 
-LENGTHS = tuple(float(v) for v in np.geomspace(0.05, 4.0, 13))
-NOISES = (1e-3, 1e-2, 0.1, 0.5)
-"""Of the labels' variance."""
-FROM = (NOISES[1], NOISES[-1])
-"""Where the climbs to the largest likelihood begin."""
+LENGTHS = tuple(float(v) for v in np.geomspace(0.05, 6.0, 14))
+AMPLITUDES = tuple(float(2**i) for i in range(7))
+FROM = ((1.0, 16.0), (0.3, 4.0))
+"""Length and amplitude where the climbs to the largest evidence begin."""
 MOST_ROWS = 320
-"""Rows by which lengths and noise are chosen; more hardly change them, and cost their third power."""
+"""Rows by which lengths and amplitude are chosen; more hardly change them, and cost their third power."""
 ROUNDS = 3
-CONFIDENCE, DECIMALS = 1.96, 6
-"""Deviations to either side in which the border may lie, and the digits of a score that count."""
+DECIMALS = 6
+"""Digits of a gain that count."""
 
 
 class Surrogate:
@@ -36,7 +39,7 @@ class Surrogate:
 
     Attributes:
         lengths: (d,) of the quantities, in their scaled units.
-        noise: variance of the labels.
+        amplitude: standard deviation of f before any trial.
 
     Args:
         points: (n, d) of the trials, each quantity scaled to -1 to 1 over its range.
@@ -45,55 +48,73 @@ class Surrogate:
 
     def __init__(self, points: Float, works: NDArray[np.bool_]) -> None:
         labels = np.where(works, 1.0, -1.0)
-        self.lengths, self.noise = _chosen(points[:MOST_ROWS], labels[:MOST_ROWS])
+        self.lengths, self.amplitude = _chosen(points[:MOST_ROWS], labels[:MOST_ROWS])
         self._points = points
-        gram = covariance(points, points, self.lengths) + self.noise * np.eye(len(points))
-        self._factor = cho_factor(gram, lower=True)
-        self._weights = cho_solve(self._factor, labels)
+        self._known = posterior(self._covariance(points, points), labels)
 
     def mean(self, points: Float) -> Float:
-        """(m,) means at (m, d) points: towards 1 where it works, towards -1 where it does not."""
-        result: Float = covariance(points, self._points, self.lengths) @ self._weights
+        """(m,) means of f at (m, d) points: above 0 where it works, below where it does not."""
+        result: Float = self._covariance(points, self._points) @ self._known.weights
         return result
 
     def deviation(self, points: Float) -> Float:
-        """(m,) standard deviations of the guess at (m, d) points, the labels' noise left out."""
-        result: Float = np.sqrt(np.maximum(1.0 - np.sum(self._whitened(points) ** 2, axis=0), 0.0))
+        """(m,) standard deviations of f at (m, d) points."""
+        result: Float = np.sqrt(np.maximum(self.amplitude**2 - np.sum(self._whitened(points) ** 2, axis=0), 0.0))
         return result
+
+    def success(self, points: Float) -> Float:
+        """(m,) success probabilities at (m, d) points, over all that f may be."""
+        result: Float = ndtr(self.mean(points) / np.sqrt(1.0 + self.deviation(points) ** 2))
+        return result
+
+    def above(self, points: Float) -> Float:
+        """(m,) how sure it is that f is above 0 at (m, d) points, which is that most trials succeed there."""
+        result: Float = ndtr(self.mean(points) / np.maximum(self.deviation(points), JITTER * self.amplitude))
+        return result
+
+    def _covariance(self, first: Float, second: Float) -> Float:
+        return self.amplitude**2 * covariance(first, second, self.lengths)
 
     def _whitened(self, points: Float) -> Float:
-        """(n, m): the covariance of trials and points, whitened by that of the trials."""
-        cross = covariance(self._points, points, self.lengths)
-        result: Float = solve_triangular(self._factor[0], cross, lower=True, check_finite=False)
+        """(n, m): what the trials tell of f at the points; its squares add up to the variance that they take away."""
+        cross = self._known.root[:, None] * self._covariance(self._points, points)
+        result: Float = solve_triangular(self._known.factor, cross, lower=True, check_finite=False)
         return result
 
-    def straddle(self, candidates: Float, count: int) -> NDArray[np.intp]:
-        """Which of (m, d) candidates to try next to learn where the border lies, (count,) indices.
+    def telling(self, candidates: Float, count: int) -> NDArray[np.intp]:
+        """Which of (m, d) even candidates to try next to learn where the border lies, (count,) indices.
 
-        The straddle score 1.96 s - |mean| (Bryan et al. 2005, "Active learning for identifying function threshold
-        boundaries") is taken greedily: a picked point shrinks the deviations s of the others and leaves the mean.
-        Scores are rounded and ties go to the smaller index, so that last bits of other processors pick the same.
+        Wanted is a small sum of p (1 - p) over the candidates, p = Phi(mean / s) being how sure it is that f is above 0
+        (the stepwise uncertainty reduction of Bect et al. 2012, "Sequential design of computer experiments for the
+        estimation of a probability of failure", Statistics and Computing 22). To first order in what a label at c
+        moves the mean (ours), it takes from it
+
+            sum_i phi(m_i / s_i)^2 / s_i^2 g_c C_ic^2,      g = phi(z)^2 / ((1 + s^2) Phi(z) Phi(-z)),
+            z = m / sqrt(1 + s^2).
+
+        C is the covariance of f, and g_c C_cc^2 the variance of what the label does to the mean at c. Points are picked
+        greedily: each shrinks C as a label does in the mean, and leaves m. Gains are rounded and ties go to the smaller
+        index, so that last bits of other processors pick the same.
         """
-        half, mean = self._whitened(candidates), np.abs(self.mean(candidates))
-        variance = 1.0 - np.sum(half**2, axis=0)
+        half, mean = self._whitened(candidates), self.mean(candidates)
+        spread = self._covariance(candidates, candidates) - half.T @ half
         picked: list[int] = []
-        known: list[Float] = []
         for _ in range(count):
-            score = np.round(CONFIDENCE * np.sqrt(np.maximum(variance, 0.0)) - mean, DECIMALS)
-            score[picked] = -np.inf
-            best = int(np.argmax(score))
-            column = covariance(candidates, candidates[best : best + 1], self.lengths)[:, 0] - half.T @ half[:, best]
-            for before in known:
-                column = column - before * before[best]
-            column = column / np.sqrt(max(variance[best], 0.0) + self.noise)
-            variance = variance - column**2
-            known.append(column)
+            variance = np.maximum(np.diag(spread), JITTER * self.amplitude**2)
+            at = mean / np.sqrt(1.0 + variance)
+            share = np.exp(-(at**2) - log_ndtr(at) - log_ndtr(-at)) / (2.0 * np.pi * (1.0 + variance))
+            doubt = np.exp(-(mean**2) / variance) / (2.0 * np.pi * variance)
+            gain = np.round(doubt @ spread**2 * share, DECIMALS)
+            gain[picked] = -np.inf
+            best = int(np.argmax(gain))
+            column = np.sqrt(share[best]) * spread[:, best]
+            spread = spread - column[:, None] * column
             picked.append(best)
         return np.array(picked, dtype=np.intp)
 
 
 def covariance(first: Float, second: Float, lengths: Float) -> Float:
-    """Matern 5/2 covariance (n, m) of (n, d) and (m, d) points."""
+    """Matern 5/2 covariance (n, m) of (n, d) and (m, d) points, of amplitude 1."""
     a, b = first / lengths, second / lengths
     squared = np.maximum((a**2).sum(1)[:, None] + (b**2).sum(1) - 2.0 * a @ b.T, 0.0)
     r = np.sqrt(5.0 * squared)
@@ -102,42 +123,43 @@ def covariance(first: Float, second: Float, lengths: Float) -> Float:
 
 
 def _chosen(points: Float, labels: Float) -> tuple[Float, float]:
-    """Lengths (d,) and noise of the largest marginal likelihood on the ladder, of climbs from little and much noise."""
-    found = (_climbed(points, labels, noise) for noise in FROM)
-    _, lengths, noise = max(found, key=lambda one: one[0])
-    return lengths, noise
+    """Lengths (d,) and amplitude of the largest evidence on the ladders, of all climbs."""
+    found = [_climbed(points, labels, length, amplitude) for length, amplitude in FROM]
+    _, lengths, amplitude = max(found, key=lambda one: one[0])
+    return lengths, amplitude
 
 
-def _climbed(points: Float, labels: Float, noise: float) -> tuple[float, Float, float]:
-    """A local maximum of the likelihood, its lengths (d,) and its noise, one coordinate after the other."""
-    places = [LENGTHS.index(min(LENGTHS, key=lambda v: abs(v - 1.0)))] * points.shape[1]
+def _climbed(points: Float, labels: Float, length: float, amplitude: float) -> tuple[float, Float, float]:
+    """A local maximum of the evidence, its lengths (d,) and its amplitude, one coordinate after the other."""
+    dimension = points.shape[1]
+    ladders = [LENGTHS] * dimension + [AMPLITUDES]
+    places = [_nearest(LENGTHS, length)] * dimension + [_nearest(AMPLITUDES, amplitude)]
 
-    def lengths(at: list[int]) -> Float:
-        return np.array([LENGTHS[i] for i in at])
+    def at(rungs: list[int]) -> tuple[Float, float]:
+        return np.array([LENGTHS[i] for i in rungs[:-1]]), AMPLITUDES[rungs[-1]]
 
-    best = _likelihood(points, labels, lengths(places), noise)
+    best = _evidence(points, labels, *at(places))
     for _ in range(ROUNDS):
         before = best
-        for i in range(len(places)):
-            for step in range(len(LENGTHS)):
-                tried = [*places[:i], step, *places[i + 1 :]]
-                found = _likelihood(points, labels, lengths(tried), noise)
-                if found > best:
+        for i, ladder in enumerate(ladders):
+            for step in (-1, 1):
+                while 0 <= places[i] + step < len(ladder):
+                    tried = [*places[:i], places[i] + step, *places[i + 1 :]]
+                    found = _evidence(points, labels, *at(tried))
+                    if found <= best:
+                        break
                     best, places = found, tried
-        for tried_noise in NOISES:
-            found = _likelihood(points, labels, lengths(places), tried_noise)
-            if found > best:
-                best, noise = found, tried_noise
         if best == before:
             break
-    return best, lengths(places), noise
+    return best, *at(places)
 
 
-def _likelihood(points: Float, labels: Float, lengths: Float, noise: float) -> float:
-    """Logarithm of the marginal likelihood, but for a constant."""
+def _nearest(ladder: tuple[float, ...], value: float) -> int:
+    return ladder.index(min(ladder, key=lambda rung: abs(rung - value)))
+
+
+def _evidence(points: Float, labels: Float, lengths: Float, amplitude: float) -> float:
     try:
-        factor = np.linalg.cholesky(covariance(points, points, lengths) + noise * np.eye(len(points)))
+        return evidence(amplitude**2 * covariance(points, points, lengths), labels)
     except np.linalg.LinAlgError:
         return -np.inf
-    whitened = solve_triangular(factor, labels, lower=True, check_finite=False)
-    return float(-0.5 * whitened @ whitened - np.log(np.diag(factor)).sum())

@@ -15,7 +15,6 @@ from skillframe.campaign.claims.claim import certified, family, fresh_trials, ju
 from skillframe.campaign.claims.engine import Engine
 from skillframe.campaign.claims.question import begin, read_question
 from skillframe.campaign.claims.rounds import looked
-from skillframe.campaign.claims.surrogate import Surrogate, covariance
 from skillframe.campaign.folder import load
 from skillframe.campaign.rows import ChunkJob, rows_of
 from skillframe.campaign.runner import Options
@@ -74,25 +73,6 @@ def test_nested_boxes_have_their_shares_of_the_volume_about_one_centre():
     for each, share in zip(family(box), (0.7, 0.85, 1.0), strict=True):
         assert each.share / box.share == pytest.approx(share)
         assert (each.low + each.high) / 2.0 == pytest.approx((box.low + box.high) / 2.0)
-
-
-def test_the_surrogate_is_the_gaussian_process_of_its_definition():
-    rng = np.random.default_rng(1)
-    points, asked = rng.uniform(-1.0, 1.0, (20, 2)), rng.uniform(-1.0, 1.0, (5, 2))
-    works = points[:, 0] > 0.0
-    found = Surrogate(points, works)
-    gram = covariance(points, points, found.lengths) + found.noise * np.eye(20)
-    expected = covariance(asked, points, found.lengths) @ np.linalg.inv(gram) @ np.where(works, 1.0, -1.0)
-    assert found.mean(asked) == pytest.approx(expected, abs=1e-8)
-    r = np.linalg.norm((points[3] - points[7]) / found.lengths)
-    matern = (1.0 + np.sqrt(5.0) * r + 5.0 * r**2 / 3.0) * np.exp(-np.sqrt(5.0) * r)
-    assert covariance(points, points, found.lengths)[3, 7] == pytest.approx(matern)
-
-
-def test_a_quantity_without_effect_gets_a_long_length():
-    points = 2.0 * qmc.Sobol(2, scramble=True, rng=np.random.default_rng(2)).random(128) - 1.0
-    lengths = Surrogate(points, np.abs(points[:, 0]) < 0.4).lengths
-    assert lengths[1] > 4.0 * lengths[0]
 
 
 def test_the_peeled_box_of_an_ellipse_is_nearly_the_largest_that_fits():

@@ -17,7 +17,7 @@ from skillframe.campaign.claims.plan import PLAN, RoundPlan
 from skillframe.campaign.claims.question import ask_again, begin, read_question
 from skillframe.campaign.claims.rounds import looked
 from skillframe.campaign.claims.searches import check_plan, find_break, nominal, other_methods, rank
-from skillframe.campaign.claims.surrogate import Surrogate, covariance
+from skillframe.campaign.claims.surrogate import Surrogate
 from skillframe.cli.searches import _tell_border, _tell_matter
 from skillframe.errors import InputError
 from skillframe.world.worlds.valley import ValleyParams
@@ -34,31 +34,6 @@ def answered(search, truth):
             batches.append(search.send(Looked(batches[-1].points, truth(batches[-1].points))))
     except StopIteration as end:
         return end.value, np.concatenate([batch.points for batch in batches])
-
-
-def test_the_deviation_is_that_of_the_gaussian_process():
-    points, asked_at = RNG.uniform(-1.0, 1.0, (20, 2)), RNG.uniform(-1.0, 1.0, (5, 2))
-    found = Surrogate(points, points[:, 0] > 0.0)
-    gram = covariance(points, points, found.lengths) + found.noise * np.eye(20)
-    cross = covariance(asked_at, points, found.lengths)
-    expected = np.sqrt(1.0 - np.einsum("ij,jk,ik->i", cross, np.linalg.inv(gram), cross))
-    assert found.deviation(asked_at) == pytest.approx(expected, abs=1e-6)  # the root of a difference of ones
-
-
-def test_a_picked_point_shrinks_the_deviations_of_the_others_and_leaves_the_mean():
-    """Greedy picks against the Gaussian process with each pick added as a trial of the same noise."""
-    points, offered = RNG.uniform(-1.0, 1.0, (12, 2)), RNG.uniform(-1.0, 1.0, (40, 2))
-    found = Surrogate(points, points[:, 0] + 0.3 * points[:, 1] > 0.0)
-    mean, known, expected = np.abs(found.mean(offered)), points, []
-    for _ in range(6):
-        gram = covariance(known, known, found.lengths) + found.noise * np.eye(len(known))
-        cross = covariance(offered, known, found.lengths)
-        variance = 1.0 - np.einsum("ij,jk,ik->i", cross, np.linalg.inv(gram), cross)
-        score = 1.96 * np.sqrt(np.maximum(variance, 0.0)) - mean
-        score[expected] = -np.inf
-        expected.append(int(np.argmax(score)))
-        known = np.concatenate([known, offered[expected[-1:]]])
-    assert found.straddle(offered, 6).tolist() == expected
 
 
 def test_the_border_of_an_ellipse_is_found_and_the_ends_of_the_ranges_that_it_passes():
@@ -81,11 +56,26 @@ def test_the_border_of_an_ellipse_is_found_and_the_ends_of_the_ranges_that_it_pa
 
 def test_a_search_does_not_settle_where_what_was_seen_to_work_is_predicted_to_fail(monkeypatch):
     """A surrogate that takes the trials that work for noise, and says that nothing works."""
-    monkeypatch.setattr(Surrogate, "mean", lambda self, points: -np.ones(len(points)))
+    monkeypatch.setattr(Surrogate, "above", lambda self, points: np.full(len(points), 1e-6))
     seen = Looked(SOBOL[:64], SOBOL[:64, 0] > 0.9)
     found, _ = answered(border.search(seen, 64, lambda a, b: SOBOL[a:b], 160), lambda p: p[:, 0] > 0.9)
     assert seen.works.any()
-    assert (found.settled, found.trials, found.share) == (False, 160, 0.0)
+    assert (found.settled, found.trials, found.share, found.doubt) == (False, 160, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("works", [True, False])
+def test_where_all_trials_end_alike_the_search_settles_at_once(works):
+    seen = Looked(SOBOL[:128], np.full(128, works))
+    found, _ = answered(border.search(seen, 128, lambda a, b: SOBOL[a:b], 256), lambda p: np.full(len(p), works))
+    assert (found.settled, found.trials, found.share) == (True, 128 + 2 * 32, float(works))
+
+
+def test_doubt_is_the_volume_that_may_be_wrong_over_that_of_the_set():
+    """A quarter works for sure, a quarter by 0.9; of the half that fails a tenth may work."""
+    sure = np.repeat([1.0, 0.9, 0.1], [25, 25, 50])
+    assert border.doubt_of(sure, np.array([True, False])) == pytest.approx(7.5 / 52.5)
+    assert border.doubt_of(sure, np.array([False])) == pytest.approx(0.525)
+    assert border.doubt_of(np.full(4, 0.4), np.array([True, False])) == 1.0
 
 
 def batch_share(left):
@@ -137,7 +127,7 @@ def test_where_nothing_fails_there_is_no_breaking_point():
 
 def test_indices_of_a_linear_truth_are_the_shares_of_its_variance():
     class Linear:
-        def mean(self, points):
+        def success(self, points):
             return points @ np.array([0.4, 0.2, 0.0])
 
     assert matter.indices(Linear(), 3) == pytest.approx([0.8, 0.2, 0.0], abs=0.01)  # 4096 even points
@@ -347,7 +337,7 @@ def test_where_all_trials_end_alike_there_is_nothing_to_rank_and_no_border(tmp_p
     border = {
         "trials": 128,
         "successes": 128 * works,
-        "changed": 0.0,
+        "doubt": 0.0,
         "settled": True,
         "share_that_works": float(works),
     }
@@ -360,7 +350,7 @@ def test_where_all_trials_end_alike_there_is_nothing_to_rank_and_no_border(tmp_p
 def test_a_quantity_that_does_nothing_is_named(tmp_path, capsys):
     index = {"fixture.tilt_y": 0.9, "fixture.offset_x": 0.01}
     _tell_matter(tmp_path, {"looked_at": {"trials": 128, "successes": 60}, "index": index, "held": []})
-    found = {"trials": 160, "successes": 80, "changed": 0.02, "settled": True, "share_that_works": 0.5, "index": index}
+    found = {"trials": 160, "successes": 80, "doubt": 0.02, "settled": True, "share_that_works": 0.5, "index": index}
     reaches = {"fixture.tilt_y": (False, True), "fixture.offset_x": (True, True)}
     _tell_border(tmp_path, {**found, "reaches": reaches, "smallest_island": 0.02})
     told = capsys.readouterr().out
