@@ -95,9 +95,9 @@ class Surrogate:
             z = m / sqrt(1 + s^2).
 
         C is the covariance of f, and g_c C_cc^2 the variance of what the label does to the mean at c. Points are picked
-        greedily: each shrinks C as a label does in the mean, and leaves m. Only the `DOUBTED` candidates count whose sign
-        is the least sure. Gains are rounded and ties go to the smaller index, so that last bits of other processors
-        pick the same.
+        greedily: each shrinks C as a label does in the mean, and leaves m. Only the `DOUBTED` candidates count whose
+        sign is the least sure. Gains are rounded and ties go to the smaller index, so that last bits of other
+        processors pick the same.
         """
         sure = np.round(np.abs(self.above(candidates) - 0.5), DECIMALS)
         chosen = np.sort(np.argsort(sure, kind="stable")[: max(DOUBTED, count)])
