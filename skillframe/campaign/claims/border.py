@@ -116,8 +116,8 @@ def search(
 def doubt_of(sure: Float, works: NDArray[np.bool_]) -> float:
     """`Border.doubt`, at most 1.
 
-    Where no trial works it is the share of the ranges that is expected to; where some do and no place is predicted to,
-    what was seen to work is taken for noise, and no border is known.
+    It is 1 where some trials work and no place is predicted to: what was seen to work is taken for noise, and no border
+    is known. Where no trial works it is the share of the ranges that is expected to.
 
     Args:
         sure: (m,) at even points, how sure it is that most trials succeed.
@@ -125,9 +125,7 @@ def doubt_of(sure: Float, works: NDArray[np.bool_]) -> float:
     """
     if not works.any():
         return float(np.mean(sure))
-    if not np.any(sure > 0.5):
-        return 1.0
-    return min(1.0, float(np.mean(np.minimum(sure, 1.0 - sure)) / np.mean(sure)))
+    return float(np.mean(np.minimum(sure, 1.0 - sure)) / np.mean(sure))
 
 
 def to_go(doubt: float, calm: int, trials: int, batch: int, budget: int) -> int:

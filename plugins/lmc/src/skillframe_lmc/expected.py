@@ -20,8 +20,8 @@ spike, says nothing (e = 1), and from ten on P does not count how long a face wa
 inside its sector, so that P is even inside the intersection and its mean is the intersection's middle.
 
 Form and constants are our choice, because averages of motion and force passed steps, slides and skew ramps that the
-deepest push missed. It is asked where modes decide (`votes`): faces of one side, of a tool that did not turn. In
-corners and valleys the deepest push did as well or better. docs/evidence/worth.md says what it is worth.
+deepest push missed. It is asked where modes decide (`votes`): faces of one side, of a tool that did not turn. After a
+wrong first try the deepest push did better. docs/evidence/worth.md says what it is worth.
 """
 
 from __future__ import annotations
