@@ -83,5 +83,5 @@ def _solved(factor: Float, right: Float) -> Float:
 
 
 def _objective(weights: Float, hidden: Float, labels: Float) -> float:
-    """Log p(y | f) p(f), but for a constant; f is K times the weights."""
+    """Log p(y | f) p(f), but for a constant, f being K times the weights."""
     return float(-0.5 * weights @ hidden + log_ndtr(labels * hidden).sum())

@@ -78,7 +78,7 @@ class Surrogate:
         return self.amplitude**2 * covariance(first, second, self.lengths)
 
     def _whitened(self, points: Float) -> Float:
-        """(n, m): what the trials tell of f at the points; its squares add up to the variance that they take away."""
+        """(n, m): what the trials tell of f at the points, whose squares add up to the variance taken away."""
         cross = self._known.root[:, None] * self._covariance(self._points, points)
         result: Float = solve_triangular(self._known.factor, cross, lower=True, check_finite=False)
         return result
