@@ -29,6 +29,8 @@ FROM = ((1.0, 16.0), (0.3, 4.0))
 """Length and amplitude where the climbs to the largest evidence begin."""
 MOST_ROWS = 320
 """Rows by which lengths and amplitude are chosen; more hardly change them, and cost their third power."""
+MOST_KNOWN = 2048
+"""Trials that it knows, the last ones: points that were picked come last, and cost grows with the third power."""
 ROUNDS = 3
 DECIMALS = 6
 """Digits of a gain, or of how sure a place is, that count."""
@@ -49,7 +51,7 @@ class Surrogate:
     """
 
     def __init__(self, points: Float, works: NDArray[np.bool_]) -> None:
-        labels = np.where(works, 1.0, -1.0)
+        points, labels = points[-MOST_KNOWN:], np.where(works[-MOST_KNOWN:], 1.0, -1.0)
         self.lengths, self.amplitude = _chosen(points[:MOST_ROWS], labels[:MOST_ROWS])
         self._points = points
         self._known = posterior(self._covariance(points, points), labels)

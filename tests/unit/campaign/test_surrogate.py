@@ -6,6 +6,7 @@ from scipy.optimize import minimize
 from scipy.special import log_ndtr, ndtr
 from scipy.stats import multivariate_normal, norm, qmc
 
+from skillframe.campaign.claims import surrogate
 from skillframe.campaign.claims.laplace import JITTER, evidence, mode
 from skillframe.campaign.claims.propagation import posterior
 from skillframe.campaign.claims.surrogate import AMPLITUDES, LENGTHS, Surrogate, covariance
@@ -157,3 +158,10 @@ def test_how_much_is_said_to_be_wrong_is_about_what_is_wrong():
 def test_a_quantity_without_effect_gets_a_long_length():
     lengths = Surrogate(SOBOL[:128], np.abs(SOBOL[:128, 0]) < 0.4).lengths
     assert lengths[1] > 4.0 * lengths[0]
+
+
+def test_of_very_many_trials_the_last_ones_are_known(monkeypatch):
+    """The first half says the opposite."""
+    monkeypatch.setattr(surrogate, "MOST_KNOWN", 128)
+    works = np.where(np.arange(256) < 128, SOBOL[:, 0] > 0.0, SOBOL[:, 0] < 0.0)
+    assert np.array_equal(Surrogate(SOBOL, works).mean(SOBOL), Surrogate(SOBOL[128:], works[128:]).mean(SOBOL))
