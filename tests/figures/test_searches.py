@@ -16,9 +16,11 @@ from skillframe.campaign.claims.engine import Looked
 from skillframe.campaign.claims.question import LOOKS
 from skillframe.campaign.claims.surrogate import Surrogate
 from tests.figures.teaching import row
+from tests.figures.test_certify import Truth
 
 pytestmark = pytest.mark.figures
 SEED = 2026_11_23
+SOFT = 20
 
 
 def sobol(dimension, seed):
@@ -97,6 +99,38 @@ def test_a_border_is_found_with_half_the_error_of_sobol_points(truth, dimension,
     )  # fmt: skip
     assert np.median(errors) < 0.5 * np.median(beside)
     assert most is None or np.mean(errors <= most) >= 0.9
+
+
+def test_what_a_search_says_it_may_have_wrong_is_what_it_has_wrong_where_borders_are_soft():
+    """Truths of `test_certify`: success falls over a soft edge, and up to 7 % of failures come anywhere."""
+    even, found = np.random.default_rng(SEED).uniform(-1.0, 1.0, (20_000, 2)), []
+    for seed in range(SOFT):
+        rng = np.random.default_rng([SEED, seed, 2])
+        truth, points = Truth(rng, 2), sobol(2, 100 + seed)
+        works = rng.random(len(points)) < truth(points)
+        seen = Looked(points[: LOOKS[2]], works[: LOOKS[2]])
+        search, used = border.search(seen, LOOKS[2], lambda a, b, p=points: p[a:b], border.BUDGET[2]), seen
+        try:
+            batch = next(search)
+            while True:
+                ended = Looked(batch.points, rng.random(len(batch.points)) < truth(batch.points))
+                used = used.with_more(ended)
+                batch = search.send(ended)
+        except StopIteration as end:
+            there = truth(even) > 0.5
+            wrong = [
+                float(np.mean((Surrogate(*pair).mean(even) > 0.0) != there) / there.mean())
+                for pair in ((used.points, used.works), (points[: len(used.works)], works[: len(used.works)]))
+            ]
+            found.append((end.value.trials, end.value.settled, end.value.doubt, *wrong))
+    trials, settled, said, wrong, beside = (np.array(column) for column in zip(*found, strict=True))
+    row(
+        f"soft, 2-D, {SOFT} truths", f"{np.median(trials):.0f} trials, {settled.sum()} settled",
+        f"said {np.median(said):.3f} (worst {said.max():.3f}), error {np.median(wrong):.3f} (worst {wrong.max():.3f})",
+        f"of those settled: error at most {wrong[settled].max(initial=0.0):.3f}; Sobol {np.median(beside):.3f}",
+    )  # fmt: skip
+    assert 0.6 < np.median(wrong / said) < 1.6
+    assert np.mean(wrong < 2.0 * said) >= 0.9
 
 
 def planes(rng, dimension):

@@ -14,6 +14,8 @@ beginnings are our choice. Nothing that is claimed rests on it: it proposes, fre
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
@@ -31,6 +33,8 @@ MOST_ROWS = 320
 """Rows by which lengths and amplitude are chosen; more hardly change them, and cost their third power."""
 MOST_KNOWN = 2048
 """Trials that it knows, the last ones: points that were picked come last, and cost grows with the third power."""
+BLOCK = 1024
+"""Points that are asked about at a time."""
 ROUNDS = 3
 DECIMALS = 6
 """Digits of a gain, or of how sure a place is, that count."""
@@ -58,12 +62,12 @@ class Surrogate:
 
     def mean(self, points: Float) -> Float:
         """(m,) means of f at (m, d) points: above 0 where it works, below where it does not."""
-        result: Float = self._covariance(points, self._points) @ self._known.weights
-        return result
+        return _by_blocks(lambda some: self._covariance(some, self._points) @ self._known.weights, points)
 
     def deviation(self, points: Float) -> Float:
         """(m,) standard deviations of f at (m, d) points."""
-        result: Float = np.sqrt(np.maximum(self.amplitude**2 - np.sum(self._whitened(points) ** 2, axis=0), 0.0))
+        variance = _by_blocks(lambda some: self.amplitude**2 - np.sum(self._whitened(some) ** 2, axis=0), points)
+        result: Float = np.sqrt(np.maximum(variance, 0.0))
         return result
 
     def success(self, points: Float) -> Float:
@@ -120,6 +124,11 @@ class Surrogate:
             picked.append(best)
         result: NDArray[np.intp] = chosen[picked]
         return result
+
+
+def _by_blocks(of: Callable[[Float], Float], points: Float) -> Float:
+    """What is asked of (m, d) points, some at a time: 8192 of them and 2048 trials would take a gigabyte."""
+    return np.concatenate([of(points[i : i + BLOCK]) for i in range(0, len(points), BLOCK)])
 
 
 def covariance(first: Float, second: Float, lengths: Float) -> Float:
