@@ -30,7 +30,8 @@ AMPLITUDES = tuple(float(2**i) for i in range(7))
 FROM = ((1.0, 16.0), (0.3, 4.0))
 """Length and amplitude where the climbs to the largest evidence begin."""
 MOST_ROWS = 320
-"""Rows by which lengths and amplitude are chosen; more hardly change them, and cost their third power."""
+"""Rows by which lengths and amplitude are chosen, evenly from first to last: the first alone may have met too little of
+the set. More hardly change them, and cost their third power."""
 MOST_KNOWN = 2048
 """Trials that it knows, the last ones: points that were picked come last, and cost grows with the third power."""
 BLOCK = 1024
@@ -56,7 +57,8 @@ class Surrogate:
 
     def __init__(self, points: Float, works: NDArray[np.bool_]) -> None:
         points, labels = points[-MOST_KNOWN:], np.where(works[-MOST_KNOWN:], 1.0, -1.0)
-        self.lengths, self.amplitude = _chosen(points[:MOST_ROWS], labels[:MOST_ROWS])
+        some = np.unique(np.linspace(0, len(points) - 1, MOST_ROWS).round().astype(int))
+        self.lengths, self.amplitude = _chosen(points[some], labels[some])
         self._points = points
         self._known = posterior(self._covariance(points, points), labels)
 
