@@ -30,8 +30,8 @@ AMPLITUDES = tuple(float(2**i) for i in range(7))
 FROM = ((1.0, 16.0), (0.3, 4.0))
 """Length and amplitude where the climbs to the largest evidence begin."""
 MOST_ROWS = 320
-"""Rows by which lengths and amplitude are chosen, evenly from first to last: the first alone may have met too little of
-the set. More hardly change them, and cost their third power."""
+"""Rows by which lengths and amplitude are chosen, the first ones and as many from first to last: the first alone may
+have met too little of the set, and the others lie near its border. More cost their third power."""
 MOST_KNOWN = 2048
 """Trials that it knows, the last ones: points that were picked come last, and cost grows with the third power."""
 BLOCK = 1024
@@ -57,8 +57,7 @@ class Surrogate:
 
     def __init__(self, points: Float, works: NDArray[np.bool_]) -> None:
         points, labels = points[-MOST_KNOWN:], np.where(works[-MOST_KNOWN:], 1.0, -1.0)
-        some = np.unique(np.linspace(0, len(points) - 1, MOST_ROWS).round().astype(int))
-        self.lengths, self.amplitude = _chosen(points[some], labels[some])
+        self.lengths, self.amplitude = _chosen(points, labels)
         self._points = points
         self._known = posterior(self._covariance(points, points), labels)
 
@@ -143,9 +142,14 @@ def covariance(first: Float, second: Float, lengths: Float) -> Float:
 
 
 def _chosen(points: Float, labels: Float) -> tuple[Float, float]:
-    """Lengths (d,) and amplitude of the largest evidence on the ladders, of all climbs."""
-    found = [_climbed(points, labels, length, amplitude) for length, amplitude in FROM]
-    _, lengths, amplitude = max(found, key=lambda one: one[0])
+    """Lengths (d,) and amplitude on the ladders: of what some rows find best, what explains all of them best."""
+    count = len(points)
+    evenly = np.unique(np.linspace(0, count - 1, MOST_ROWS).round().astype(int))
+    samples = [evenly] if count <= MOST_ROWS else [np.arange(MOST_ROWS), evenly]
+    found = [max((_climbed(points[s], labels[s], *start) for start in FROM), key=lambda one: one[0]) for s in samples]
+    if len(found) > 1:
+        found.sort(key=lambda one: _evidence(points, labels, *one[1:]))
+    _, lengths, amplitude = found[-1]
     return lengths, amplitude
 
 
