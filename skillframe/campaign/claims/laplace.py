@@ -4,8 +4,8 @@ Labels y are 1 and -1, f has covariance K at the n trials, and p(y | f) = Phi(y 
 Newton's method finds it, and the curvature there gives the evidence (Rasmussen and Williams 2006, "Gaussian processes
 for machine learning", algorithm 3.1, with derivatives from their equation 3.16). Steps that overshoot are halved.
 
-It costs a third of what `propagation` does and ranks covariances alike, but its mode lies far below the mean where
-labels are sure, so that nothing else is taken from it.
+It costs less than `propagation`, and ranks covariances here. Its mode lies far below the mean where labels are sure, so
+that nothing else is taken from it.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def evidence(gram: Float, labels: Float) -> float:
     """
     gram = gram + JITTER * gram[0, 0] * np.eye(len(labels))
     _, best, curvature = mode(gram, labels)
-    return best - float(np.log(np.diag(_factor(gram, np.sqrt(curvature)))).sum())
+    return best - float(np.log(np.diag(factor_of(gram, np.sqrt(curvature)))).sum())
 
 
 def mode(gram: Float, labels: Float) -> tuple[Float, float, Float]:
@@ -45,8 +45,8 @@ def mode(gram: Float, labels: Float) -> tuple[Float, float, Float]:
     for _ in range(MOST_STEPS):
         slope, curvature = _slope(hidden, labels)
         root = np.sqrt(curvature)
-        factor, target = _factor(gram, root), curvature * hidden + slope
-        step = target - root * _solved(factor, root * (gram @ target)) - weights
+        factor, target = factor_of(gram, root), curvature * hidden + slope
+        step = target - root * solved(factor, root * (gram @ target)) - weights
         along, share = gram @ step, 1.0
         reached = _objective(weights + step, hidden + along, labels)
         while reached < best and share > CLOSE:
@@ -72,11 +72,13 @@ def _slope(hidden: Float, labels: Float) -> tuple[Float, Float]:
     return labels * ratio, curvature
 
 
-def _factor(gram: Float, root: Float) -> Float:
+def factor_of(gram: Float, root: Float) -> Float:
+    """Lower Cholesky factor (n, n) of I + R K R, R being the diagonal matrix of `root` (n,)."""
     return np.asarray(np.linalg.cholesky(np.eye(len(root)) + root[:, None] * gram * root))
 
 
-def _solved(factor: Float, right: Float) -> Float:
+def solved(factor: Float, right: Float) -> Float:
+    """(n,) solution of the equations that a lower Cholesky factor (n, n) stands for."""
     half = solve_triangular(factor, right, lower=True, check_finite=False)
     result: Float = solve_triangular(factor, half, lower=True, trans=1, check_finite=False)
     return result

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from skillframe.campaign.claims.laplace import JITTER, hazard
+from skillframe.campaign.claims.laplace import JITTER, factor_of, hazard, solved
 from skillframe.frames import Float
 
 DAMPING = 0.6
@@ -52,16 +52,14 @@ def posterior(gram: Float, labels: Float) -> Posterior:
     precision, pull = np.zeros(count), np.zeros(count)
     for _ in range(MOST_SWEEPS):
         root = np.sqrt(precision)
-        factor = np.asarray(np.linalg.cholesky(np.eye(count) + root[:, None] * gram * root))
+        factor = factor_of(gram, root)
         half = solve_triangular(factor, root[:, None] * gram, lower=True, check_finite=False)
         variance, mean = np.diag(gram) - np.sum(half**2, axis=0), gram @ pull - half.T @ (half @ pull)
         wanted, drawn, moved = _replaced(variance, mean, precision, pull, labels)
         if moved < CLOSE:
             break
         precision, pull = precision + DAMPING * (wanted - precision), pull + DAMPING * (drawn - pull)
-    inside = solve_triangular(factor, root * (gram @ pull), lower=True, check_finite=False)
-    back = solve_triangular(factor, inside, lower=True, trans=1, check_finite=False)
-    return Posterior(pull - root * back, root, factor)
+    return Posterior(pull - root * solved(factor, root * (gram @ pull)), root, factor)
 
 
 def _replaced(variance: Float, mean: Float, precision: Float, pull: Float, labels: Float) -> tuple[Float, Float, float]:

@@ -6,8 +6,8 @@ from scipy.optimize import minimize
 from scipy.special import log_ndtr, ndtr
 from scipy.stats import multivariate_normal, norm, qmc
 
-from skillframe.campaign.claims import surrogate
-from skillframe.campaign.claims.laplace import JITTER, evidence, mode
+from skillframe.campaign.claims import propagation, surrogate
+from skillframe.campaign.claims.laplace import JITTER, evidence, factor_of, mode
 from skillframe.campaign.claims.propagation import posterior
 from skillframe.campaign.claims.surrogate import AMPLITUDES, LENGTHS, Surrogate, covariance
 
@@ -165,3 +165,26 @@ def test_of_very_many_trials_the_last_ones_are_known(monkeypatch):
     monkeypatch.setattr(surrogate, "MOST_KNOWN", 128)
     works = np.where(np.arange(256) < 128, SOBOL[:, 0] > 0.0, SOBOL[:, 0] < 0.0)
     assert np.array_equal(Surrogate(SOBOL, works).mean(SOBOL), Surrogate(SOBOL[128:], works[128:]).mean(SOBOL))
+
+
+def test_lengths_are_those_that_explain_all_trials_and_not_the_first_ones_alone(monkeypatch):
+    """The first 64 all fail, which says nothing of lengths; all of them say that x alone matters."""
+    monkeypatch.setattr(surrogate, "MOST_ROWS", 64)
+    works = np.abs(SOBOL[:, 0]) < 0.4
+    order = np.argsort(works, kind="stable")
+    lengths = Surrogate(SOBOL[order], works[order]).lengths
+    assert lengths[1] > 2.0 * lengths[0]
+
+
+def test_sweeps_come_to_an_end_on_sharp_labels_at_the_largest_amplitude(monkeypatch):
+    """Some thirty take all labels to where they stay; whole steps swing up to the last of 200."""
+    sweeps = []
+    monkeypatch.setattr(propagation, "factor_of", lambda *given: sweeps.append(1) or factor_of(*given))
+    sharp = np.where(np.abs(SOBOL[:, 1] - 0.3 * SOBOL[:, 0]) < 0.08 * (SOBOL[:, 0] + 1.1), 1.0, -1.0)
+    posterior(AMPLITUDES[-1] ** 2 * matern(SOBOL, SOBOL, np.array([1.4, 0.5])), sharp)
+    assert len(sweeps) < 60
+
+
+def test_trials_at_one_place_that_end_both_ways_give_their_rate():
+    there = np.zeros((40, 2))
+    assert Surrogate(there, np.arange(40) % 4 > 0).success(there[:1])[0] == pytest.approx(0.75, abs=0.1)
