@@ -12,8 +12,8 @@ from skillframe.campaign.claims import procedure
 from skillframe.campaign.claims.box import Box, peel
 from skillframe.campaign.claims.certificate import check_certificate, outcome, write_certificate
 from skillframe.campaign.claims.claim import certified, family, fresh_trials, judge, most_failures, passes
-from skillframe.campaign.claims.engine import Engine
-from skillframe.campaign.claims.question import begin, read_question
+from skillframe.campaign.claims.engine import Engine, Looked
+from skillframe.campaign.claims.question import Question, begin, read_question
 from skillframe.campaign.claims.rounds import looked
 from skillframe.campaign.folder import load
 from skillframe.campaign.rows import ChunkJob, rows_of
@@ -81,6 +81,15 @@ def test_the_peeled_box_of_an_ellipse_is_nearly_the_largest_that_fits():
     box = peel(CLOUD, works, 0.0125)
     assert np.mean(~works[box.holds(CLOUD)]) <= 0.0125
     assert 0.9 < box.share / (2.0 * 0.8 * 0.5 / 4.0) < 1.3
+
+
+def test_no_box_is_proposed_over_places_where_two_trials_in_three_succeed():
+    """Left of the middle all succeed, right of it 65 %: more than half, and less than LIKELY."""
+    works = (CLOUD[:512, 0] < 0.0) | (np.random.default_rng(5).random(512) < 0.65)
+    question = Question(rate=0.95, confidence=0.95, ranges={"x": (-1.0, 1.0), "y": (-1.0, 1.0)})
+    box = procedure.propose(question, Looked(CLOUD[:512], works))
+    assert box.high[0] < 0.3
+    assert box.low[0] < -0.9
 
 
 def test_where_nothing_works_no_box_is_proposed():
