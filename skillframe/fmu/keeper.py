@@ -103,13 +103,15 @@ def _end_all(reaper: int, worker: int) -> int:
         os.waitpid(reaper, 0)  # the kernel has ended the namespace by then
         return status
     until = time.monotonic() + PATIENCE_S
-    while (left := confine.descendants(os.getpid())) and time.monotonic() < until:
-        for pid in left:
+    while time.monotonic() < until:
+        for pid in confine.descendants(os.getpid()):
             with suppress(OSError):
                 os.kill(pid, signal.SIGKILL)
-        with suppress(ChildProcessError):
+        try:
             while os.waitpid(-1, os.WNOHANG)[0]:
                 pass
+        except ChildProcessError:
+            break  # none is left: a list may miss one that loses its parent meanwhile, and that one is our child by now
         time.sleep(0.002)
     return status
 
