@@ -38,6 +38,8 @@ from skillframe.world.scene import Scene, State
 from skillframe.world.sensors import SensorSettings
 
 MOST_ATTEMPTS = 20
+SIDE_BY_SIDE = 4
+"""How many attempts follow each that failed, at once: four take little longer than one (ours)."""
 MOST_AT_ONCE = 100
 """Demonstrations that are simulated side by side, so that memory does not grow with the traces of a thousand."""
 Done = Callable[[State], NDArray[np.bool_]]
@@ -167,8 +169,8 @@ def collect(
 ) -> Recording:
     """Let a teacher attempt what is still missing until every slot has its demonstration.
 
-    What failed is attempted once more, then twice side by side, then four times, and so on. The first that succeeds is
-    kept, as if they had been made one after the other; what comes after it is not counted.
+    What failed is attempted four times side by side, then twenty times. The first that succeeds is kept, as if they had
+    been made one after the other; what comes after it is not counted.
 
     Args:
         robot: for the messages.
@@ -188,7 +190,7 @@ def collect(
         progress(beginning(robot, scene, count))
     number = 0
     while number < attempts:
-        ahead = range(number, min(number + max(number, 1), attempts))
+        ahead = range(number, min(number + max(SIDE_BY_SIDE * number, 1), attempts))
         tries = deque((slot, each) for each in ahead for slot in range(count) if slot not in done)
         while some := _still_due(tries, done):
             result = attempt(some)

@@ -9,6 +9,7 @@ from skillframe_benchmarks import counts, scores
 from skillframe_benchmarks.assets import pairs
 from skillframe_benchmarks.counts import Cell, cause, share
 
+from skillframe import CampaignResults
 from skillframe.cli.main import run
 from skillframe.errors import InputError, UnknownName
 from skillframe.frames import matrix_from_quaternion, quaternion_from_matrix, rotation_matrix
@@ -149,6 +150,8 @@ def test_two_pairs_of_meshes_become_a_table_a_page_and_are_not_run_again(tmp_pat
         "2",
         "--level",
         "1mm-2deg-0.2",
+        "--level",
+        "1mm-2deg-0.5",
         "--method",
         "push",
         "--workers",
@@ -160,9 +163,12 @@ def test_two_pairs_of_meshes_become_a_table_a_page_and_are_not_run_again(tmp_pat
     found = json.loads((tmp_path / "automate/automate.json").read_text())
     ran, refused = found["assemblies"]
     assert "overlap" in refused["refused"] and not refused["cells"]  # a plug of 6 mm in a hole of 5
-    (only,) = ran["cells"]
+    only, other = ran["cells"]
+    assert [only["level"], other["level"]] == ["1mm-2deg-0.2", "1mm-2deg-0.5"] and other["trials"] == 2
+    rows = CampaignResults(tmp_path / "automate/00001/1mm-2deg").rows
+    assert [row["world.friction"] for row in rows] == [0.2, 0.2, 0.5, 0.5]  # one campaign, so that they run abreast
     assert 'tilt = "90deg"' in (tmp_path / "automate/00001/fixture.toml").read_text()  # seated says nothing of it
-    assert only["trials"] == 2 and only["checked"] is not None and ran["cost_s"]["1mm-2deg-0.2"] > 0.0
+    assert only["trials"] == 2 and only["checked"] is not None and ran["cost_s"]["1mm-2deg"] > 0.0
     page = (tmp_path / "automate/automate.html").read_text()
     assert "00001" in page and "data:image/png" in page and "http://" not in page
     assert run(words) == 0 and "2 of 2 assemblies are there already" in capsys.readouterr().err

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from skillframe import CampaignResults
-from skillframe_benchmarks.assembly import DONE, REFUSED, UNLEARNED, Level
+from skillframe_benchmarks.assembly import DONE, FRICTION, REFUSED, UNLEARNED, Level
 from skillframe_benchmarks.scores import passes
 
 DRAWS, OFTEN, FEWEST = 4000, 0.8, 5
@@ -84,8 +84,8 @@ def read(folder: Path, levels: Iterable[Level]) -> Found | None:
     parts = _json(folder / "parts.json")
     cells: dict[tuple[str, str], Cell] = {}
     for level in levels:
-        if (folder / level.name / "summary.json").exists():
-            cells |= {(level.name, method): cell for method, cell in _cells(folder / level.name, parts).items()}
+        if (folder / level.noise / "summary.json").exists():
+            cells |= {(level.name, method): cell for method, cell in _cells(folder, level, parts).items()}
     unlearned = _json(folder / UNLEARNED)
     if unlearned:
         none = _failed(_json(folder / DONE)["trials"], parts)
@@ -105,10 +105,11 @@ def _json(path: Path) -> dict[str, Any]:
     return found
 
 
-def _cells(folder: Path, parts: Mapping[str, Any]) -> dict[str, Cell]:
+def _cells(folder: Path, level: Level, parts: Mapping[str, Any]) -> dict[str, Cell]:
     rows: dict[str, list[dict[str, Any]]] = {}
-    for row in CampaignResults(folder).rows:
-        rows.setdefault(row["skill"].removesuffix(".skill.json"), []).append(row)
+    for row in CampaignResults(folder / level.noise).rows:
+        if row[FRICTION] == level.friction:
+            rows.setdefault(row["skill"].removesuffix(".skill.json"), []).append(row)
     return {method: _cell(each, parts) for method, each in rows.items()}
 
 
