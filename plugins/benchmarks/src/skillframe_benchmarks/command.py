@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from skillframe_benchmarks.counts import Found
 
 
+LAYOUT = 2
+"""Of a benchmark's folder: a campaign a noise. The first had a campaign a level."""
+
+
 @click.group(name="benchmark")
 def command() -> None:
     """Run public benchmarks of assembly on parts that you fetched. Nothing of them is shipped.
@@ -124,7 +128,7 @@ def _agree(out: Path, plan: Plan) -> None:
     """Keep the plan, or refuse a folder that was begun with another."""
     from skillframe.files import write_whole
 
-    path, mine = out / "plan.json", json.loads(json.dumps(asdict(plan)))
+    path, mine = out / "plan.json", {**json.loads(json.dumps(asdict(plan))), "layout": LAYOUT}
     if path.exists():
         theirs = json.loads(path.read_text(encoding="utf-8"))
         other = [f"{key} = {theirs.get(key)!r}" for key in mine if theirs.get(key) != mine[key]]
