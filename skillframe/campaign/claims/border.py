@@ -2,9 +2,9 @@ r"""Where the border of success lies, from trials that are picked near it.
 
 After the first trials, each round fits the surrogate, takes three quarters of its points where they tell most of the
 border and a quarter from the Sobol sequence, which goes on where the first trials ended and finds what the surrogate
-does not expect. It ends once the surrogate expects to be wrong on less than `CLOSE` of the set in two rounds running,
-or at the budget. Batches are small: a large one picks its last points from a guess that its first ones would have
-changed.
+does not expect. It ends once the surrogate, found to its end, expects to be wrong on less than `CLOSE` of the set in
+two rounds running, or at the budget. Batches are small: a large one picks its last points from a guess that its first
+ones would have changed.
 
 Rows that were picked so are no sample: no rate, interval or test may be made of them.
 """
@@ -107,7 +107,7 @@ def search(
         surrogate = Surrogate(seen.points, seen.works)
         sure = surrogate.above(even)
         doubt = doubt_of(sure, seen.works)
-        calm = calm + 1 if doubt < CLOSE else 0
+        calm = calm + 1 if doubt < CLOSE and surrogate.settled else 0
         say(_progress(doubt, len(seen.works), to_go(doubt, calm, len(seen.works), batch, budget)))
     share_that_works, edges = float(np.mean(sure > 0.5)), edges_of(surrogate, dimension)
     return Border(len(seen.works), explored, doubt_of(sure, seen.works), calm >= RUNNING, share_that_works, edges)

@@ -49,6 +49,7 @@ class Surrogate:
     Attributes:
         lengths: (d,) of the quantities, in their scaled units.
         amplitude: standard deviation of f before any trial.
+        settled: whether what the labels say of f was found to its end (`propagation`).
 
     Args:
         points: (n, d) of the trials, each quantity scaled to -1 to 1 over its range.
@@ -60,6 +61,7 @@ class Surrogate:
         self.lengths, self.amplitude = _chosen(points, labels)
         self._points = points
         self._known = posterior(self._covariance(points, points), labels)
+        self.settled = self._known.settled
 
     def mean(self, points: Float) -> Float:
         """(m,) means of f at (m, d) points: above 0 where it works, below where it does not."""

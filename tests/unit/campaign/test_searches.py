@@ -11,7 +11,7 @@ from scipy.stats import norm, qmc
 from search_fakes import content, everything
 from test_certify import ENGINE, TEXT, asked, inside, written
 
-from skillframe.campaign.claims import border, breaking, matter, plan, procedure
+from skillframe.campaign.claims import border, breaking, matter, plan, procedure, propagation
 from skillframe.campaign.claims.engine import Looked
 from skillframe.campaign.claims.plan import PLAN, RoundPlan
 from skillframe.campaign.claims.question import ask_again, begin, read_question
@@ -61,6 +61,13 @@ def test_a_search_does_not_settle_where_what_was_seen_to_work_is_predicted_to_fa
     found, _ = answered(border.search(seen, 64, lambda a, b: SOBOL[a:b], 160), lambda p: p[:, 0] > 0.9)
     assert seen.works.any()
     assert (found.settled, found.trials, found.share, found.doubt) == (False, 160, 0.0, 1.0)
+
+
+def test_a_search_does_not_settle_by_a_surrogate_that_was_not_found_to_its_end(monkeypatch):
+    monkeypatch.setattr(propagation, "MOST_SWEEPS", 8)
+    seen = Looked(SOBOL[:64], np.full(64, True))
+    found, _ = answered(border.search(seen, 64, lambda a, b: SOBOL[a:b], 160), lambda p: np.full(len(p), True))
+    assert (found.settled, found.trials) == (False, 160) and found.doubt < border.CLOSE
 
 
 @pytest.mark.parametrize("works", [True, False])

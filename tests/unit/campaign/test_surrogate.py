@@ -181,8 +181,20 @@ def test_sweeps_come_to_an_end_on_sharp_labels_at_the_largest_amplitude(monkeypa
     sweeps = []
     monkeypatch.setattr(propagation, "factor_of", lambda *given: sweeps.append(1) or factor_of(*given))
     sharp = np.where(np.abs(SOBOL[:, 1] - 0.3 * SOBOL[:, 0]) < 0.08 * (SOBOL[:, 0] + 1.1), 1.0, -1.0)
-    posterior(AMPLITUDES[-1] ** 2 * matern(SOBOL, SOBOL, np.array([1.4, 0.5])), sharp)
-    assert len(sweeps) < 60
+    gram = AMPLITUDES[-1] ** 2 * matern(SOBOL, SOBOL, np.array([1.4, 0.5]))
+    assert posterior(gram, sharp).settled and len(sweeps) < 60
+    monkeypatch.setattr(propagation, "MOST_SWEEPS", len(sweeps) // 2)
+    assert not posterior(gram, sharp).settled
+
+
+@pytest.mark.parametrize("count", [64, 192, 256])
+def test_labels_that_are_all_alike_are_found_to_their_end(count):
+    """f is nearly one number c then: its mean is that of N(c; 0, a^2) Phi(c)^n, by quadrature; ours is 12 % above."""
+    found = Surrogate(SOBOL[:count], np.full(count, True))
+    level = np.linspace(-5.0, 12.0, 4001) * found.amplitude
+    weight = norm.pdf(level, scale=found.amplitude) * np.exp(count * log_ndtr(level))
+    assert found.settled and found.lengths.tolist() == [LENGTHS[-1]] * 2
+    assert found.mean(SOBOL[:1])[0] == pytest.approx(weight @ level / weight.sum(), rel=0.2)
 
 
 def test_trials_at_one_place_that_end_both_ways_give_their_rate():
