@@ -70,7 +70,7 @@ class FolderLock:
                 pid, host = _owner(descriptor)
                 os.close(descriptor)
                 fix = "wait until it ends, or stop it"
-                raise InputError(self._path, f"process {pid} on {host} is writing this campaign", fix) from None
+                raise InputError(self._path, f"process {pid} on {host} is writing into this folder", fix) from None
             except BaseException:
                 os.close(descriptor)
                 raise
@@ -108,7 +108,7 @@ class FolderLock:
 
 def _may_be_writing(path: Path, pid: int, host: str) -> InputError:
     fix = f"make sure that it has ended there, then delete {path}"
-    return InputError(path, f"process {pid} on {host} may be writing this campaign", fix)
+    return InputError(path, f"process {pid} on {host} may be writing into this folder", fix)
 
 
 def _owner(descriptor: int) -> tuple[int, str]:

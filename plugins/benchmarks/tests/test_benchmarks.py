@@ -1,6 +1,8 @@
 """AutoMate's check in closed form, rates whose unit is the assembly, and the command on two parts of our own."""
 
 import json
+import subprocess
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -121,6 +123,22 @@ def test_a_folder_that_was_begun_with_another_plan_is_refused(fetched, tmp_path,
     (tmp_path / "out/plan.json").write_text(json.dumps({"trials": 7}))
     assert run(["benchmark", "automate", str(fetched), "--out", str(tmp_path / "out")]) == 2
     assert "was begun with" in capsys.readouterr().err
+
+
+def test_a_benchmark_that_another_process_runs_is_refused_and_nothing_of_it_is_touched(fetched, tmp_path, capsys):
+    out = tmp_path / "out"
+    (out / "watch").mkdir(parents=True)
+    holds = "import sys; from pathlib import Path; from skillframe.campaign.lock import FolderLock\n"
+    holds += "with FolderLock(Path(sys.argv[1])): print('held', flush=True); sys.stdin.read()"
+    other = subprocess.Popen(
+        [sys.executable, "-c", holds, str(out)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert other.stdout.readline() == "held\n"
+        assert run(["benchmark", "automate", str(fetched), "00004", "--out", str(out)]) == 2
+        assert f"process {other.pid} on" in capsys.readouterr().err and (out / "watch").is_dir()
+    finally:
+        other.communicate()
 
 
 @pytest.mark.slow

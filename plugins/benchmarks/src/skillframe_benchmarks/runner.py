@@ -13,6 +13,7 @@ from typing import Any
 from skillframe.campaign.cluster import ClusterPool
 from skillframe.campaign.driver import WHY, Died, Raised
 from skillframe.campaign.identity import identity
+from skillframe.campaign.lock import FolderLock
 from skillframe_benchmarks import assembly
 from skillframe_benchmarks.assembly import DONE, AssemblyJob
 
@@ -33,8 +34,15 @@ def run(jobs: Sequence[AssemblyJob], out: Path, workers: int, tell: Tell) -> lis
         sentences about assemblies that ended in an internal error.
 
     Raises:
+        InputError: another process runs the same benchmark.
         SchedulerError: no workers. KeyboardInterrupt: Ctrl-C; the workers are ended.
     """
+    out.mkdir(parents=True, exist_ok=True)
+    with FolderLock(out):
+        return _missing(jobs, out, workers, tell)
+
+
+def _missing(jobs: Sequence[AssemblyJob], out: Path, workers: int, tell: Tell) -> list[str]:
     waiting = deque(job for job in jobs if not (job.folder / DONE).exists())
     if len(waiting) < len(jobs):
         tell(f"{len(jobs) - len(waiting)} of {len(jobs)} assemblies are there already in {out}")
