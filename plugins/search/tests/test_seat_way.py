@@ -1,9 +1,15 @@
-"""Where the way of a seating begins, by paths of a tip that are drawn by hand."""
+"""Where the way of a seating begins, by paths of a tip that are drawn by hand, and pushes that have none."""
 
 from itertools import pairwise
 
 import numpy as np
-from skillframe_search.seat_learner import _way_begins
+import pytest
+from skillframe_search.example import seated
+from skillframe_search.seat_learner import _check_push, _way_begins
+
+from skillframe.errors import InputError
+from skillframe.extend.records import LearnOptions
+from skillframe.extend.registry import registry
 
 
 def tip_path(*corners):
@@ -35,3 +41,13 @@ def test_where_it_rests_as_soon_as_it_touches_the_way_is_the_one_that_it_came():
     bottom = tip_path((0.0, 0.0, 0.006), (0.0, 0.0, 0.001), (0.0, 0.0, 0.0))
     np.testing.assert_array_equal(_way_begins(bottom, 100, 0.002), bottom[0])
     np.testing.assert_array_equal(_way_begins(bottom, 100), bottom[100])
+
+
+def test_demonstrations_whose_contact_shows_no_direction_to_push_in_are_refused():
+    body = registry().skill("lmc").learn([seated(0.14)], LearnOptions())
+    _check_push(body)
+    for part in ("translation", "rotation"):
+        body["phases"][0][part] |= {"desired_direction": None, "speed": 0.0}
+    with pytest.raises(InputError, match="no one direction to push in"):
+        _check_push(body)
+    _check_push({"phases": [{"of another kind": {}}]})  # whatever it does is not ours to know
