@@ -2,8 +2,11 @@
 
    Contact: dist = distance, normal = its gradient, position half the depth from the point along it. The deepest comes
    first, then whichever is farthest from those taken, in place and in normal, so that few contacts carry all.
+   Points that are far from the other part are not asked again until something has moved as far as they are away: what is
+   found is the same to the bit (Verlet 1967, Physical Review 159, whose lists these are).
    The names and the call are those of MuJoCo's table of collision functions; its version is checked when this is built. */
 #include <mujoco/mujoco.h>
+#include <stdlib.h>
 
 #include "surfaces.h"
 
@@ -18,7 +21,11 @@
 #define AROUND 4.27      /* cells around a whole part, within its widest grid; a tenth of one less than there are */
 #define SURELY 0.5       /* cells; what interpolates to more is outside, whatever edge is near (it is off by a quarter) */
 
+#define AHEAD 3e-4       /* m; points nearer than this are asked until one of them may have moved so far */
+#define LISTS 4096       /* of a thread; by simulation, part and part */
+
 static const Part* parts[PARTS];
+static int64_t changes;  /* of that table: what was kept of other parts is not of these */
 
 typedef struct {
   double turn[9], shift[3];
@@ -187,23 +194,104 @@ static int is_clear(const Shape* in, const double* centre, double radius) {
   return 0;
 }
 
-/* Add what the points of one part find in the other; `sign` turns gradients to normals from the first to the second. */
-static int look(const Part* of, const Frame* pose_of, const Part* part, const double* half, const Frame* pose_in, double sign, int found) {
+/* Points of a part that may be within AHEAD of another, in order, as both stood then. */
+typedef struct {
+  const void* data;
+  const Part *of, *in;
+  Frame across;
+  double centre[3], radius; /* of a ball around all points */
+  int64_t changes, count, room;
+  int32_t* point;
+} Near;
+
+static _Thread_local Near* lists;
+
+/* Where a simulation's list of a pair is, or may be put; NULL without memory. */
+static Near* list_of(const void* data, const Part* of, const Part* in) {
+  if (!lists && !(lists = calloc(LISTS, sizeof(Near)))) return NULL;
+  uint64_t h = ((uint64_t)(uintptr_t)data >> 4) * 0x9e3779b97f4a7c15u;
+  h = (h ^ ((uint64_t)(uintptr_t)of >> 4)) * 0x9e3779b97f4a7c15u;
+  h = (h ^ ((uint64_t)(uintptr_t)in >> 4)) * 0x9e3779b97f4a7c15u >> 32;
+  for (uint64_t k = 0; k < 4; k++) {
+    Near* here = lists + ((h + k) & (LISTS - 1));
+    if (!here->data || (here->data == data && here->of == of && here->in == in)) return here;
+  }
+  return lists + (h & (LISTS - 1));
+}
+
+/* Whether no point has moved by AHEAD against the other part since a list was made. */
+static int is_good(const Near* near, const void* data, const Part* of, const Part* in, const Frame* across) {
+  if (near->data != data || near->of != of || near->in != in || near->changes != changes) return 0;
+  Frame by;
+  double turned = 0, moved[3];
+  for (int i = 0; i < 9; i++) by.turn[i] = across->turn[i] - near->across.turn[i], turned += by.turn[i] * by.turn[i];
+  for (int x = 0; x < 3; x++) by.shift[x] = across->shift[x] - near->across.shift[x];
+  apply(&by, near->centre, moved);
+  return sqrt(turned) * near->radius + sqrt(dot(moved, moved)) < 0.999 * AHEAD;
+}
+
+/* Make a list. Without memory it is of no pair. */
+static void make_list(Near* near, const void* data, const Part* of, const Part* in, const Shape* shape) {
+  near->data = data, near->of = of, near->in = in, near->across = shape->across, near->changes = changes;
+  near->count = 0, near->radius = 0;
+  for (int x = 0; x < 3; x++) {
+    near->centre[x] = 0;
+    for (int64_t a = 0; a < of->groups; a++) near->centre[x] += of->around[4 * a + x] / (double)of->groups;
+  }
+  for (int64_t a = 0; a < of->groups; a++) {
+    double from[3];
+    for (int x = 0; x < 3; x++) from[x] = of->around[4 * a + x] - near->centre[x];
+    near->radius = larger(near->radius, sqrt(dot(from, from)) + of->around[4 * a + 3]);
+    if (is_clear(shape, of->around + 4 * a, of->around[4 * a + 3] + AHEAD)) continue;
+    for (int64_t b = of->group[a]; b < of->group[a + 1]; b++) {
+      if (is_clear(shape, of->ball + 4 * b, of->ball[4 * b + 3] + AHEAD)) continue;
+      for (int64_t i = of->first[b]; i < of->first[b + 1]; i++) {
+        if (is_clear(shape, of->point + 3 * i, AHEAD)) continue;
+        if (near->count == near->room) {
+          int64_t room = near->room ? 2 * near->room : 256;
+          int32_t* more = realloc(near->point, (size_t)room * sizeof *more);
+          if (!more) {
+            near->of = NULL;
+            return;
+          }
+          near->room = room, near->point = more;
+        }
+        near->point[near->count++] = (int32_t)i;
+      }
+    }
+  }
+}
+
+/* Add what a point finds in the other part; `sign` turns gradients to normals from the first to the second. */
+static INLINE int ask(const Shape* in, const Frame* pose_in, const double* point, double sign, int found) {
+  double p[3], normal[3], dist = distance_at(in, 1, point, p, normal);
+  if (!(dist < 0)) return found;
+  Candidate* c = candidates + found;
+  for (int x = 0; x < 3; x++) p[x] -= 0.5 * dist * normal[x];
+  apply(pose_in, p, c->pos);
+  for (int x = 0; x < 3; x++) c->normal[x] = sign * dot(pose_in->turn + 3 * x, normal);
+  c->dist = dist, c->apart = 1e9;
+  return found + 1;
+}
+
+/* Add what the points of one part find in the other. `data` says whose list of near points is kept, NULL: none is. */
+static int look(const void* data, const Part* of, const Frame* pose_of, const Part* part, const double* half,
+                const Frame* pose_in, double sign, int found) {
   Frame back = inverse(pose_in), across = after(&back, pose_of);
   Shape in = seen(part, half, &across);
+  Near* near = data ? list_of(data, of, part) : NULL;
+  if (near && !is_good(near, data, of, part, &across)) make_list(near, data, of, part, &in);
+  if (near && near->of) {
+    for (int64_t n = 0; n < near->count && found < CANDIDATES; n++)
+      found = ask(&in, pose_in, of->point + 3 * near->point[n], sign, found);
+    return found;
+  }
   for (int64_t a = 0; a < of->groups; a++) {
     if (is_clear(&in, of->around + 4 * a, of->around[4 * a + 3])) continue;
     for (int64_t b = of->group[a]; b < of->group[a + 1]; b++) {
       if (is_clear(&in, of->ball + 4 * b, of->ball[4 * b + 3])) continue;
-      for (int64_t i = of->first[b]; i < of->first[b + 1] && found < CANDIDATES; i++) {
-        double p[3], normal[3], dist = distance_at(&in, 1, of->point + 3 * i, p, normal);
-        if (!(dist < 0)) continue;
-        Candidate* c = candidates + found++;
-        for (int x = 0; x < 3; x++) p[x] -= 0.5 * dist * normal[x];
-        apply(pose_in, p, c->pos);
-        for (int x = 0; x < 3; x++) c->normal[x] = sign * dot(pose_in->turn + 3 * x, normal);
-        c->dist = dist, c->apart = 1e9;
-      }
+      for (int64_t i = of->first[b]; i < of->first[b + 1] && found < CANDIDATES; i++)
+        found = ask(&in, pose_in, of->point + 3 * i, sign, found);
     }
   }
   return found;
@@ -254,8 +342,8 @@ static int collide(const mjModel* m, mjData* d, mjPreContact* con, int g1, int g
   const Part *one = part_of(m, d, g1, &f1), *two = part_of(m, d, g2, &f2);
   (void)margin;
   if (!one || !two) return 0;
-  int found = look(one, &f1, two, NULL, &f2, -1.0, 0);
-  found = look(two, &f2, one, NULL, &f1, 1.0, found);
+  int found = look(d, one, &f1, two, NULL, &f2, -1.0, 0);
+  found = look(d, two, &f2, one, NULL, &f1, 1.0, found);
   return choose(found, smaller(one->apart, two->apart), con);
 }
 
@@ -267,7 +355,7 @@ static int collide_box(const mjModel* m, mjData* d, mjPreContact* con, int g1, i
   if (!part) return 0;
   memcpy(box.turn, d->geom_xmat + 9 * g1, sizeof box.turn);
   memcpy(box.shift, d->geom_xpos + 3 * g1, sizeof box.shift);
-  return choose(look(part, &pose, NULL, m->geom_size + 3 * g1, &box, 1.0, 0), part->apart, con);
+  return choose(look(NULL, part, &pose, NULL, m->geom_size + 3 * g1, &box, 1.0, 0), part->apart, con);
 }
 
 EXPORT int skillframe_version(void) { return mjVERSION_HEADER; }
@@ -282,13 +370,13 @@ EXPORT void skillframe_install(mjfCollision table[mjNGEOMTYPES][mjNGEOMTYPES]) {
 EXPORT int skillframe_add(const Part* part) {
   for (int slot = 0; slot < PARTS; slot++)
     if (!parts[slot]) {
-      parts[slot] = part;
+      parts[slot] = part, changes++;
       return slot + 1;
     }
   return 0;
 }
 
-EXPORT void skillframe_remove(int number) { parts[number - 1] = NULL; }
+EXPORT void skillframe_remove(int number) { parts[number - 1] = NULL, changes++; }
 
 /* Signed distances of points (count, 3) as contacts see them. */
 EXPORT void skillframe_look_up(const Part* part, int64_t count, const double* point, double* out) {

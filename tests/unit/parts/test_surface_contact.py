@@ -1,5 +1,7 @@
 """Parts as surfaces in MuJoCo: chosen where pieces do not hold, a block's weight and height, the same in a batch."""
 
+import ctypes
+
 import mujoco
 import mujoco.batch
 import numpy as np
@@ -14,6 +16,7 @@ from skillframe.parts.found import lines, values
 from skillframe.parts.load import load
 from skillframe.parts.solid import arrays_of
 from skillframe.parts.world import stated
+from skillframe.world import surfaces
 from skillframe.world.convert import add_geom
 from skillframe.world.scene import Geom
 from skillframe.world.surfaces import available, opened
@@ -89,6 +92,59 @@ def test_what_is_in_the_hole_does_not_touch_and_what_is_beside_it_does():
     for contact in data.contact:  # from the wall at +x to the pin
         assert contact.frame[0] < -0.5
     del below, pin
+
+
+def contacts_along(model, places, forget=lambda: None):
+    """Of each of some places (T, 7): distances, positions and frames of all contacts, (n, 13) in order."""
+    data, found = mujoco.MjData(model), []
+    for place in places:
+        forget()
+        data.qpos[:] = place
+        mujoco.mj_forward(model, data)
+        contact = data.contact
+        found.append(np.column_stack([contact.dist, contact.pos, contact.frame]))
+    return found
+
+
+def walk(low, high, most_turn):
+    """Places (2000, 7) of a part that moves by 1 um to 0.4 mm and up to half a degree at a time, held within a box."""
+    rng = np.random.default_rng(5)
+    size, place, turn = 10.0 ** rng.uniform(-6.0, -3.4, 2000), np.mean([low, high], axis=0), np.zeros(3)
+    found = []
+    for step in size:
+        place = np.clip(place + step * rng.standard_normal(3), low, high)
+        turn = np.clip(turn + 20.0 * step * rng.standard_normal(3), -most_turn, most_turn)
+        found.append([*place, 1.0, *0.5 * turn])  # MuJoCo makes a unit quaternion of it
+    return np.array(found)
+
+
+BLOCK = hole(5.2, 12.0, 24), box((-8, -8, 0), (8, 8, 6))
+PAIRS = {
+    "a pin in a hole": ((hole(5.2, 12.0, 24), rod(5.0, -3.0, 8.0, 24)), walk([-2e-4] * 3, [2e-4] * 3, 0.01)),
+    "a block over it": (BLOCK, walk([-1e-3] * 3, [1e-3, 1e-3, 2e-3], 0.1)),
+    "a block that turns": (BLOCK, walk([0.0, 0.0, 3e-4], [0.0, 0.0, 3e-4], 0.1)),
+}
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", PAIRS)
+def test_a_part_that_moves_on_meets_what_it_meets_where_no_near_points_were_kept(name):
+    """In and out of touch, thousands of times. That another part is put in makes the generator forget."""
+    (below, above), places = PAIRS[name]
+    below, above = geom_of(in_metres(below)), geom_of(in_metres(above))
+    model = dropped(below, above, 0.0)
+    unused = surfaces._part(below.surface)
+
+    def forget():
+        library = surfaces._require()
+        library.skillframe_remove(library.skillframe_add(ctypes.byref(unused)))
+
+    kept, fresh = contacts_along(model, places), contacts_along(model, places, forget)
+    touched = [len(each) > 0 for each in kept]
+    assert np.count_nonzero(np.diff(touched)) > 20
+    for mine, theirs in zip(kept, fresh, strict=True):
+        np.testing.assert_array_equal(mine, theirs)
+    del below, above
 
 
 @pytest.mark.slow
