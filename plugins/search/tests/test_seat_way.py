@@ -3,11 +3,11 @@
 from itertools import pairwise
 
 import numpy as np
-import pytest
 from skillframe_search.example import seated
-from skillframe_search.seat_learner import _check_push, _way_begins
+from skillframe_search.seat_learner import _way_begins
+from skillframe_search.seat_words import NOWHERE, describe, goes_nowhere
 
-from skillframe.errors import InputError
+from skillframe.document.source import learned
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
 
@@ -43,11 +43,10 @@ def test_where_it_rests_as_soon_as_it_touches_the_way_is_the_one_that_it_came():
     np.testing.assert_array_equal(_way_begins(bottom, 100), bottom[100])
 
 
-def test_demonstrations_whose_contact_shows_no_direction_to_push_in_are_refused():
-    body = registry().skill("lmc").learn([seated(0.14)], LearnOptions())
-    _check_push(body)
+def test_a_seating_says_where_its_push_has_no_direction():
+    made = learned(registry().skill("seat"), [seated(0.14)], LearnOptions())
+    assert NOWHERE not in describe(made)
     for part in ("translation", "rotation"):
-        body["phases"][0][part] |= {"desired_direction": None, "speed": 0.0}
-    with pytest.raises(InputError, match="no one direction to push in"):
-        _check_push(body)
-    _check_push({"phases": [{"of another kind": {}}]})  # whatever it does is not ours to know
+        made["phases"][0][part] |= {"desired_direction": None, "speed": 0.0}
+    assert NOWHERE in describe(made)
+    assert not goes_nowhere({"of another kind": {}})  # whatever it does is not ours to know

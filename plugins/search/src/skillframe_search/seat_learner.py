@@ -94,8 +94,7 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     """The body of a seating document.
 
     Raises:
-        InputError: axes other than base, a demonstration without contact or way, contact that shows no direction to
-            push in, or an unknown setting.
+        InputError: axes other than base, a demonstration without contact or way, or an unknown setting.
         UnknownName: no such kind of skill, or none that is an exception strategy.
     """
     settings, own, searching = _sorted(options)
@@ -109,7 +108,6 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     if push.learn is None:
         raise InputError(f"--skill {push.name}", "is not learned from demonstrations", "name one that is, such as lmc")
     body = push.learn([each.part for each in shown], replace(options, settings=own))
-    _check_push(body)
     at_point = with_center({"frame": {**body["frame"], "learned_at": point.tolist()}}, point.tolist())
     stalled = Stalled(
         way=seat.way, radius=sqrt(2.0) * (seat.shift_m + seat.tilt_rad * seat.contact_m), tilt=seat.tilt_rad,
@@ -126,17 +124,6 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
         "seat": plain(asdict(seat)),
         "settings": plain(asdict(settings)),
     }
-
-
-def _check_push(body: Document) -> None:
-    """Refuse a push that goes nowhere, which would seat nothing however well the search finds the mouth."""
-    parts = [part for each in body["phases"] for part in each.values() if isinstance(part, dict)]
-    ways = [part["desired_direction"] for part in parts if "desired_direction" in part]
-    if ways and all(way is None for way in ways):
-        raise InputError(
-            "learn", "from the first contact on the demonstrations show no one direction to push in",
-            "push the part in rather than carry it, without turning back, and see what learn says without --exception",
-        )  # fmt: skip
 
 
 def exception_strategy(name: str) -> SkillType:

@@ -9,6 +9,10 @@ from skillframe.extend.registry import registry
 from skillframe_search.seat_document import PUSH, SEARCH, Seat, part_of, read_seat
 
 NAMES = ((PUSH, "push"), (SEARCH, "search"))
+NOWHERE = (
+    "push: has no direction, since the contact showed none (below: why); seated is only what the search lets fall in; "
+    "show it again, and push the part in rather than carry it"
+)
 
 
 def describe(document: Document) -> list[str]:
@@ -17,10 +21,16 @@ def describe(document: Document) -> list[str]:
     kinds = [document["phases"][i].get("skill") for i in (PUSH, SEARCH)]
     stall = f", {kinds[1]} where it stalls" if seat.search else ", and fail where it stalls"
     lines = [f"seat a part {1e3 * seat.contact_m:.1f} mm deep: {'approach, ' * seat.approach}push ({kinds[0]}){stall}"]
-    return [*lines, *_parts(seat), *_sources(seat), *_phases(document)]
+    return [*lines, *_parts(seat, goes_nowhere(document["phases"][PUSH])), *_sources(seat), *_phases(document)]
 
 
-def _parts(seat: Seat) -> list[str]:
+def goes_nowhere(push: Document) -> bool:
+    """Whether a push has no direction, which only the phases of some kinds of skill tell."""
+    parts = [part for part in push.values() if isinstance(part, dict) and "desired_direction" in part]
+    return bool(parts) and all(part["desired_direction"] is None for part in parts)
+
+
+def _parts(seat: Seat, nowhere: bool) -> list[str]:
     above = 1e3 * (seat.above_m - seat.contact_m)
     approach = (
         f"approach: to {above:.1f} mm above the first contact, over the demonstrated end, at "
@@ -32,7 +42,7 @@ def _parts(seat: Seat) -> list[str]:
     )
     return [
         *([approach] if seat.approach else []),
-        "push: adds the direction, and gives way where the contact guides the part",
+        NOWHERE if nowhere else "push: adds the direction, and gives way where the contact guides the part",
         *([search] if seat.search else []),
         f"catch: brakes above {1e3 * seat.catch_m_s:.3g} mm/s along the way with {seat.catch_ns_m:g} Ns/m; adds that a "
         "part that lets go does not hit the bottom",
