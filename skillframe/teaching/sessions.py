@@ -169,8 +169,8 @@ def collect(
 ) -> Recording:
     """Let a teacher attempt what is still missing until every slot has its demonstration.
 
-    What failed is attempted four times side by side, then twenty times. The first that succeeds is kept, as if they had
-    been made one after the other; what comes after it is not counted.
+    What failed is attempted four times side by side, then twenty times, or as often as is left. The first that succeeds
+    is kept, as if they had been made one after the other; what comes after it is not counted.
 
     Args:
         robot: for the messages.

@@ -3,11 +3,13 @@
 import json
 import subprocess
 import sys
+from dataclasses import asdict
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from skillframe_benchmarks import counts, scores
+from skillframe_benchmarks.assembly import Plan
 from skillframe_benchmarks.assets import pairs
 from skillframe_benchmarks.counts import Cell, cause, share
 
@@ -123,6 +125,10 @@ def test_a_folder_that_was_begun_with_another_plan_is_refused(fetched, tmp_path,
     (tmp_path / "out/plan.json").write_text(json.dumps({"trials": 7}))
     assert run(["benchmark", "automate", str(fetched), "--out", str(tmp_path / "out")]) == 2
     assert "was begun with" in capsys.readouterr().err
+    of_before = json.loads(json.dumps(asdict(Plan())))  # when each level had a campaign of its own
+    (tmp_path / "out/plan.json").write_text(json.dumps(of_before))
+    assert run(["benchmark", "automate", str(fetched), "--out", str(tmp_path / "out")]) == 2
+    assert "was begun with layout = None" in capsys.readouterr().err
 
 
 def test_a_benchmark_that_another_process_runs_is_refused_and_nothing_of_it_is_touched(fetched, tmp_path, capsys):

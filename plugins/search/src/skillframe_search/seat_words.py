@@ -10,7 +10,7 @@ from skillframe_search.seat_document import PUSH, SEARCH, Seat, part_of, read_se
 
 NAMES = ((PUSH, "push"), (SEARCH, "search"))
 NOWHERE = (
-    "push: has no direction, since the contact showed none (below: why); seated is only what the search lets fall in; "
+    "push: has no direction, since the contact showed none (below: why); only what the search lets fall in is seated; "
     "show it again, and push the part in rather than carry it"
 )
 
