@@ -147,6 +147,29 @@ def test_a_part_that_moves_on_meets_what_it_meets_where_no_near_points_were_kept
     del below, above
 
 
+@needs_compiler
+def test_near_points_of_a_part_that_was_taken_out_are_not_those_of_one_in_its_place():
+    """The same number and the same record in memory, as may come about by chance: a wider hole, then one too narrow."""
+    wide, narrow = (geom_of(in_metres(hole(radius, 12.0, 24))) for radius in (5.2, 4.9))
+    pin = geom_of(in_metres(rod(5.0, -3.0, 8.0, 24)))
+    model, library, record = dropped(wide, pin, 0.0), surfaces._require(), surfaces._part(wide.surface)
+    number = library.skillframe_add(ctypes.byref(record))
+    model.geom_user[0, 0] = number
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 0
+    library.skillframe_remove(number)
+    other = surfaces._part(narrow.surface)
+    ctypes.memmove(ctypes.byref(record), ctypes.byref(other), ctypes.sizeof(record))
+    assert library.skillframe_add(ctypes.byref(record)) == number
+    found = [contacts_along(model, [data.qpos])[0]]
+    mujoco.mj_forward(model, data)  # with what it knew of the wider one
+    found.append(np.column_stack([data.contact.dist, data.contact.pos, data.contact.frame]))
+    library.skillframe_remove(number)
+    assert len(found[0]) and np.array_equal(*found)
+    del wide, narrow, pin
+
+
 @pytest.mark.slow
 @needs_compiler
 def test_trials_are_the_same_to_the_bit_alone_and_in_a_batch():
