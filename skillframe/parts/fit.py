@@ -114,6 +114,15 @@ def fit(plug: MeshPart, socket: MeshPart, file: FixtureFile) -> PartsFit:
     return PartsFit(one, two, depth, float(np.median(gaps)), gaps, lifts, radius, turn, axis, origin, way)
 
 
+def nothing_stops(fit: PartsFit, table: bool, fall: float) -> bool:
+    """Whether an assembled part goes straight on for `fall` [m], past the socket and, if there is one, the `table`."""
+    floor = float(fit.socket.bounding_box()[2])
+    if table and float(fit.plug.bounding_box()[2]) - fall < floor:
+        return False
+    common = fit.plug.translate([0.0, 0.0, -fall]) ^ fit.socket
+    return thickness(common) < TOUCH
+
+
 def _gap(one: Any, two: Any) -> float:
     """The smallest distance of two solids [m], at most the last of `_FAR`."""
     gaps = (float(one.min_gap(two, far)) for far in _FAR)

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from skillframe.config.fields import require_ranges
 from skillframe.frames import Float, matrix_from_quaternion, norm, quaternion_from_matrix
 from skillframe.parts.declared import FixtureFile, read_fixture
-from skillframe.parts.fit import corners, lowest
+from skillframe.parts.fit import corners, lowest, nothing_stops
 from skillframe.parts.load import LoadedParts, PreparedPart, load
 from skillframe.parts.second import in_place, second_parts
 from skillframe.parts.solid import arrays_of
-from skillframe.world.scene import REACTION_S, Geom, Scene, State, Task, Tool, Vector
+from skillframe.world.scene import REACTION_S, Geom, Scene, State, Stop, Task, Tool, Vector
 from skillframe.world.shapes import FIXTURE_COLOUR, TOOL_COLOUR, shaft
 from skillframe.world.worlds.common import TOOL_DOWN, insertion, tilt_of
 
@@ -103,6 +103,9 @@ def build_world(path: Path, params: PartsParams) -> Scene:
             there = there & (_turn_left(state) < loaded.file.task.seated.turned)
         return there & in_place(loaded.file.second, state)
 
+    stop = None
+    if not (movers or fixed) and nothing_stops(found, loaded.file.fixture.table, loaded.file.task.seated.height):
+        stop = Stop((0.0, 0.0, loaded.file.tool.grip), (0.0, 0.0, -depth))
     x, y, z, w = quaternion_from_matrix(found.way.before @ matrix_from_quaternion(TOOL_DOWN)).tolist()
     return Scene(
         name=loaded.name,
@@ -119,7 +122,7 @@ def build_world(path: Path, params: PartsParams) -> Scene:
         task=Task(
             direction=(0.0, 0.0, -1.0), aligned=TOOL_DOWN, hand="aligning",
             starts=tuple(_start(height, tilt, params, points) for height, tilt in loaded.starts),
-            waits_s=WAITS_S, held_s=REACTION_S,
+            stop=stop, waits_s=WAITS_S, held_s=REACTION_S,
         ),
         params=stated(loaded),
     )  # fmt: skip

@@ -34,7 +34,7 @@ from skillframe.teaching.staged import hand_of, teacher_for
 from skillframe.teaching.teacher import TeacherSettings
 from skillframe.teaching.teleoperation import OperatorSettings
 from skillframe.world.placement import fixture_poses, places_in_base
-from skillframe.world.scene import Scene, State
+from skillframe.world.scene import Scene, State, Task
 from skillframe.world.sensors import SensorSettings
 
 MOST_ATTEMPTS = 20
@@ -42,6 +42,8 @@ SIDE_BY_SIDE = 4
 """How many attempts follow each that failed, at once: four take little longer than one (ours)."""
 MOST_AT_ONCE = 100
 """Demonstrations that are simulated side by side, so that memory does not grow with the traces of a thousand."""
+RESTS_M = 1e-4
+"""A person who holds on lets go once the part goes no further than this (ours): what still moves is not at its end."""
 Done = Callable[[State], NDArray[np.bool_]]
 Try = tuple[int, int]
 """A demonstration that is wanted, and the number of the attempt at it."""
@@ -243,7 +245,7 @@ def _attempt(
     setup = Setup(
         robot=robot.guided(), scene=scene, center_of_compliance=np.array(scene.tool.frames[scene.tool.hand]),
         sensors=sensors or SensorSettings(), filter_wrench=False,
-        stop_when=_held(last.done or scene.goal, last.held_s * robot.spec.control.tick_hz),
+        stop_when=_held(last, last.done or scene.goal, robot.spec.control.tick_hz),
         make_drive=drive_maker(robot),
     )  # fmt: skip
     rngs = [np.random.default_rng([seed, slot, number]) for slot, number in tries]
@@ -258,14 +260,19 @@ def person_for(scene: Scene, fixture: Pose, settings: TeacherSettings, firmly: b
     return LookingTeacher(scene, fixture, settings, hand_of(scene.task, firmly))
 
 
-def _held(done: Done, ticks: float) -> Done:
-    """`done`, once it has been so for as many ticks. It is asked every `SLOW_TICKS`."""
-    times = np.zeros(())
+def _held(task: Task, done: Done, tick_hz: float) -> Done:
+    """`done`, once it has been so for `task.held_s` without the tip going further. It is asked every `SLOW_TICKS`."""
+    ticks = task.held_s * tick_hz / SLOW_TICKS
+    times, reached = np.zeros(()), np.full((), -np.inf)
 
     def held(state: State) -> NDArray[np.bool_]:
-        nonlocal times
+        nonlocal times, reached
         times = np.where(done(state), times + 1.0, 0.0)
-        found: NDArray[np.bool_] = times > ticks / SLOW_TICKS
+        if task.held_s and task.direction is not None:
+            along = state.tip.position @ np.array(task.direction)
+            further = along > reached + RESTS_M
+            times, reached = np.where(further, 0.0, times), np.where(further, along, reached)
+        found: NDArray[np.bool_] = times > ticks
         return found
 
     return held

@@ -6,6 +6,7 @@ Maxwell element (all figures ours, chosen so that demonstrations look and feel l
 
     d = unit(d_0 + o),  do = -o dt / 0.5 s + sigma sqrt(2 dt / 0.5 s) N(0, 1)     where the person aims
     x_h += v_h d dt;  x_h -= e_perp dt / tau;  push capped at F_max               e = x_h - x(t - delay)
+    s = min(1, max(0, r / 2 mm)) times v_h and F_max, - D (1 - s) d_0.v d_0       r left to where the person stops it
     F = K_h (x_h - x) + B_h (v_h d - v) + tremor
 
 A person softens to align a part and stiffens to slide it, hence one hand per task. Teleoperation adds a one-way delay
@@ -28,6 +29,7 @@ from skillframe.world.scene import Task
 
 AIM_TIME, TREMOR_TIME = 0.5, 0.1  # correlation times of aim and tremor [s]
 SLOWING_S = 0.2  # a hand that carries something to a place slows down by so much before it
+STOPPING_M, STOPPING_NS_M = 0.002, 600.0
 BLOCK = 500
 BY_ROW = ("_noise", "_aim", "_tremor", "_position", "_rotation", "_direction", "_goal", "_aligned", "_turn")
 """What a teacher keeps of each trial, beside its generator and its delays."""
@@ -199,9 +201,13 @@ class Teacher(Skill):
         if observation.time[0] < self._task.waits_s:
             velocity = turning = self._follow(seen_position, observation.dt)
         else:
-            velocity = self._push(noise[:, :3], seen_position, observation.dt)
+            velocity = self._push(noise[:, :3], Pose(seen_position, seen_rotation), observation.dt)
             turning = self._turn_hand(seen_rotation, observation.dt)
         tremor = self._shake(noise[:, 3:], observation.dt)
+        if self._task.stop is not None and self._direction is not None:
+            along = (observation.twist[:, :3] * self._direction).sum(-1, keepdims=True)
+            held = STOPPING_NS_M * (1.0 - self._share(Pose(seen_position, seen_rotation)))
+            tremor[:, :3] -= held * along * self._direction
         position, rotation, twist = self._arrival.push(
             self._position.copy(), self._rotation, np.concatenate([velocity, turning], axis=-1)
         )
@@ -225,22 +231,32 @@ class Teacher(Skill):
         self._position = self._position - error * (dt / self._hand.relaxation)
         return np.zeros_like(error)
 
-    def _push(self, noise: Float, seen: Float, dt: float) -> Float:
+    def _push(self, noise: Float, pose: Pose, dt: float) -> Float:
         """Advance the hand's position. Returns its velocity (N, 3)."""
-        settings, hand = self._settings, self._hand
+        settings, hand, seen = self._settings, self._hand, pose.position
         if self._direction is None and self._goal is None:
             return self._follow(seen, dt)
         error = self._position - seen
-        direction = self._aimed(noise, seen, dt)
+        direction, share = self._aimed(noise, seen, dt), self._share(pose)
         along = (error * direction).sum(-1, keepdims=True)
         sideways = error - along * direction
-        excess = np.maximum(along - settings.force_max / hand.stiffness, 0.0)
-        velocity: Float = self._speed() * direction
+        excess = np.maximum(along - share * settings.force_max / hand.stiffness, 0.0)
+        velocity: Float = share * self._speed() * direction
         if not hand.gives_way:
             left = 1.0 - along * (hand.stiffness / settings.force_max)
             velocity, excess = np.clip(left, 0.0, 1.0) * velocity, np.zeros_like(excess)
         self._position = self._position + velocity * dt - sideways * (dt / hand.relaxation) - excess * direction
         return velocity
+
+    def _share(self, seen: Pose) -> float | Float:
+        """Of speed and push (N, 1), by how far the part that is seen still has to go where only the person stops it."""
+        stop = self._task.stop
+        if stop is None or self._direction is None:
+            return 1.0
+        away = self._fixture.at(np.array(stop.at)).position - seen.at(np.array(stop.point)).position
+        left = (away * self._direction).sum(-1, keepdims=True)
+        share: Float = np.clip(left / STOPPING_M, 0.0, 1.0)
+        return share
 
     def _speed(self) -> float | Float:
         """How fast the hand goes: as it does, and more slowly near the place that it carries the tool to."""

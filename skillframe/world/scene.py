@@ -167,6 +167,18 @@ class State(NamedTuple):
     second: Mapping[str, Float] = MappingProxyType({})
 
 
+class Stop(NamedTuple):
+    """Where a person stops a part that nothing else stops.
+
+    Attributes:
+        point: (3,) of the tool, seen from the hand, in tool axes [m].
+        at: (3,) where it is to stand, in the fixture frame [m].
+    """
+
+    point: Vector
+    at: Vector
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Task:
     """What a person who sees the scene knows, for the simulated teacher only, in the fixture frame.
@@ -181,8 +193,9 @@ class Task:
         done: predicate of a finished demonstration, or of a finished stage; the goal if None.
         then: stages that follow, in order, once `done` has held for a person's reaction time; the last one's `done`
             ends the demonstration, their starts are not looked at.
+        stop: where the person stops pushing along `direction`, where nothing else stops the part.
         waits_s: how long the person holds still before moving, so that a recording begins in free air [s].
-        held_s: how long the person goes on once it is done, so that the last moment is not lost [s].
+        held_s: how long the person goes on once it is done and goes no further along `direction` [s].
         believed: what a blindfolded person knows instead of all this: standard deviations of where the goal is,
             relative to the start, along and across the surface [m] and about its normal [rad].
     """
@@ -195,6 +208,7 @@ class Task:
     starts: tuple[dict[str, float], ...] = ({},)
     done: Callable[[State], NDArray[np.bool_]] | None = None
     then: tuple[Task, ...] = ()
+    stop: Stop | None = None
     waits_s: float = 0.0
     held_s: float = 0.0
     believed: Vector = (0.004, 0.004, 0.0)

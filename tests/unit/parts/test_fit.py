@@ -7,9 +7,9 @@ import pytest
 
 from skillframe.errors import InputError
 from skillframe.parts.declared import FixtureFile, FixturePart, HeldPart, MeshPlace, TaskKeys
-from skillframe.parts.fit import corners, fit, lowest
+from skillframe.parts.fit import corners, fit, lowest, nothing_stops
 from skillframe.parts.solid import MeshPart
-from tests.part_meshes import SIDES, box, in_metres, keyed, round_pair
+from tests.part_meshes import SIDES, box, in_metres, keyed, rod, round_pair
 
 FILE = FixtureFile(fixture=FixturePart(mesh="socket.stl"), tool=HeldPart(mesh="plug.stl"))
 
@@ -71,3 +71,12 @@ def test_the_lowest_point_of_a_tilted_part_is_its_edge():
     points = corners(fitted(*round_pair()))
     tilt = np.array([[0.0, 0.1, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.4]])
     np.testing.assert_allclose(lowest(points, tilt), [-0.005 * np.sin(0.1)] * 2 + [0.0], atol=1e-9)
+
+
+def test_nothing_stops_a_part_in_a_hole_that_goes_through_but_a_table_and_a_bottom_do():
+    pin, blind = round_pair()
+    through = blind - rod(5.2, -20.0, 0.0, outside=True)  # 17 mm deep in all, and the pin 12
+    assert not nothing_stops(fitted(pin, blind), table=False, fall=0.001)
+    found = fitted(pin, through)
+    assert nothing_stops(found, table=True, fall=0.0049)
+    assert not nothing_stops(found, table=True, fall=0.0051) and nothing_stops(found, table=False, fall=0.0051)

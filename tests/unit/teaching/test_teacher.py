@@ -6,7 +6,7 @@ from skillframe.frames import Pose, cross, matrix_from_quaternion, norm, rotatio
 from skillframe.skill import Observation
 from skillframe.teaching.sessions import _held, record
 from skillframe.teaching.teacher import AIM_TIME, HANDS, TREMOR_TIME, Teacher, TeacherSettings, firm
-from skillframe.world.scene import Task
+from skillframe.world.scene import State, Stop, Task
 from tests.laws.runs import SILENT, generators, robot, scene
 
 DT = 1e-3
@@ -56,14 +56,50 @@ def test_a_person_who_waits_holds_still_first_and_then_does_as_one_who_does_not(
         np.testing.assert_allclose(after.twist, before.twist, atol=1e-12)
 
 
+DOWN = Task(direction=(0.0, 0.0, -1.0), held_s=0.2)
+
+
+def at_heights(*heights):
+    """Tips so high over the fixture's origin [m]."""
+    return State(Pose(np.array([(0.0, 0.0, z) for z in heights]), np.tile(np.eye(3), (len(heights), 1, 1))), None)
+
+
 def test_who_holds_on_stops_once_it_has_been_done_without_a_break_for_so_long():
     is_done = iter([True, False] + [True] * 30)
-    told = _held(lambda state: np.array([next(is_done), False]), 200.0)
-    found = [told(None) for _ in range(32)]
+    told = _held(DOWN, lambda state: np.array([next(is_done), False]), 1000.0)
+    found = [told(at_heights(0.0, 0.0)) for _ in range(32)]
     assert [bool(each[0]) for each in found].index(True) == 22  # 0.2 s after sample 2, asked every 10 ms
     assert not any(each[1] for each in found)
-    now = _held(lambda state: np.array([True]), 0.0)
-    assert now(None)[0]
+    now = _held(Task(direction=None), lambda state: np.array([True]), 1000.0)
+    assert now(at_heights(0.0))[0]
+
+
+def test_who_holds_on_does_not_let_go_of_a_part_that_still_goes_in():
+    """The one sinks by 0.3 mm in 0.1 s and then rests, the other creeps on by 0.04 mm in 0.2 s: that is a tremor."""
+    told = _held(DOWN, lambda state: np.array([True, True]), 1000.0)
+    ended = [told(at_heights(-3e-5 * min(k, 10), -2e-6 * k)) for k in range(40)]
+    first = [[bool(each[i]) for each in ended].index(True) for i in (0, 1)]
+    assert first == [
+        29,
+        21,
+    ]  # more than 0.2 s after sample 8, where it was 0.1 mm farther for the last time, and after 0
+
+
+def test_a_person_stops_what_nothing_else_stops_and_pushes_no_more():
+    """In free air, led by a hand of 4 kg: it comes to rest within 0.2 mm of where it is to stop."""
+    task = Task(direction=(0.0, 0.0, -1.0), hand="aligning", stop=Stop((0.0, 0.0, 0.1), (0.0, 0.0, -0.12)))
+    teacher, seen = Teacher(task, fixture(1, (0.0, 0.0, 0.0)), STEADY), observation(0)
+    teacher.start(seen, generators(1))
+    place, speed, mass, turned = np.zeros(3), np.zeros(3), 4.0, np.diag([1.0, -1.0, -1.0])[None]
+    for tick in range(4000):
+        seen = observation(tick)._replace(pose=Pose(place[None].copy(), turned))
+        command = teacher.step(seen)
+        hand = HANDS["aligning"]
+        force = hand.stiffness * (command.pose.position[0] - place) + hand.damping * (command.twist[0, :3] - speed)
+        speed = speed + force / mass * DT
+        place = place + speed * DT
+    assert place[2] == pytest.approx(-0.02, abs=2e-4)  # the tip is 0.1 m below the hand
+    assert norm(force) < 0.5 and norm(speed) < 1e-4
 
 
 def test_what_is_led_sideways_relaxes_with_the_hand_s_time_constant():
