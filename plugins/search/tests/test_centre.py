@@ -50,6 +50,17 @@ def test_it_presses_along_the_way_and_is_stiff_across_it_alone():
     assert command.feedforward[0, :3] @ DOWN > 0.0
 
 
+def test_where_there_is_no_bottom_it_holds_its_height_and_does_not_press():
+    skill = Centre(END, DOWN, 8.0, pressed=False)
+    seen = Observation(
+        np.zeros(1), 0.01, Pose(END + 0.003 * np.eye(3)[:1], np.eye(3)[None]), np.zeros((1, 6)), np.zeros((1, 6))
+    )
+    skill.start(seen, [np.random.default_rng(0)])
+    command = skill.step(seen)
+    np.testing.assert_array_equal(command.feedforward, 0.0)
+    np.testing.assert_allclose(command.impedance.stiffness[:3, :3], ACROSS * np.eye(3))
+
+
 def rests(aside, **changes):
     played = Played(**changes)
     played.go()

@@ -121,7 +121,7 @@ class Script(Skill):
     """Commands a feed-forward of its own, and ends where it is told to."""
 
     def __init__(self):
-        self.begun, self.ends = [], {}
+        self.begun, self.ends, self.lead, self.speed = [], {}, np.zeros(3), 0.0
 
     def start(self, observation, rngs):
         self.n = len(rngs)
@@ -135,8 +135,9 @@ class Script(Skill):
         for row, end in self.ends.items():
             status[row], reason[row] = end, "told to"
         self.ends = {}
-        stiffness = Impedance(np.eye(6))
-        return Command(observation.pose, np.zeros((self.n, 6)), stiffness, np.ones((self.n, 6)), status, reason)
+        pose, twist = observation.pose._replace(position=observation.pose.position + self.lead), np.zeros((self.n, 6))
+        twist[:, :3] = self.speed * DOWN
+        return Command(pose, twist, Impedance(np.eye(6)), np.ones((self.n, 6)), status, reason)
 
 
 def known(monkeypatch, **kinds):
@@ -275,6 +276,17 @@ def test_what_falls_in_is_braked_along_the_way_beyond_the_speed_of_the_catch():
         np.testing.assert_allclose(
             played.go().feedforward[:, :3], np.tile(np.ones(3) - brake * DOWN, (3, 1)), atol=1e-9
         )
+
+
+def test_a_part_that_nothing_stops_is_pushed_less_and_less_before_the_end_and_not_beyond_it():
+    played = Played(stop_m=0.001)
+    for deep, share in ((-0.002, 1.0), (-0.001, 1.0), (-0.0004, 0.4), (0.0, 0.0), (0.001, 0.0)):
+        played.deep[:] = deep
+        played.push.lead, played.push.speed = np.array([0.001, 0.0, -0.010]), 0.02
+        command = played.go()
+        lead = command.pose.position - played.seen().pose.position
+        np.testing.assert_allclose(lead, np.tile((0.001, 0.0, -0.010 * share), (3, 1)), atol=1e-9)
+        np.testing.assert_allclose(command.twist[:, 2], -0.02 * share, atol=1e-9)
 
 
 def test_what_lies_down_is_pulled_upright_with_more_beyond_the_stated_tilt():

@@ -1,8 +1,10 @@
 """Where the way of a seating begins, by paths of a tip that are drawn by hand, and pushes that have none."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from skillframe_search.example import seated
 from skillframe_search.seat_learner import _way_begins
 from skillframe_search.seat_words import NOWHERE, describe, goes_nowhere
@@ -41,6 +43,53 @@ def test_where_it_rests_as_soon_as_it_touches_the_way_is_the_one_that_it_came():
     bottom = tip_path((0.0, 0.0, 0.006), (0.0, 0.0, 0.001), (0.0, 0.0, 0.0))
     np.testing.assert_array_equal(_way_begins(bottom, 100, 0.002), bottom[0])
     np.testing.assert_array_equal(_way_begins(bottom, 100), bottom[100])
+
+
+def resting(high_m, *forces):
+    """A made-up demonstration that ends higher, and rests there for 0.3 s with each of these pushes [N]."""
+    one = seated(0.0)
+    rests = one.time[-1] + np.arange(1, 60 * len(forces) + 1) * np.median(np.diff(one.time))
+    wrench = np.random.default_rng(2).standard_normal((len(rests), 6)) * np.repeat([0.05, 0.002], 3)
+    wrench[:, 2] += np.repeat(forces, 60)
+    stays = [np.repeat(values[-1:], len(rests), axis=0) for values in (one.position, one.quaternion)]
+    return replace(
+        one, time=np.concatenate([one.time, rests]), wrench=np.concatenate([one.wrench, wrench]),
+        position=np.concatenate([one.position, stays[0]]) + np.array([0.0, 0.0, high_m]),
+        quaternion=np.concatenate([one.quaternion, stays[1]]),
+    )  # fmt: skip
+
+
+def learned_of(*demonstrations, **settings):
+    return learned(registry().skill("seat"), demonstrations, LearnOptions(settings=settings))
+
+
+def end_of(*demonstrations, **settings):
+    """The block `seat`, and how high its end is [mm]."""
+    seat = learned_of(*demonstrations, **settings)["seat"]
+    return seat, 1e3 * (seat["end"][2] - 0.2)
+
+
+def test_the_end_is_that_of_the_demonstration_that_went_deepest():
+    seat, height = end_of(resting(0.0, 10.0), resting(0.0004, 10.0))
+    assert height == pytest.approx(0.0, abs=0.05) and seat["stop_m"] == 0.0
+    assert seat["contact_m"] == pytest.approx(
+        0.0122, abs=4e-4
+    )  # over the deeper end: contact began at 12.0 and 12.4 mm
+    _, height = end_of(resting(0.0, 10.0), resting(0.0004, 10.0), place="start")  # both went as far: neither is short
+    assert height == pytest.approx(0.2, abs=0.05)
+
+
+def test_where_all_rest_without_pressing_nothing_stops_the_part_and_the_end_is_their_mean():
+    seat, height = end_of(resting(0.0, 1.0), resting(0.0004, 1.0))
+    assert height == pytest.approx(0.2, abs=0.05) and seat["stop_m"] > 0.0
+    assert any(line.startswith("stop:") for line in describe(learned_of(resting(0.0, 1.0))))
+    assert not any(line.startswith("stop:") for line in describe(learned_of(resting(0.0, 10.0))))
+
+
+def test_who_lets_go_at_a_bottom_has_pressed_on_it_before():
+    assert end_of(resting(0.0, 10.0, 0.0))[0]["stop_m"] == 0.0
+    assert end_of(resting(0.0, 1.0), resting(0.0, 10.0))[0]["stop_m"] == 0.0
+    assert end_of(seated(0.0))[0]["stop_m"] == 0.0  # cut off while it went on: it rests nowhere
 
 
 def test_a_seating_says_where_its_push_has_no_direction():

@@ -3,8 +3,8 @@ r"""Drawing a part that rests at its depth back over the nominal axis, as far as
     x_d = x_0 + u e,    0 <= u <= |a|,    e = - a / |a|,  a: from the nominal axis to the tool, across the way
 
 A search leaves a part wherever it sank. Walls hold it there, or nothing does: in a slot that is open at an end the
-depth tells nothing of the place along it, and the demonstrated place is the best guess. It presses lightly and has done
-what it can where it arrives, or where more than a stated force holds it (all ours).
+depth tells nothing of the place along it, and the demonstrated place is the best guess. It presses lightly, where there
+is a bottom, and has done what it can where it arrives, or where more than a stated force holds it (all ours).
 """
 
 from __future__ import annotations
@@ -29,11 +29,12 @@ class Centre(Skill):
         ends: (N, 3) a point of the axis in base [m].
         way: (3,) unit vector along it, the way in.
         most_n: held with more than this, it ends [N].
+        pressed: against a bottom; else its height is held.
     """
 
-    def __init__(self, ends: Float, way: Float, most_n: float) -> None:
-        self._ends, self._way, self._most = ends, way, most_n
-        across = np.eye(3) - np.outer(way, way)
+    def __init__(self, ends: Float, way: Float, most_n: float, pressed: bool = True) -> None:
+        self._ends, self._way, self._most, self._pressed = ends, way, most_n, pressed
+        across = np.eye(3) - pressed * np.outer(way, way)
         self._stiffness = np.zeros((6, 6))
         self._stiffness[:3, :3], self._stiffness[3:, 3:] = ACROSS * across, TURN * np.eye(3)
 
@@ -52,7 +53,7 @@ class Centre(Skill):
         self, rows: NDArray[np.intp], observation: Observation, rngs: Sequence[np.random.Generator]
     ) -> None:  # fmt: skip
         """Start again in some trials, from where their tools are now."""
-        fresh = Centre(self._ends[rows], self._way, self._most)
+        fresh = Centre(self._ends[rows], self._way, self._most, self._pressed)
         fresh.start(rows_of(observation, rows), rngs)
         for name in ROWS:
             getattr(self, name)[rows] = getattr(fresh, name)
@@ -67,7 +68,7 @@ class Centre(Skill):
         for i in np.flatnonzero(done & (self._status == Status.RUNNING)).tolist():
             self._status[i], self._reason[i] = Status.SUCCESS, self._told(observation, i)
         wrench = np.zeros((len(gone), 6))
-        wrench[:, :3] = PRESS_N * self._way
+        wrench[:, :3] = PRESS_N * self._pressed * self._way
         place = self._home.position + np.minimum(gone, self._length)[:, None] * self._back
         pose = Pose(place, self._home.rotation)
         zero = np.zeros((len(gone), 6))

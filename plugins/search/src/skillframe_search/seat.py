@@ -14,8 +14,9 @@ What is added to the push is a wrench F at the centre of compliance, u the way, 
     lean       - k_0 rho - k_1 max(0, |rho| - tilt) rho/|rho|    so that it does not lie down; k_0 on the rim only
     rock       m (a cos wt + b sin wt),  a, b across u           in the hole, where it rests short of the end
 
-In the hole the attitude wanted follows the measured one, low-passed and never farther from the nominal one than the
-stated tilt: the hole knows better. All of this is ours. Searches and returns are counted together.
+Where the demonstrations ended without pressing, nothing stops the part: lead and speed of the push along u fade over
+the last `stop_m`. In the hole the attitude wanted follows the measured one, low-passed and never farther from the
+nominal one than the stated tilt: the hole knows better. All of this is ours. Searches and returns are counted together.
 """
 
 from __future__ import annotations
@@ -75,7 +76,10 @@ class Seating(Composition):
         self._end, self._start = (np.array(place) + self._upright @ shift for place in (seat.end, seat.start))
         self._axes = surface_axes(self._way)
         parts = [Part("approach", self._reach), Part("push", push), Part("search", search)]
-        super().__init__([*parts, Part("centre", lambda: Centre(self._ends, self._way, seat.centre_n))])
+        super().__init__([*parts, Part("centre", self._centre)])
+
+    def _centre(self) -> Skill:
+        return Centre(self._ends, self._way, self._seat.centre_n, pressed=not self._seat.stop_m)
 
     def _reach(self) -> Skill:
         seat, above = self._seat, -self._seat.above_m * self._way
@@ -106,7 +110,7 @@ class Seating(Composition):
             np.where(moved, self._deep, self._best),
             np.where(moved, observation.time, self._since),
         )
-        command = self._followed(observation, super().step(observation))
+        command = self._stopped(observation, self._followed(observation, super().step(observation)))
         self._look(observation, command.status == RUNNING)
         if np.count_nonzero(self._status):
             told = np.where(self._status == RUNNING, "", self._reason)
@@ -227,6 +231,18 @@ class Seating(Composition):
         """Who has been searched for, or has gone beyond the first contact and stalled there."""
         result: NDArray[np.bool_] = self._searched | self._urged
         return result
+
+    def _stopped(self, observation: Observation, command: Command) -> Command:
+        """The command, its push along the way fading before the end where nothing else stops the part."""
+        if not self._seat.stop_m:
+            return command
+        share = np.clip(-self._deep / self._seat.stop_m, 0.0, 1.0)
+        gone = np.where(self.current == PUSHING, 1.0 - share, 0.0)
+        position, twist = command.pose.position.copy(), command.twist.copy()
+        lead = np.maximum(_dot(position - observation.pose.position, self._way), 0.0)
+        position -= (gone * lead)[:, None] * self._way
+        twist[:, :3] -= (gone * np.maximum(_dot(twist[:, :3], self._way), 0.0))[:, None] * self._way
+        return command._replace(pose=Pose(position, command.pose.rotation), twist=twist)
 
     def _added(self, observation: Observation) -> Float:
         """(N, 6) the wrench that is added to the push: catch, lean and rock."""

@@ -42,6 +42,7 @@ class Seat:
         centre_n, aside_m: at rest near the end, but farther than aside_m from the nominal axis, it is drawn back until
             more than centre_n holds it; 0 does not.
         sunk_m: deeper than the stall by this is in the hole, beside what the tilt makes of the way across.
+        stop_m: the push fades over so much before the end, where nothing else stops the part; 0: the part is stopped.
         catch_m_s, catch_ns_m: faster along the way than this is braked, with this damping.
         upright_nm_rad: pulls upright until a search is over; lean_nm_rad: always, beyond `tilt_rad`.
         follow_s: in the hole the attitude wanted follows the measured one within this; 0 does not.
@@ -72,6 +73,7 @@ class Seat:
     centre_n: float = 8.0
     aside_m: float = 0.001
     sunk_m: float = 0.0008
+    stop_m: float = 0.0
     catch_m_s: float = 0.03
     catch_ns_m: float = 400.0
     upright_nm_rad: float = 3.0

@@ -2,11 +2,13 @@
 
 The push is learned from what each demonstration shows from shortly before its first contact on. From the demonstrations
 come the push (at --at), and at the tool's tip the way (from the first contact to the end), the end with its attitude,
-and the height of the first contact. Loose parts touch only near the end, and how they slide there is not the way: where
-the tip came straight from more than twice as far, and more than 30 degrees otherwise than it went in contact, the way
-is that straight and begins with it. So it is where they touch within `LEAST_M` of the end and rest there, as at the
-bottom of a shallow hole that is wide (our choices). From the user comes how far off the fixture may be. The rest is by
-hand. The search is as wide as the mouth can be off its place, both ways at once (our choice):
+and the height of the first contact. The end is as deep as the deepest, since who ends higher stopped short of the
+bottom; where all ended without pressing there is none, and it is the mean. Loose parts touch only near the end, and how
+they slide there is not the way: where the tip came straight from more than twice as far, and more than 30 degrees
+otherwise than it went in contact, the way is that straight and begins with it. So it is where they touch within
+`LEAST_M` of the end and rest there, as at the bottom of a shallow hole that is wide (our choices). From the user comes
+how far off the fixture may be. The rest is by hand. The search is as wide as the mouth can be off its place, both ways
+at once (our choice):
 
     radius = sqrt(2) (shift + tilt * height of the first contact)
 """
@@ -40,6 +42,10 @@ RESTED_S, RESTED_M = 0.1, 0.0005  # where that is shorter: it stood at the end, 
 STRAIGHT = 0.15  # of its length that a straight way is off its line, at most
 SLID = np.cos(radians(30.0))  # between that way and the one in contact; more is no insertion
 _LOOKED_AT = 200  # samples before the contact
+FREE_N, STOP_M = 2.5, 0.001
+"""Demonstrations that all rest at their ends with less show a part that nothing stops; it is stopped over so much."""
+PRESSED_S, SAME_M, RESTING_M_S = 0.1, 3e-4, 1e-3
+"""For how long, how near their ends, and how slowly that is [s, m, m/s] (ours)."""
 ABOVE_M, MOST_ABOVE_M = 0.002, 0.005  # over the first contact, and at most where demonstrations began higher
 PREFIX = "search_"
 
@@ -81,12 +87,22 @@ class SeatSettings:
 
 
 class _Shown(NamedTuple):
-    """What one demonstration shows of the place, in base: three points of its way [m], and the attitude at its end."""
+    """What one demonstration shows of the place, in base.
+
+    Attributes:
+        start, contact, end: three points (3,) of its way [m].
+        attitude: (3, 3) at its end.
+        time, position, force: (T,), (T, 3), (T, 3) of the point, and of what the tool exerts on the parts [s, m, N].
+        part: from shortly before its contact on.
+    """
 
     start: Float
     contact: Float
     end: Float
     attitude: Float
+    time: Float
+    position: Float
+    force: Float
     part: Demonstration
 
 
@@ -107,7 +123,7 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     push = registry().skill(settings.skill)
     if push.learn is None:
         raise InputError(f"--skill {push.name}", "is not learned from demonstrations", "name one that is, such as lmc")
-    body = push.learn([each.part for each in shown], replace(options, settings=own))
+    body = push.learn([_pushed(each, seat) for each in shown], replace(options, settings=own))
     at_point = with_center({"frame": {**body["frame"], "learned_at": point.tolist()}}, point.tolist())
     stalled = Stalled(
         way=seat.way, radius=sqrt(2.0) * (seat.shift_m + seat.tilt_rad * seat.contact_m), tilt=seat.tilt_rad,
@@ -159,8 +175,25 @@ def _shown(demonstration: Demonstration, point: Float) -> _Shown:
     last = position[demonstration.time >= max(began, contacts[-1][1] - RESTED_S)]
     rested = contacts[-1][1] - began >= RESTED_S and float(norm(last[0] - last[-1])) < RESTED_M
     brief = LEAST_M if rested else 0.0
-    return _Shown(position[0], _way_begins(position, first, brief), position[-1], pose.rotation[-1],
-                  demonstration.between(began - BEFORE_S, None))  # fmt: skip
+    return _Shown(
+        position[0], _way_begins(position, first, brief), position[-1], pose.rotation[-1], demonstration.time, position,
+        -demonstration.wrench[:, :3], demonstration.between(began - BEFORE_S, None),
+    )  # fmt: skip
+
+
+def _pressed_at_end(shown: _Shown, way: Float) -> float:
+    """The largest mean force [N] along the way over `PRESSED_S` for which the tool rested at the end; inf: it did not.
+
+    Who lets go at a bottom has pressed on it before.
+    """
+    window = max(1, round(PRESSED_S / float(np.median(np.diff(shown.time)))))
+    if window >= len(shown.time):
+        return np.inf
+    along, force = shown.position @ way, np.cumsum(np.concatenate([[0.0], shown.force @ way]))
+    moved = np.abs(along[window:] - along[:-window])
+    there = (along[window:] > along[-1] - SAME_M) & (moved < RESTING_M_S * PRESSED_S)
+    mean = (force[window:] - force[:-window])[1:] / window
+    return float(mean[there].max()) if there.any() else np.inf
 
 
 def _way_begins(position: Float, first: int, brief: float = 0.0) -> Float:
@@ -182,6 +215,14 @@ def _way_begins(position: Float, first: int, brief: float = 0.0) -> Float:
     return np.asarray(position[first])
 
 
+def _pushed(shown: _Shown, seat: Seat) -> Demonstration:
+    """What shows the push: all from the contact on, or where nothing stops the part, until it is at its end."""
+    if not seat.stop_m:
+        return shown.part
+    along = shown.position @ np.array(seat.way)
+    return shown.part.between(None, float(shown.time[np.argmax(along > along[-1] - SAME_M)]))
+
+
 def _seat(shown: Sequence[_Shown], point: Float, settings: SeatSettings) -> Seat:
     start, contact, end = (
         np.mean(each, axis=0) for each in ([s.start for s in shown], [s.contact for s in shown], [s.end for s in shown])
@@ -193,6 +234,11 @@ def _seat(shown: Sequence[_Shown], point: Float, settings: SeatSettings) -> Seat
             "record until the part is seated, and begin before it touches",
         )  # fmt: skip
     way = unit(end - contact)
+    free = all(_pressed_at_end(each, way) < FREE_N for each in shown)
+    if not free:  # nobody goes deeper than the bottom, and some stop short of it
+        moved = settings.place == "start"
+        further = max(float((each.end - end - (each.start - start) * moved) @ way) for each in shown)
+        end, depth = end + further * way, depth + further
     left, _, right = np.linalg.svd(np.sum([each.attitude for each in shown], axis=0))
     attitude = rotation_vector(left @ right)  # the mean of rotations
     above = float(np.clip((end - start) @ way, depth + ABOVE_M, depth + MOST_ABOVE_M))
@@ -200,7 +246,7 @@ def _seat(shown: Sequence[_Shown], point: Float, settings: SeatSettings) -> Seat
         way=_vector(way), point=_vector(point), end=_vector(end), start=_vector(start), attitude=_vector(attitude),
         contact_m=depth, above_m=above, place=settings.place, shift_m=settings.shift, tilt_rad=settings.tilt,
         height_m=settings.height, friction=settings.friction, approach=settings.approach, search=settings.search,
-        tries=settings.tries,
+        stop_m=STOP_M if free else 0.0, tries=settings.tries,
     )  # fmt: skip
 
 

@@ -46,6 +46,7 @@ def _parts(seat: Seat, nowhere: bool) -> list[str]:
         *([search] if seat.search else []),
         f"catch: brakes above {1e3 * seat.catch_m_s:.3g} mm/s along the way with {seat.catch_ns_m:g} Ns/m; adds that a "
         "part that lets go does not hit the bottom",
+        *([_stop(seat)] if seat.stop_m else []),
         f"lean: pulls upright with {seat.upright_nm_rad:g} Nm/rad on the rim, and with {seat.lean_nm_rad:g} beyond "
         f"{degrees(seat.tilt_rad):.1f} degrees; adds that the part does not lie down on the rim",
         f"follow: in the hole the attitude wanted follows the measured one within {seat.follow_s:g} s, by that tilt at "
@@ -56,6 +57,13 @@ def _parts(seat: Seat, nowhere: bool) -> list[str]:
         f"{seat.centre_n:g} N hold it; adds that a part in a slot that is open at an end is where it was shown",
         f"lost: more than {1e3 * (seat.lost_m + seat.height_m):.1f} mm past the end is beside the hole: it returns",
     ]
+
+
+def _stop(seat: Seat) -> str:
+    return (
+        f"stop: the demonstrations ended without pressing, so the push fades over the last {1e3 * seat.stop_m:g} mm; "
+        "adds that a part that nothing stops stands where it was shown"
+    )
 
 
 def _sources(seat: Seat) -> list[str]:
