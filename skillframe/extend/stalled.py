@@ -27,6 +27,7 @@ class Stalled:
     Attributes:
         way: (3,) unit vector along which the other skill goes on, in base axes.
         radius: distance from the nominal axis within which the way on is [m].
+        near: distance within which it likely is [m]; None: no part of that is likelier.
         tilt: angle within which the fixture's attitude is [rad].
         friction: between tool and fixture, as stated.
         frame: the `frame` block of the document that the body will stand in.
@@ -41,3 +42,4 @@ class Stalled:
     frame: Document
     options: LearnOptions
     blind: Sequence[Demonstration] = field(default_factory=tuple)
+    near: float | None = None

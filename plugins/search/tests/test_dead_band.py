@@ -119,3 +119,13 @@ def test_a_dither_turns_in_the_surface_and_about_its_normal():
     np.testing.assert_allclose(np.linalg.norm(torque[:, 1:], axis=1), 0.2)
     np.testing.assert_allclose(torque[0], torque[20], atol=1e-12)  # 0.4 s is a whole number of turns of both
     assert np.abs(torque[:, 0]).max() == pytest.approx(0.3, rel=0.1)  # sampled every 20 ms
+
+
+def test_what_is_likelier_is_searched_out_and_in_first_and_then_all_of_it_from_the_middle():
+    plain = there_and_back(6e-4, 0.005, 0.04, 0.5, 3, 1e-3)
+    both = there_and_back(6e-4, 0.005, 0.04, 0.5, 3, 1e-3, inner=0.0025)
+    near = there_and_back(6e-4, 0.0025, 0.04, 0.5, 2, 1e-3)
+    np.testing.assert_array_equal(both[: len(near)], near)
+    np.testing.assert_array_equal(both[len(near) :], plain[1:])
+    middle = np.hypot(*near[-1])
+    assert middle < 1e-4 and np.hypot(*np.diff(both, axis=0).T).max() < 1.01 * 0.04 * 1e-3 + middle  # and on from there

@@ -58,12 +58,15 @@ def test_the_push_is_learned_from_the_contact_and_not_from_the_free_air_before_i
 
 def test_the_search_is_as_wide_as_the_user_is_unsure_and_wider_by_the_dead_band():
     """The mouth is off by the shift both ways, and by the tilt times the height of the first contact."""
-    for shift, tilt, friction in ((0.002, radians(5.0), 0.5), (0.001, radians(2.0), 0.2)):
+    for shift, tilt, friction in ((0.002, radians(5.0), 0.5), (0.001, radians(2.0), 0.2), (0.001, radians(5.0), 0.2)):
         found = document(shift=shift, tilt=tilt, friction=friction)
         search = read_phase(part_of(found, seat_document.SEARCH))
         height = read_seat(found).contact_m
         assert search.path.radius == pytest.approx(sqrt(2.0) * (shift + tilt * height) + friction * 4.0 / 4000.0)
         assert search.stop.drop_m > 2.0 * search.path.radius * tan(tilt)  # no slope is a hole
+        likely, held = sqrt(2.0) * shift, friction * 4.0 / 4000.0  # where the mouth is however high the tilt turns it
+        inner = 0.0 if likely > 0.8 * (search.path.radius - held) else likely + held
+        assert search.path.inner == pytest.approx(inner)
 
 
 def test_a_search_is_learned_where_somebody_searched_blindfolded(tmp_path):

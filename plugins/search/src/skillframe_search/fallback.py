@@ -26,6 +26,7 @@ PITCH_M, SPEED, ACCELERATION, PASSES = 6e-4, 0.04, 1.0, 3
 ROTATION, TURN = 3.0, 5.0  # Nm/rad: soft enough for the dither to rock it by 4 degrees
 DITHER = Dither(tilt_nm=0.2, tilt_hz=4.0, turn_nm=0.3, turn_hz=3.0)
 STOP = {"touch_n": 1.5, "approach_speed": 0.01, "lost_share": 0.5, "force_limit_n": 60.0}
+INNER = 0.8  # where the likely part is not smaller than this of the whole, it is not searched first
 DROP_M = 8e-4  # beside what a tilted surface falls from one side of the spiral to the other
 
 
@@ -44,11 +45,13 @@ def strategy(stalled: Stalled, kind: str) -> Document:
         )  # fmt: skip
     gains = Gains(PUSH_N, STIFFEST)
     held = dead_band(stalled.friction, gains)
+    near = stalled.radius if stalled.near is None else stalled.near
+    inner = near + held if near < INNER * stalled.radius else 0.0
     path = Path(
         kind="spiral", speed=SPEED, acceleration=ACCELERATION, pitch=PITCH_M, layers=(0.0,), step=0.004,
-        reach=0.02, radius=stalled.radius + held, passes=PASSES,
+        reach=0.02, radius=stalled.radius + held, passes=PASSES, inner=inner,
     )  # fmt: skip
-    way = there_and_back(path.pitch, path.radius, path.speed, path.acceleration, path.passes, STEP_S)
+    way = there_and_back(path.pitch, path.radius, path.speed, path.acceleration, path.passes, STEP_S, path.inner)
     drop = DROP_M + 2.0 * path.radius * tan(stalled.tilt)
     phase = Phase(
         push=Push(direction=stalled.way, force=gains.push), searched=("across_1", "across_2"), exploration=None,

@@ -36,6 +36,7 @@ class Path:
         step, reach: of the random walk [m].
         radius: at which the spiral turns back [m]; 0 goes on outwards until time is up.
         passes: of a spiral with a radius: each further one goes the other way, finer and slower.
+        inner: radius within which it goes out and in again before that, because the hole is likelier there [m].
     """
 
     kind: Kind
@@ -47,6 +48,7 @@ class Path:
     reach: float
     radius: float = 0.0
     passes: int = 1
+    inner: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

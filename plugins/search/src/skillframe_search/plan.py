@@ -89,7 +89,9 @@ def _motion(phase: Phase, rng: np.random.Generator) -> tuple[Motion, Float]:
     if path.kind != "spiral" or not path.radius:
         places, scale = _places(phase, rng)
         return smoothed(places, path.speed, path.acceleration, time), scale
-    flat = there_and_back(path.pitch, path.radius, path.speed, path.acceleration, path.passes, STEP_S)
+    flat = there_and_back(
+        path.pitch, path.radius, path.speed, path.acceleration, path.passes, STEP_S, path.inner
+    )  # fmt: skip
     flat = flat[: round(time / STEP_S) + 1]
     place = np.concatenate([flat, np.zeros((len(flat), len(phase.searched) - 2))], axis=1)
     rate = np.concatenate([np.diff(place, axis=0) / STEP_S, np.zeros((1, place.shape[1]))])

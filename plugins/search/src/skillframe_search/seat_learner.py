@@ -127,6 +127,7 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     at_point = with_center({"frame": {**body["frame"], "learned_at": point.tolist()}}, point.tolist())
     stalled = Stalled(
         way=seat.way, radius=sqrt(2.0) * (seat.shift_m + seat.tilt_rad * seat.contact_m), tilt=seat.tilt_rad,
+        near=sqrt(2.0) * seat.shift_m,
         friction=seat.friction, frame=at_point["frame"],
         options=replace(options, at=",".join(map(str, point.tolist())), settings=searching),
         blind=[read_demonstration(Path(file)) for file in settings.blind],

@@ -19,6 +19,7 @@ from skillframe.frames import Float, norm, unit
 
 FINE = 2e-4  # m between the spiral's points
 FINER, SLOWER = 0.6, 0.8  # of pitch and speed, each further pass
+INNER_PASSES = 2  # so that the wide ones begin in the middle again
 
 
 def spiral(dimensions: int, pitch: float, length: float, layers: Sequence[float] = (0.0,)) -> Float:
@@ -37,12 +38,18 @@ def spiral(dimensions: int, pitch: float, length: float, layers: Sequence[float]
     return np.concatenate([np.zeros((1, dimensions)), *parts])
 
 
-def there_and_back(pitch: float, radius: float, speed: float, acceleration: float, passes: int, step: float) -> Float:
-    """(n, 2) places [m] every `step` seconds: a spiral out to a radius, and finer ones in and out again."""
+def there_and_back(
+    pitch: float, radius: float, speed: float, acceleration: float, passes: int, step: float, inner: float = 0.0
+) -> Float:
+    """(n, 2) places [m] every `step` seconds: a spiral out to a radius, and finer ones in and out again.
+
+    Before that, if `inner` is not 0, out and in again within that radius.
+    """
     parts = [np.zeros((1, 2))]
-    for k in range(passes):
-        way = _outwards(pitch * FINER**k, radius, speed * SLOWER**k, acceleration, step)
-        parts.append(way if k % 2 == 0 else way[::-1] @ _turned(way[-1], parts[-1][-1]))
+    for reach, count in ((inner, INNER_PASSES if inner else 0), (radius, passes)):
+        for k in range(count):
+            way = _outwards(pitch * FINER**k, reach, speed * SLOWER**k, acceleration, step)
+            parts.append(way if k % 2 == 0 else way[::-1] @ _turned(way[-1], parts[-1][-1]))
     return np.concatenate(parts)
 
 
