@@ -67,12 +67,15 @@ class LearnOptions:
         hand: where torque work is taken; None for the demonstration's own `hand`, else the learning point.
         axes: "base", or "phase_start": the tool's attitude at the start of the phase.
         settings: the learner's own settings by name, checked by the learner.
+        toward: (3,) where the part is to go, in `axes`, if that is known: a learner that finds no direction to push in
+            may take it, and says so.
     """
 
     at: str | None = None
     hand: str | None = None
     axes: str = "base"
     settings: Mapping[str, Any] = field(default_factory=dict)
+    toward: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

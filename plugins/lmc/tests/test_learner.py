@@ -137,6 +137,19 @@ def test_levering_makes_translation_fully_compliant_and_keeps_the_turn() -> None
     assert degrees_between(turn["desired_direction"], [0.0, 1.0, 0.0]) <= GRID
 
 
+def test_who_is_told_where_the_part_is_to_go_pushes_there_if_no_push_was_shown_and_says_so() -> None:
+    move = translation([syn.levering(syn.Recipe(noise_m=5e-5, noise_n=0.3))], toward=(0.0, 0.0, -2.0))
+    assert move["desired_direction"] == DOWN.tolist() and move["speed"] > 0.0 and not move["fully_compliant"]
+    assert np.allclose(np.array(move["compliant_axes"]) @ DOWN, 0.0, atol=1e-9)  # gives way across it alone
+    assert "not learned, because the environment did" in move["evidence"]["message"]
+    assert move["evidence"]["pyramid_angle_rad"] is None
+
+
+def test_who_is_told_where_the_part_is_to_go_keeps_the_push_that_was_shown() -> None:
+    shown = syn.pair_of_alignments(syn.Recipe(noise_m=5e-5, noise_n=0.3))
+    assert phase(shown, toward=(0.0, 1.0, 0.0)) == phase(shown)
+
+
 def test_turning_upright_from_both_sides_has_no_direction_but_one_axis() -> None:
     found = phase(syn.pair_of_alignments(syn.Recipe(noise_m=5e-5, noise_n=0.3)))
     move, turn = found["translation"], found["rotation"]

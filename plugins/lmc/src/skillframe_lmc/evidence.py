@@ -30,7 +30,7 @@ ONE_WAY, CONTRADICTS = radians(10.0), radians(20.0)  # mean ways this near each 
 
 def as_document(part: Learned, settings: Settings) -> dict[str, Any]:
     """The evidence of one part as plain JSON values."""
-    choice, done = part.choice, part.work
+    choice, done = part.choice if part.told is None else None, part.work
     open_direction = is_ambiguous(part)
     return {
         "held": part.held,
@@ -63,6 +63,9 @@ def is_ambiguous(part: Learned) -> bool:
 def _message(part: Learned, settings: Settings, open_direction: bool) -> str:
     if part.held:
         return _held_message(part, settings)
+    if part.told is not None:
+        why = _untold(part, settings)
+        return f"doubtful: the push is that along the way that was given, and not learned, because {why}"
     share = f"the environment did {100.0 * _fraction(part):.0f} % of the work"
     if part.fully_compliant:
         return f"{share}, so it is left free in all directions"
@@ -70,6 +73,13 @@ def _message(part: Learned, settings: Settings, open_direction: bool) -> str:
         share += ", no more than chance makes of even shares, so it is not left free in all directions"
         return "; ".join(filter(None, [share, _direction_message(part, settings, open_direction)]))
     return _direction_message(part, settings, open_direction)
+
+
+def _untold(part: Learned, settings: Settings) -> str:
+    """Why what was shown gives no push."""
+    if part.work is not None and part.work.environment_drove:
+        return f"the environment did {100.0 * _fraction(part):.0f} % of the work"
+    return _direction_message(part, settings, open_direction=False)
 
 
 def _press_message(part: Learned) -> str:

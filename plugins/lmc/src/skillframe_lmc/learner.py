@@ -6,6 +6,7 @@ First the pitch, then for translation and rotation alike
     who moved it?      W = F_m . dx, or T_m . dbeta at the hand                     (3)        [work]
                        the environment, if W > 0 prevails: three compliant degrees of freedom
     where to push?     intersection of the pyramids; may not exist      [sectors, directions, heading, modes, votes]
+                       then where it was told that the part is to go
                        its middle, where faces of one side were passed  [expected]
     where to give?     where faces turned the push aside; where none did, or the tool turned,
                        principal axes of the motion that the push does not explain              [faces, axes]
@@ -64,6 +65,7 @@ class Learned:
         means: (n, 3) mean directions, a row for each that moved.
         speed: mean demonstrated speed, without the pauses [m/s or rad/s].
         pressed: the standing force of each demonstration, where it decided; empty where the motion did.
+        told: (3,) direction that was given from outside and taken, because the demonstrations show none.
     """
 
     name: Name
@@ -76,6 +78,7 @@ class Learned:
     means: Float
     speed: float
     pressed: Sequence[Press] = ()
+    told: Float | None = None
 
     @property
     def held(self) -> bool:
@@ -84,13 +87,13 @@ class Learned:
 
     @property
     def fully_compliant(self) -> bool:
-        """The environment moved it."""
-        return self.work is not None and self.work.environment_drove
+        """The environment moved it, and nobody told where to push."""
+        return self.told is None and self.work is not None and self.work.environment_drove
 
     @property
     def direction(self) -> Float | None:
         """The desired direction, if it exists."""
-        return None if self.choice is None else self.choice.direction
+        return self.told if self.choice is None or self.choice.direction is None else self.choice.direction
 
 
 def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
@@ -105,7 +108,8 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     at, hand = np.array(frame["learned_at"]), np.array(frame["work_at"])
     tracks = [intervals.track(d, at, hand, options.axes) for d in demonstrations]
     rotation = _learn_part("rotation", tracks, intervals.rotation, settings)
-    translation = _learn_part("translation", tracks, intervals.translation, settings, turned=not rotation.held)
+    toward = None if options.toward is None else unit(np.array(options.toward))
+    translation = _learn_part("translation", tracks, intervals.translation, settings, not rotation.held, toward)
     return {
         "frame": frame,
         "phases": [_phase(translation, rotation, settings)],
@@ -115,7 +119,7 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
 
 def _learn_part(
     name: Name, tracks: Sequence[Track], cut: Callable[[Track, Settings], Motion], settings: Settings,
-    turned: bool = True,
+    turned: bool = True, toward: Float | None = None,
 ) -> Learned:  # fmt: skip
     motions = [cut(blocks, settings) for blocks in tracks]
     if settings.contact_only:
@@ -132,8 +136,10 @@ def _learn_part(
     elif votes.choice is not None and votes.choice.direction is None and not turned:
         moving, votes = touched(name, moving, votes, settings)
     choice, means, axes = votes.choice, _means(moving), None
-    if done is not None and not done.environment_drove:
-        direction = None if choice is None else choice.direction
+    direction = None if choice is None else choice.direction
+    told = toward if done is not None and direction is None else None
+    if done is not None and (told is not None or not done.environment_drove):
+        direction = direction if told is None else told
         rows = np.concatenate([means, mean_pushes(votes.modes)]) if stood is None else stood.means(least)
         axes = compliant_axes(rows, direction, _straightness(name, moving, means, choice, settings))
         if settings.faces and direction is not None and stood is None and not turned:
@@ -141,7 +147,7 @@ def _learn_part(
     path, time = sum(m.path for m in moving), sum(m.duration for m in moving)
     return Learned(
         name=name, motions=motions, moving=moving, given=votes.given, work=done, choice=choice, axes=axes, means=means,
-        speed=path / time if time > 0.0 else 0.0, pressed=() if stood is None else stood.presses,
+        speed=path / time if time > 0.0 else 0.0, pressed=() if stood is None else stood.presses, told=told,
     )  # fmt: skip
 
 

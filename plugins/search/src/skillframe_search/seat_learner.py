@@ -123,7 +123,7 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     push = registry().skill(settings.skill)
     if push.learn is None:
         raise InputError(f"--skill {push.name}", "is not learned from demonstrations", "name one that is, such as lmc")
-    body = push.learn([_pushed(each, seat) for each in shown], replace(options, settings=own))
+    body = push.learn([_pushed(each, seat) for each in shown], replace(options, settings=own, toward=seat.way))
     at_point = with_center({"frame": {**body["frame"], "learned_at": point.tolist()}}, point.tolist())
     stalled = Stalled(
         way=seat.way, radius=sqrt(2.0) * (seat.shift_m + seat.tilt_rad * seat.contact_m), tilt=seat.tilt_rad,
