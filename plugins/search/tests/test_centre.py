@@ -77,6 +77,15 @@ def test_at_the_end_and_aside_it_is_drawn_back_once_and_then_done():
     assert rests(0.0015, centre_n=0.0)[1].status.all() and rests(0.0005)[1].status.all()
 
 
+def test_what_nothing_stops_is_not_pressed_while_it_is_drawn_back():
+    played = Played(stop_m=0.001)
+    played.go()
+    played.deep[:], played.aside[:] = 0.0, 0.0015
+    command = played.go(0.4)  # drawn back from 0.3 s on, for 0.08 + 0.1 s
+    assert (played.skill.current == CENTRING).all()
+    np.testing.assert_array_equal(command.feedforward, 0.0)
+
+
 def test_farther_aside_than_the_fixture_may_be_off_is_no_seat():
     played, _ = rests(0.02)
     played.go(SEAT.stall_s + 2.0)

@@ -9,6 +9,7 @@ from skillframe_search.example import seated
 from skillframe_search.seat_learner import _way_begins
 from skillframe_search.seat_words import NOWHERE, describe, goes_nowhere
 
+from plugins.search.tests.test_seat import known
 from skillframe.document.source import learned
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
@@ -72,9 +73,10 @@ def end_of(*demonstrations, **settings):
 def test_the_end_is_that_of_the_demonstration_that_went_deepest():
     seat, height = end_of(resting(0.0, 10.0), resting(0.0004, 10.0))
     assert height == pytest.approx(0.0, abs=0.05) and seat["stop_m"] == 0.0
+    alone = end_of(resting(0.0, 10.0))[0]["contact_m"]
     assert seat["contact_m"] == pytest.approx(
-        0.0122, abs=4e-4
-    )  # over the deeper end: contact began at 12.0 and 12.4 mm
+        alone + 0.0002, abs=5e-5
+    )  # the mean of both contacts, over the deeper end
     _, height = end_of(resting(0.0, 10.0), resting(0.0004, 10.0), place="start")  # both went as far: neither is short
     assert height == pytest.approx(0.2, abs=0.05)
 
@@ -84,6 +86,22 @@ def test_where_all_rest_without_pressing_nothing_stops_the_part_and_the_end_is_t
     assert height == pytest.approx(0.2, abs=0.05) and seat["stop_m"] > 0.0
     assert any(line.startswith("stop:") for line in describe(learned_of(resting(0.0, 1.0))))
     assert not any(line.startswith("stop:") for line in describe(learned_of(resting(0.0, 10.0))))
+
+
+def test_a_push_is_learned_until_the_part_is_at_its_end_where_nothing_stops_it(monkeypatch):
+    """0.3 s before the contact, 1.5 s of it down to within 0.3 mm of the end (0.04 s before it), 0.3 s of standing."""
+    seen, told = [], []
+    real = registry().skill("lmc")
+
+    def learn(given, options):
+        seen.append(round(given[0].duration, 1))
+        told.append(options.toward)
+        return real.learn(given, options)
+
+    known(monkeypatch, lmc=replace(real, learn=learn))
+    for force in (1.0, 10.0):
+        seat, _ = end_of(resting(0.0, force))
+    assert seen == [1.8, 2.1] and list(told[1]) == seat["way"]
 
 
 def test_who_lets_go_at_a_bottom_has_pressed_on_it_before():

@@ -14,7 +14,7 @@ from skillframe.robot.spec import load_robot
 from skillframe.world.placement import fixture_poses, start_configurations
 from skillframe.world.plant import Plant
 from skillframe.world.scene import State
-from tests.part_meshes import FILE, round_pair, write
+from tests.part_meshes import FILE, rod, round_pair, write
 
 BOX = '[[second]]\nname = "a"\nboxes = [{ size = [0.01, 0.02, 0.03], xyz = [0.04, 0.0, 0.05] }]\n'
 MASS = 2700.0 * 0.01 * 0.02 * 0.03
@@ -187,3 +187,17 @@ def test_a_second_part_that_cannot_be_used_is_refused_in_one_sentence(tmp_path, 
     with pytest.raises(InputError) as error:
         scene_with(tmp_path, "", text)
     assert said in str(error.value) and "\n" not in str(error.value)
+
+
+def test_only_where_no_second_part_may_stop_it_does_the_person_stop_a_part_by_hand(tmp_path):
+    pin, blind = round_pair()
+    through = blind - rod(5.2, -20.0, 0.0, outside=True)
+    scenes = [
+        make_scene(registry().world(str(write(tmp_path / name, pin, socket, FILE + second))), {})
+        for name, socket, second in (
+            ("open", through, ""),
+            ("two", through, BOX + 'joint = "slide"\n'),
+            ("blind", blind, ""),
+        )
+    ]
+    assert [scene.task.stop is not None for scene in scenes] == [True, False, False]

@@ -100,6 +100,10 @@ def test_a_person_stops_what_nothing_else_stops_and_pushes_no_more():
         place = place + speed * DT
     assert place[2] == pytest.approx(-0.02, abs=2e-4)  # the tip is 0.1 m below the hand
     assert norm(force) < 0.5 and norm(speed) < 1e-4
+    moving = seen._replace(twist=np.array([[0.01, 0.0, 0.02, 0.0, 0.0, 0.0]]))
+    np.testing.assert_allclose(teacher.step(moving).feedforward[0, :3], (0.0, 0.0, -600.0 * 0.02), atol=0.5)
+    above = observation(0)._replace(pose=Pose(np.array([[0.0, 0.0, 0.05]]), turned), twist=moving.twist)
+    np.testing.assert_array_equal(teacher.step(above).feedforward, 0.0)  # on the way there he is as soft as ever
 
 
 def test_what_is_led_sideways_relaxes_with_the_hand_s_time_constant():
