@@ -21,7 +21,7 @@ from skillframe.parts.fit import corners, lowest, nothing_stops
 from skillframe.parts.load import LoadedParts, PreparedPart, load
 from skillframe.parts.second import in_place, second_parts
 from skillframe.parts.solid import arrays_of
-from skillframe.world.scene import REACTION_S, Geom, Scene, State, Stop, Task, Tool, Vector
+from skillframe.world.scene import REACTION_S, Geom, HandStop, Scene, State, Task, Tool, Vector
 from skillframe.world.shapes import FIXTURE_COLOUR, TOOL_COLOUR, shaft
 from skillframe.world.worlds.common import TOOL_DOWN, insertion, tilt_of
 
@@ -105,7 +105,7 @@ def build_world(path: Path, params: PartsParams) -> Scene:
 
     stop = None
     if not (movers or fixed) and nothing_stops(found, loaded.file.fixture.table, loaded.file.task.seated.height):
-        stop = Stop((0.0, 0.0, loaded.file.tool.grip), (0.0, 0.0, -depth))
+        stop = HandStop((0.0, 0.0, loaded.file.tool.grip), (0.0, 0.0, -depth))
     x, y, z, w = quaternion_from_matrix(found.way.before @ matrix_from_quaternion(TOOL_DOWN)).tolist()
     return Scene(
         name=loaded.name,

@@ -167,7 +167,7 @@ class State(NamedTuple):
     second: Mapping[str, Float] = MappingProxyType({})
 
 
-class Stop(NamedTuple):
+class HandStop(NamedTuple):
     """Where a person stops a part that nothing else stops.
 
     Attributes:
@@ -208,7 +208,7 @@ class Task:
     starts: tuple[dict[str, float], ...] = ({},)
     done: Callable[[State], NDArray[np.bool_]] | None = None
     then: tuple[Task, ...] = ()
-    stop: Stop | None = None
+    stop: HandStop | None = None
     waits_s: float = 0.0
     held_s: float = 0.0
     believed: Vector = (0.004, 0.004, 0.0)

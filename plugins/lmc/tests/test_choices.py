@@ -4,13 +4,16 @@ import math
 
 import numpy as np
 import pytest
+import synthetic as syn
 from skillframe_lmc.axes import compliant_axes, straightness
 from skillframe_lmc.directions import choose
 from skillframe_lmc.heading import Heading, doubt
 from skillframe_lmc.intervals import Motion
+from skillframe_lmc.learner import learn
 from skillframe_lmc.sectors import Sectors, sectors
 from skillframe_lmc.settings import Settings
 
+from skillframe.extend.records import LearnOptions
 from skillframe.frames import Float
 
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -78,3 +81,8 @@ def test_of_a_turn_only_what_the_teacher_drove_and_what_was_free_has_a_sector() 
     motion = Motion(turned, torque, (turned * torque).sum(axis=1), 0.05, 0.5, 0.5, 1.0)
     assert list(sectors(motion, teacher_driven_only=True).contact) == [True, True, True, False]
     assert list(sectors(motion).contact) == [True, True, True, True, False]
+
+
+def test_who_is_told_where_the_part_is_to_go_keeps_the_push_that_was_shown() -> None:
+    shown = syn.pair_of_alignments(syn.Recipe(noise_m=5e-5, noise_n=0.3))
+    assert learn(shown, LearnOptions(toward=(0.0, 1.0, 0.0))) == learn(shown, LearnOptions())

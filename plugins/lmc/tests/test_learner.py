@@ -145,11 +145,6 @@ def test_who_is_told_where_the_part_is_to_go_pushes_there_if_no_push_was_shown_a
     assert move["evidence"]["pyramid_angle_rad"] is None
 
 
-def test_who_is_told_where_the_part_is_to_go_keeps_the_push_that_was_shown() -> None:
-    shown = syn.pair_of_alignments(syn.Recipe(noise_m=5e-5, noise_n=0.3))
-    assert phase(shown, toward=(0.0, 1.0, 0.0)) == phase(shown)
-
-
 def test_turning_upright_from_both_sides_has_no_direction_but_one_axis() -> None:
     found = phase(syn.pair_of_alignments(syn.Recipe(noise_m=5e-5, noise_n=0.3)))
     move, turn = found["translation"], found["rotation"]

@@ -281,17 +281,6 @@ def test_what_falls_in_is_braked_along_the_way_beyond_the_speed_of_the_catch():
         )
 
 
-def test_a_part_that_nothing_stops_is_pushed_less_and_less_before_the_end_and_not_beyond_it():
-    played = Played(stop_m=0.001)
-    for deep, share in ((-0.002, 1.0), (-0.001, 1.0), (-0.0004, 0.4), (0.0, 0.0), (0.001, 0.0)):
-        played.deep[:] = deep
-        played.push.lead, played.push.speed = np.array([0.001, 0.0, -0.010]), 0.02
-        command = played.go()
-        lead = command.pose.position - played.seen().pose.position
-        np.testing.assert_allclose(lead, np.tile((0.001, 0.0, -0.010 * share), (3, 1)), atol=1e-9)
-        np.testing.assert_allclose(command.twist[:, 2], -0.02 * share, atol=1e-9)
-
-
 def test_what_lies_down_is_pulled_upright_with_more_beyond_the_stated_tilt():
     played = Played()
     for angle in (0.05, 0.3):

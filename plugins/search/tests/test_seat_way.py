@@ -9,7 +9,7 @@ from skillframe_search.example import seated
 from skillframe_search.seat_learner import _way_begins
 from skillframe_search.seat_words import NOWHERE, describe, goes_nowhere
 
-from plugins.search.tests.test_seat import known
+from plugins.search.tests.test_seat import Played, known
 from skillframe.document.source import learned
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
@@ -102,6 +102,17 @@ def test_a_push_is_learned_until_the_part_is_at_its_end_where_nothing_stops_it(m
     for force in (1.0, 10.0):
         seat, _ = end_of(resting(0.0, force))
     assert seen == [1.8, 2.1] and list(told[1]) == seat["way"]
+
+
+def test_a_part_that_nothing_stops_is_pushed_less_and_less_before_the_end_and_not_beyond_it():
+    played = Played(stop_m=0.001)
+    for deep, share in ((-0.002, 1.0), (-0.001, 1.0), (-0.0004, 0.4), (0.0, 0.0), (0.001, 0.0)):
+        played.deep[:] = deep
+        played.push.lead, played.push.speed = np.array([0.001, 0.0, -0.010]), 0.02
+        command = played.go()
+        lead = command.pose.position - played.seen().pose.position
+        np.testing.assert_allclose(lead, np.tile((0.001, 0.0, -0.010 * share), (3, 1)), atol=1e-9)
+        np.testing.assert_allclose(command.twist[:, 2], -0.02 * share, atol=1e-9)
 
 
 def test_who_lets_go_at_a_bottom_has_pressed_on_it_before():

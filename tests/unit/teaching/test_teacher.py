@@ -6,7 +6,7 @@ from skillframe.frames import Pose, cross, matrix_from_quaternion, norm, rotatio
 from skillframe.skill import Observation
 from skillframe.teaching.sessions import _held, record
 from skillframe.teaching.teacher import AIM_TIME, HANDS, TREMOR_TIME, Teacher, TeacherSettings, firm
-from skillframe.world.scene import State, Stop, Task
+from skillframe.world.scene import HandStop, State, Task
 from tests.laws.runs import SILENT, generators, robot, scene
 
 DT = 1e-3
@@ -87,7 +87,7 @@ def test_who_holds_on_does_not_let_go_of_a_part_that_still_goes_in():
 
 def test_a_person_stops_what_nothing_else_stops_and_pushes_no_more():
     """In free air, led by a hand of 4 kg: it comes to rest within 0.2 mm of where it is to stop."""
-    task = Task(direction=(0.0, 0.0, -1.0), hand="aligning", stop=Stop((0.0, 0.0, 0.1), (0.0, 0.0, -0.12)))
+    task = Task(direction=(0.0, 0.0, -1.0), hand="aligning", stop=HandStop((0.0, 0.0, 0.1), (0.0, 0.0, -0.12)))
     teacher, seen = Teacher(task, fixture(1, (0.0, 0.0, 0.0)), STEADY), observation(0)
     teacher.start(seen, generators(1))
     place, speed, mass, turned = np.zeros(3), np.zeros(3), 4.0, np.diag([1.0, -1.0, -1.0])[None]

@@ -183,9 +183,9 @@ def _shown(demonstration: Demonstration, point: Float) -> _Shown:
 
 
 def _pressed_at_end(shown: _Shown, way: Float) -> float:
-    """The largest mean force [N] along the way over `PRESSED_S` for which the tool rested at the end; inf: it did not.
+    """The largest mean force [N] along the way over `PRESSED_S` in which the tool rested at the end.
 
-    Who lets go at a bottom has pressed on it before.
+    It is infinite where the tool never did. Who lets go at a bottom has pressed on it before.
     """
     window = max(1, round(PRESSED_S / float(np.median(np.diff(shown.time)))))
     if window >= len(shown.time):
