@@ -92,9 +92,9 @@ class People(Teacher):
         self._aim += -self._aim * (dt / AIM_TIME) + self._level * np.sqrt(2.0 * dt / AIM_TIME) * noise
         return unit(np.where(self._to_go[:, None] > 0.0, self._wrong, self._right) + self._aim)
 
-    def _push(self, noise: Float, pose: Pose, dt: float) -> Float:
-        velocity = super()._push(noise, pose, dt)
+    def _push(self, noise: Float, seen: Float, dt: float, share: float | Float) -> Float:
+        velocity = super()._push(noise, seen, dt, share)
         off = self._hesitates & ((self._clock + self._off_at) % PERIOD_S < OFF_S)
         self._clock += dt
-        self._position = np.where(off[:, None], pose.position, self._position)
+        self._position = np.where(off[:, None], seen, self._position)
         return np.where(off[:, None], 0.0, velocity)

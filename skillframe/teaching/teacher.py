@@ -198,16 +198,16 @@ class Teacher(Skill):
         """Move the hand one tick on and hold the tool with it."""
         noise = self._draw()
         seen_position, seen_rotation = self._delay.push(observation.pose.position, observation.pose.rotation)
+        share = self._share(Pose(seen_position, seen_rotation))
         if observation.time[0] < self._task.waits_s:
             velocity = turning = self._follow(seen_position, observation.dt)
         else:
-            velocity = self._push(noise[:, :3], Pose(seen_position, seen_rotation), observation.dt)
+            velocity = self._push(noise[:, :3], seen_position, observation.dt, share)
             turning = self._turn_hand(seen_rotation, observation.dt)
         tremor = self._shake(noise[:, 3:], observation.dt)
         if self._task.stop is not None and self._direction is not None:
             along = (observation.twist[:, :3] * self._direction).sum(-1, keepdims=True)
-            held = STOPPING_NS_M * (1.0 - self._share(Pose(seen_position, seen_rotation)))
-            tremor[:, :3] -= held * along * self._direction
+            tremor[:, :3] -= STOPPING_NS_M * (1.0 - share) * along * self._direction
         position, rotation, twist = self._arrival.push(
             self._position.copy(), self._rotation, np.concatenate([velocity, turning], axis=-1)
         )
@@ -231,20 +231,20 @@ class Teacher(Skill):
         self._position = self._position - error * (dt / self._hand.relaxation)
         return np.zeros_like(error)
 
-    def _push(self, noise: Float, pose: Pose, dt: float) -> Float:
-        """Advance the hand's position. Returns its velocity (N, 3)."""
-        settings, hand, seen = self._settings, self._hand, pose.position
+    def _push(self, noise: Float, seen: Float, dt: float, share: float | Float) -> Float:
+        """Advance the hand's position, with a share of speed and push. Returns its velocity (N, 3)."""
+        settings, hand = self._settings, self._hand
         if self._direction is None and self._goal is None:
             return self._follow(seen, dt)
         error = self._position - seen
-        direction, share = self._aimed(noise, seen, dt), self._share(pose)
+        direction = self._aimed(noise, seen, dt)
         along = (error * direction).sum(-1, keepdims=True)
         sideways = error - along * direction
         excess = np.maximum(along - share * settings.force_max / hand.stiffness, 0.0)
         velocity: Float = share * self._speed() * direction
         if not hand.gives_way:
             left = 1.0 - along * (hand.stiffness / settings.force_max)
-            velocity, excess = np.clip(left, 0.0, 1.0) * velocity, np.zeros_like(excess)
+            velocity, excess = np.clip(left, 0.0, 1.0) * velocity, np.where(share < 1.0, excess, 0.0)
         self._position = self._position + velocity * dt - sideways * (dt / hand.relaxation) - excess * direction
         return velocity
 

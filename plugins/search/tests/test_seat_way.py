@@ -74,9 +74,8 @@ def test_the_end_is_that_of_the_demonstration_that_went_deepest():
     seat, height = end_of(resting(0.0, 10.0), resting(0.0004, 10.0))
     assert height == pytest.approx(0.0, abs=0.05) and seat["stop_m"] == 0.0
     alone = end_of(resting(0.0, 10.0))[0]["contact_m"]
-    assert seat["contact_m"] == pytest.approx(
-        alone + 0.0002, abs=5e-5
-    )  # the mean of both contacts, over the deeper end
+    # the mean of both contacts, over the deeper end
+    assert seat["contact_m"] == pytest.approx(alone + 0.0002, abs=5e-5)
     _, height = end_of(resting(0.0, 10.0), resting(0.0004, 10.0), place="start")  # both went as far: neither is short
     assert height == pytest.approx(0.2, abs=0.05)
 

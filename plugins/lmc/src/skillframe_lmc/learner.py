@@ -6,8 +6,8 @@ First the pitch, then for translation and rotation alike
     who moved it?      W = F_m . dx, or T_m . dbeta at the hand                     (3)        [work]
                        the environment, if W > 0 prevails: three compliant degrees of freedom
     where to push?     intersection of the pyramids; may not exist      [sectors, directions, heading, modes, votes]
-                       then where it was told that the part is to go
                        its middle, where faces of one side were passed  [expected]
+                       where none exists, the way that was told (`LearnOptions.toward`)
     where to give?     where faces turned the push aside; where none did, or the tool turned,
                        principal axes of the motion that the push does not explain              [faces, axes]
     how stiff?         zero along compliant axes, k elsewhere                                   [gains]
