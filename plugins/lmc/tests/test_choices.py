@@ -86,3 +86,14 @@ def test_of_a_turn_only_what_the_teacher_drove_and_what_was_free_has_a_sector() 
 def test_who_is_told_where_the_part_is_to_go_keeps_the_push_that_was_shown() -> None:
     shown = syn.pair_of_alignments(syn.Recipe(noise_m=5e-5, noise_n=0.3))
     assert learn(shown, LearnOptions(toward=(0.0, 1.0, 0.0))) == learn(shown, LearnOptions())
+
+
+def test_of_a_push_that_was_told_nothing_is_said_to_be_known_from_what_was_shown() -> None:
+    """Two demonstrations that went opposite ways against a force: no one push explains both."""
+    ways = [np.array([x, 0.0, 0.0]) for x in (1.0, -1.0)]
+    shown = [syn.straight(way, 0.05, -8.0 * way, syn.Recipe()) for way in ways]
+    options = (LearnOptions(), LearnOptions(toward=(0.0, 0.0, -1.0)))
+    alone, told = (learn(shown, each)["phases"][0]["translation"] for each in options)
+    assert alone["desired_direction"] is None and alone["evidence"]["pyramid_angle_rad"] > math.radians(25.0)
+    assert told["desired_direction"] == DOWN.tolist() and told["evidence"]["pyramid_angle_rad"] is None
+    assert "not learned, because no one push explains what was seen" in told["evidence"]["message"]

@@ -6,10 +6,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from skillframe_search.example import seated
+from skillframe_search.seat import SEARCHING
 from skillframe_search.seat_learner import _way_begins
 from skillframe_search.seat_words import NOWHERE, describe, goes_nowhere
 
-from plugins.search.tests.test_seat import Played, known
+from plugins.search.tests.test_seat import Played, known, searching
 from skillframe.document.source import learned
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
@@ -112,6 +113,15 @@ def test_a_part_that_nothing_stops_is_pushed_less_and_less_before_the_end_and_no
         lead = command.pose.position - played.seen().pose.position
         np.testing.assert_allclose(lead, np.tile((0.001, 0.0, -0.010 * share), (3, 1)), atol=1e-9)
         np.testing.assert_allclose(command.twist[:, 2], -0.02 * share, atol=1e-9)
+
+
+def test_a_search_keeps_its_lead_where_nothing_stops_the_part():
+    played = searching(stop_m=0.001)
+    played.deep[:], played.search.lead = 0.0, np.array([0.001, 0.0, -0.010])
+    command = played.go()
+    assert (played.skill.current == SEARCHING).any()
+    there = played.skill.current == SEARCHING
+    np.testing.assert_allclose((command.pose.position - played.seen().pose.position)[there, 2], -0.010, atol=1e-9)
 
 
 def test_who_lets_go_at_a_bottom_has_pressed_on_it_before():
