@@ -60,7 +60,8 @@ def documents(shown: Sequence[Demonstration]) -> dict[str, Document]:
         "- catch": _with_seat(whole, catch_ns_m=0.0),
         "catch 1000 Ns/m": _with_seat(whole, catch_ns_m=1000.0),
         "- lean": _with_seat(whole, lean_nm_rad=0.0, upright_nm_rad=0.0),
-        "- rock": _with_seat(whole, rock_nm=0.0),
+        "- rock": _with_seat(whole, rock_nm=0.0, slow_nm=0.0),
+        "- keep": _with_seat(whole, keep_n_m=0.0),
         "- follow": _with_seat(whole, follow_s=0.0),
         "- centre": _with_seat(whole, centre_n=0.0),
     }
@@ -103,8 +104,8 @@ def _pushed(document: Document, phase: Document) -> Document:
 def _shipped(whole: Document, alone: Document) -> Document:
     """The hand-written push, and on a stall the spiral that shipped before: 10 N, 2000 N/m, pitch 1.6 mm, as it was."""
     result = _with_seat(
-        whole, approach=False, catch_ns_m=0.0, lean_nm_rad=0.0, upright_nm_rad=0.0, rock_nm=0.0, follow_s=0.0,
-        lost_m=1.0, patience_s=100.0, stall_s=100.0, sunk_m=1.0,
+        whole, approach=False, catch_ns_m=0.0, lean_nm_rad=0.0, upright_nm_rad=0.0, rock_nm=0.0, slow_nm=0.0,
+        keep_n_m=0.0, follow_s=0.0, lost_m=1.0, patience_s=100.0, stall_s=100.0, sunk_m=1.0,
     )  # fmt: skip
     result = deepcopy(result)
     _by_hand(result["phases"][0])

@@ -15,7 +15,7 @@ from skillframe_benchmarks.counts import Cell, cause, share
 
 from skillframe import CampaignResults
 from skillframe.cli.main import run
-from skillframe.errors import InputError, UnknownName
+from skillframe.errors import InputError, SkillframeError, UnknownName
 from skillframe.frames import matrix_from_quaternion, quaternion_from_matrix, rotation_matrix
 
 DEPTH, ORIGIN, TIP = 0.02, np.array([0.001, -0.002, -0.03]), np.array([0.0, 0.0, 0.2])
@@ -206,6 +206,29 @@ def test_the_levels_are_those_that_are_told_and_the_widest_is_the_published_nois
     last = LEVELS[-1].vary()
     assert last["fixture.offset_x"] == {"uniform": [-0.002, 0.002]}  # socket_pos_obs_noise, socket_rot_obs_noise
     assert last["fixture.tilt_z"]["uniform"][1] == pytest.approx(0.0872665, abs=1e-6)
+
+
+@pytest.mark.parametrize(("fails", "looks", "upright"), [(0, None, True), (1, 5e-4, True), (2, None, False)])
+def test_a_demonstration_is_shown_again_until_it_ends_upright_by_pushing_and_else_by_looking(
+    monkeypatch, fails, looks, upright
+):
+    from skillframe_benchmarks import assembly
+
+    asked = []
+
+    def record(robot, scene, teacher, **more):
+        asked.append((teacher.looks, more["draws"], more["attempts"]))
+        if len(asked) <= fails:
+            raise SkillframeError("the teacher failed")
+        return "shown"
+
+    monkeypatch.setattr(assembly, "robot_of", lambda name: None)
+    monkeypatch.setattr(assembly, "scene_of", lambda fixture, ends, depth: (None, ends))
+    monkeypatch.setattr(assembly.sessions, "record", record)
+    assert assembly._recorded(None, assembly.Plan()) == "shown"
+    assert [each[2] for each in asked] == [5, 20, 1][: fails + 1]
+    assert (asked[-1][0], "world.tilt" in asked[-1][1]) == (looks, upright)
+    assert all("world.sideways" in ends for _, ends, _ in asked)
 
 
 def test_an_assembly_that_is_not_done_has_no_entry(tmp_path):

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from skillframe_search import seat, seat_document, seat_learner
+from seat_played import DOWN, MOST_TILT, SEAT, Played, Script, known, searching
+from skillframe_search import seat, seat_document
 from skillframe_search.example import searching as blind
 from skillframe_search.example import seated
 from skillframe_search.phase import read_phase
 from skillframe_search.reach import Reach
-from skillframe_search.seat_document import Seat, part_of, read_seat
+from skillframe_search.seat_document import part_of, read_seat
 
 from skillframe.cli.main import run as typed
 from skillframe.demonstration.npz import write_npz
@@ -20,11 +21,10 @@ from skillframe.document.source import learned
 from skillframe.errors import InputError
 from skillframe.extend.records import LearnOptions, SkillType
 from skillframe.extend.registry import registry
-from skillframe.frames import Pose, norm, rotation_matrix, rotation_vector
-from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
+from skillframe.frames import Pose, norm, rotation_matrix
+from skillframe.skill import Observation, Skill, Status
 
 DEPTH, GRIP = 0.012, 0.2  # of the made-up demonstrations
-DOWN = np.array([0.0, 0.0, -1.0])
 PUSH, SEARCH, APPROACH = seat.PUSHING, seat.SEARCHING, seat.APPROACH
 
 
@@ -120,75 +120,6 @@ def test_parts_that_touch_only_at_the_bottom_and_rest_there_are_seated_along_the
     assert found.contact_m > 0.005
 
 
-class Script(Skill):
-    """Commands a feed-forward of its own, and ends where it is told to."""
-
-    def __init__(self):
-        self.begun, self.ends, self.lead, self.speed = [], {}, np.zeros(3), 0.0
-
-    def start(self, observation, rngs):
-        self.n = len(rngs)
-        self.begun.append((np.arange(self.n), observation.pose))
-
-    def restart(self, rows, observation, rngs):
-        self.begun.append((rows, Pose(observation.pose.position[rows], observation.pose.rotation[rows])))
-
-    def step(self, observation):
-        status, reason = np.zeros(self.n, dtype=np.int64), no_reasons(self.n)
-        for row, end in self.ends.items():
-            status[row], reason[row] = end, "told to"
-        self.ends = {}
-        pose, twist = observation.pose._replace(position=observation.pose.position + self.lead), np.zeros((self.n, 6))
-        twist[:, :3] = self.speed * DOWN
-        return Command(pose, twist, Impedance(np.eye(6)), np.ones((self.n, 6)), status, reason)
-
-
-def known(monkeypatch, **kinds):
-    class Known:
-        def skill(self, name):
-            return kinds.get(name) or registry().skill(name)
-
-        def names(self, kind):
-            return sorted({*registry().names(kind), *kinds})
-
-    for module in (seat, seat_document, seat_learner):
-        monkeypatch.setattr(module, "registry", Known)
-
-
-SEAT = Seat(way=(0.0, 0.0, -1.0), point=(0.0, 0.0, 0.0), end=(0.4, 0.0, 0.2), attitude=(0.0, 0.0, 0.0),
-            start=(0.4, 0.0, 0.23), contact_m=0.012, above_m=0.014, approach=False)  # fmt: skip
-
-
-class Played:
-    """A seating of three trials, tick by tick at 100 Hz."""
-
-    def __init__(self, **changes):
-        self.push, self.search = Script(), Script()
-        self.skill = seat.Seating(replace(SEAT, **changes), np.zeros(3), lambda: self.push, lambda: self.search)
-        self.time, self.deep, self.aside, self.turn, self.speed = (
-            0.0,
-            np.full(3, -0.012),
-            np.zeros(3),
-            np.zeros((3, 3)),
-            0.0,
-        )
-        self.skill.start(self.seen(), [np.random.default_rng(i) for i in range(3)])
-
-    def seen(self):
-        position = np.array(SEAT.end) + self.deep[:, None] * DOWN + self.aside[:, None] * np.array([1.0, 0.0, 0.0])
-        twist = np.zeros((3, 6))
-        twist[:, :3] = self.speed * DOWN
-        return Observation(
-            np.full(3, self.time), 0.01, Pose(position, rotation_matrix(self.turn)), twist, np.zeros((3, 6))
-        )
-
-    def go(self, seconds=0.01, **ends):
-        for _ in range(round(seconds / 0.01)):
-            command = self.skill.step(self.seen())
-            self.time += 0.01
-        return command
-
-
 def test_a_push_that_rests_short_of_the_end_is_searched_for_and_one_at_the_end_is_done():
     played = Played()
     played.go()
@@ -218,15 +149,6 @@ def test_a_search_begins_about_the_nominal_axis_at_the_height_of_the_stall_howev
     np.testing.assert_allclose(pose.rotation[0], np.eye(3), atol=1e-12)
 
 
-def searching(**changes):
-    played = Played(**changes)
-    played.go()
-    played.push.ends = {0: Status.SUCCESS}
-    played.go(0.02)
-    assert played.skill.current.tolist() == [SEARCH, PUSH, PUSH]
-    return played
-
-
 def test_a_tool_that_sinks_is_pushed_on_and_one_that_slides_down_a_slope_is_not():
     played = searching()
     slope = 0.003 * tan(SEAT.tilt_rad)
@@ -245,7 +167,7 @@ def test_a_push_after_a_search_begins_no_farther_tilted_than_the_fixture_may_be(
     played.go(0.02)
     rows, pose = played.push.begun[-1]
     assert rows.tolist() == [0]
-    np.testing.assert_allclose(pose.rotation[0], rotation_matrix(np.array([SEAT.tilt_rad, 0.0, 0.0])), atol=1e-12)
+    np.testing.assert_allclose(pose.rotation[0], rotation_matrix(np.array([MOST_TILT, 0.0, 0.0])), atol=1e-12)
 
 
 def test_a_tool_beyond_the_end_is_lost_and_returns_as_often_as_it_is_allowed_to():
@@ -269,48 +191,6 @@ def test_a_search_that_fails_is_the_end_and_without_search_a_stall_is():
     command = played.go(SEAT.stall_s + 0.1)
     assert command.status.tolist() == [Status.FAILURE] * 3
     assert "stalled 12.0 mm short of the demonstrated end" in command.reason[0]
-
-
-def test_what_falls_in_is_braked_along_the_way_beyond_the_speed_of_the_catch():
-    played = Played()
-    for speed in (0.02, 0.03, 0.13):
-        played.speed = speed
-        brake = 400.0 * max(speed - 0.03, 0.0)
-        np.testing.assert_allclose(
-            played.go().feedforward[:, :3], np.tile(np.ones(3) - brake * DOWN, (3, 1)), atol=1e-9
-        )
-
-
-def test_what_lies_down_is_pulled_upright_with_more_beyond_the_stated_tilt():
-    played = Played()
-    for angle in (0.05, 0.3):
-        played.turn[:] = (0.0, angle, 0.0)
-        pull = 3.0 * angle + 20.0 * max(angle - SEAT.tilt_rad, 0.0)
-        np.testing.assert_allclose(played.go().feedforward[0, 3:], (1.0, 1.0 - pull, 1.0), atol=1e-9)
-
-
-def test_a_part_that_rests_in_the_hole_after_a_search_is_rocked_and_only_then():
-    played = searching()
-    quiet = played.go().feedforward
-    np.testing.assert_allclose(quiet[0], np.ones(6))  # nothing is added to a search
-    played.search.ends = {0: Status.SUCCESS}
-    played.deep[:] = -0.008
-    rocked = played.go(0.3).feedforward - 1.0
-    assert norm(rocked[0, 3:]) == pytest.approx(0.4) and abs(rocked[0, 5]) < 1e-12
-    assert norm(rocked[1, 3:]) == 0.0  # a push that has not been searched for
-
-
-def test_in_the_hole_the_attitude_wanted_follows_the_measured_one_up_to_the_stated_tilt_and_no_farther():
-    played = searching()
-    played.search.ends = {0: Status.SUCCESS}
-    played.go(0.02)
-    for angle in (0.06, 0.5):
-        played.turn[:] = (angle, 0.0, 0.0)
-        wanted = played.go(1.4).pose.rotation  # e^(-1.4 / 0.31) is 1.1 %
-        followed = rotation_vector(wanted[0])
-        np.testing.assert_allclose(followed, (min(angle, SEAT.tilt_rad), 0.0, 0.0), atol=0.012 * angle)
-        played.deep[0] += 0.001
-    np.testing.assert_allclose(wanted[1], rotation_matrix(played.turn[1]))  # the push's own, before any search
 
 
 def test_an_outside_kind_of_skill_can_be_the_exception_strategy(monkeypatch):

@@ -5,12 +5,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from seat_played import Played, known, searching
 from skillframe_search.example import seated
 from skillframe_search.seat import SEARCHING
 from skillframe_search.seat_learner import _way_begins
 from skillframe_search.seat_words import NOWHERE, describe, goes_nowhere
 
-from plugins.search.tests.test_seat import Played, known, searching
 from skillframe.document.source import learned
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry

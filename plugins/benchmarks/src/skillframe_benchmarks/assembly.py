@@ -42,6 +42,8 @@ UPRIGHT, IN_PLACE = {"world.tilt": "2deg"}, {"world.sideways": "0.5mm"}
 """How a demonstration is to end: nobody shows a part slanting, or far along an open slot (ours)."""
 LOOKS_M = 5e-4
 """How exactly a person sees where the mouth is, who could not show it by pushing alone [m] (ours)."""
+FEW = 5
+"""Attempts at a demonstration before another person tries, or less is asked: one, and four side by side (ours)."""
 ABREAST = 400
 """Trials that are simulated side by side: a tick takes some 0.8 ms, of one trial or of many (ours)."""
 DONE, REFUSED, UNLEARNED = "done.json", "refused.json", "unlearned.json"
@@ -208,15 +210,16 @@ def _shown(fixture: Path, folder: Path, plan: Plan) -> list[Demonstration]:
 
 
 def _recorded(fixture: Path, plan: Plan) -> Recording:
-    """Demonstrations that end upright and in place. Where the first attempt fails, because parts lean, just in place.
+    """Demonstrations that end upright and in place, as whoever shows a part again until it stands as it should.
 
-    Where that fails, because parts slide, it is enough to be seated; only where nobody who pushes gets there either,
-    by a person who looks, in place and else seated. Who looks carries the part, and may teach no push.
+    He pushes, and where that fails five times for one of them, he looks. Where both fail, because parts lean, it is
+    enough to be in place; where that fails, because parts slide, to be seated; and last by one who looks. Who looks
+    carries the part, and may teach no push.
     """
-    looking = TeacherSettings(looks=LOOKS_M)
+    pushing, looking = TeacherSettings(), TeacherSettings(looks=LOOKS_M)
     for teacher, ends, attempts in (
-        (TeacherSettings(), IN_PLACE | UPRIGHT, 1), (TeacherSettings(), IN_PLACE, 1),
-        (TeacherSettings(), {}, sessions.MOST_ATTEMPTS), (looking, IN_PLACE, 2),
+        (pushing, IN_PLACE | UPRIGHT, FEW), (looking, IN_PLACE | UPRIGHT, sessions.MOST_ATTEMPTS),
+        (pushing, IN_PLACE, 1), (pushing, {}, sessions.MOST_ATTEMPTS), (looking, IN_PLACE, FEW),
     ):  # fmt: skip
         scene, draws = scene_of(str(fixture), ends, depth=1)
         try:

@@ -11,8 +11,14 @@ Primitives and a search as their exception strategy are the papers' structure. H
 What is added to the push is a wrench F at the centre of compliance, u the way, rho the turn from the nominal attitude:
 
     catch      - c max(0, v.u - v_max) u                     so that a part that lets go does not fall in
-    lean       - k_0 rho - k_1 max(0, |rho| - tilt) rho/|rho|    so that it does not lie down; k_0 on the rim only
-    rock       m (a cos wt + b sin wt),  a, b across u           in the hole, where it rests short of the end
+    lean       - k_0 rho - k_1 max(0, |rho| - most) rho/|rho|    so that it does not lie down; k_0 on the rim only
+    keep       - k max(0, |a| - most) a/|a| - d v_a              so that a slanting push does not pass the fixture by
+    rock       m (a cos wt + b sin wt),  a, b across u           in the hole, where it rests short of the end: quickly,
+                                                                 which frees a jam, then slowly, which moves the tip
+
+a is the way from the nominal axis to the tool, across u, and v_a its rate, beyond the most. A fixture that is off on
+two axes at once is off by sqrt(2) tilt in attitude, and by sqrt(2) (shift + tilt h) at height h over the end. A push
+that nobody has searched for yet is kept nearer, within sqrt(2) shift, since to go wider is the search's part.
 
 Where the demonstrations ended without pressing, nothing stops the part: lead and speed of the push along u fade over
 the last `stop_m`. In the hole the attitude wanted follows the measured one, low-passed and never farther from the
@@ -22,6 +28,7 @@ nominal one than the stated tilt: the hole knows better. All of this is ours. Se
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +46,9 @@ from skillframe_search.seat_document import PUSH, SEARCH, Seat, part_of, read_se
 
 APPROACH, PUSHING, SEARCHING, CENTRING = 0, 1, 2, 3
 RUNNING = int(Status.RUNNING)  # a look into the enumeration takes as long as a sum over the batch
+SQRT2 = sqrt(2.0)
 FARTHEST_M = 0.08  # an approach may be longer than the demonstrated one by this
+KEEP_NS_M = 100.0
 REST_S = 0.3  # without progress, near the end
 ENTERED_M = 0.002  # deeper than the first contact was by this is in the hole: rocked before it is searched for
 
@@ -75,6 +84,7 @@ class Seating(Composition):
         self._upright = rotation_matrix(np.array(seat.attitude))
         self._end, self._start = (np.array(place) + self._upright @ shift for place in (seat.end, seat.start))
         self._axes = surface_axes(self._way)
+        self._most_tilt = SQRT2 * seat.tilt_rad
         parts = [Part("approach", self._reach), Part("push", push), Part("search", search)]
         super().__init__([*parts, Part("centre", self._centre)])
 
@@ -131,7 +141,7 @@ class Seating(Composition):
             self._centred[row] = part == CENTRING  # a search, or a new approach, leaves it somewhere else
             return PUSHING, Status.RUNNING, f"begins, as the {self.parts[part].name} ended: {reason}"
         left = -1e3 * float(self._deep[row])
-        entered = self._deep[row] > -self._seat.contact_m + ENTERED_M
+        entered = self._entered()[row]
         if status == Status.SUCCESS and left > 1e3 * self._seat.short_m and entered and not self._urged[row]:
             self._urged[row] = True
             return PUSHING, Status.RUNNING, f"goes on and rocks, {left:.1f} mm short of the end: {reason}"
@@ -154,9 +164,12 @@ class Seating(Composition):
 
     def _beyond(self, row: int) -> bool:
         """Whether a part that was drawn back still rests farther aside than the fixture may be off, and `aside_m`."""
+        return bool(self._centred[row] and self._off[row] > self._most_aside(self._seat.contact_m))
+
+    def _most_aside(self, height: float | Float) -> float | Float:
+        """How far from the nominal axis the hole may be at a height over the end, with `aside_m` beside [m]."""
         seat = self._seat
-        most = np.sqrt(2.0) * (seat.shift_m + seat.tilt_rad * seat.contact_m) + seat.aside_m
-        return bool(self._centred[row] and self._off[row] > most)
+        return SQRT2 * (seat.shift_m + seat.tilt_rad * height) + seat.aside_m
 
     def _near(self) -> NDArray[np.bool_]:
         result: NDArray[np.bool_] = self._deep >= -(self._seat.short_m + self._seat.height_m)
@@ -209,7 +222,7 @@ class Seating(Composition):
     def _within(self, rotation: Float) -> Float:
         """Attitudes (N, 3, 3) no farther from the nominal one than the stated tilt."""
         turn = rotation_vector(rotation @ self._upright.T)
-        share = np.minimum(1.0, self._seat.tilt_rad / np.maximum(norm(turn), 1e-9))
+        share = np.minimum(1.0, self._most_tilt / np.maximum(norm(turn), 1e-9))
         return rotation_matrix(share[:, None] * turn) @ self._upright
 
     def _followed(self, observation: Observation, command: Command) -> Command:
@@ -245,28 +258,51 @@ class Seating(Composition):
         return command._replace(pose=Pose(position, command.pose.rotation), twist=twist)
 
     def _added(self, observation: Observation) -> Float:
-        """(N, 6) the wrench that is added to the push: catch, lean and rock."""
+        """(N, 6) the wrench that is added to the push: catch, keep, lean and rock."""
         seat, pushing = self._seat, self.current == PUSHING
         added = np.zeros((len(pushing), 6))
         if not np.count_nonzero(pushing):
             return added
         fast = np.maximum(_dot(observation.twist[:, :3], self._way) - seat.catch_m_s, 0.0)
-        added[:, :3] = -seat.catch_ns_m * fast[:, None] * self._way
+        added[:, :3] = -seat.catch_ns_m * fast[:, None] * self._way + self._kept(observation)
         turn = rotation_vector(observation.pose.rotation @ self._upright.T)
         angle = np.maximum(norm(turn), 1e-9)
         pull = (
             np.where(self._searched, 0.0, seat.upright_nm_rad)
-            + seat.lean_nm_rad * np.maximum(angle - seat.tilt_rad, 0.0) / angle
+            + seat.lean_nm_rad * np.maximum(angle - self._most_tilt, 0.0) / angle
         )
         added[:, 3:] = -pull[:, None] * turn
-        phase = 2.0 * np.pi * seat.rock_hz * observation.time
-        short = self._deep < -self._seat.short_m
-        resting = self._in_hole() & short & (observation.time - self._since > seat.rock_after_s)
-        rock = seat.rock_nm * np.where(resting, 1.0, 0.0)
-        added[:, 3:] += (rock * np.cos(phase))[:, None] * self._axes[0] + (rock * np.sin(phase))[:, None] * self._axes[
-            1
-        ]
+        added[:, 3:] += self._rocked(observation)
         return np.where(pushing[:, None], added, 0.0)
+
+
+    def _rocked(self, observation: Observation) -> Float:
+        """(N, 3) the torque that goes round: quickly once the tool rests short of the end, slowly where it stays."""
+        seat, idle = self._seat, observation.time - self._since
+        resting = self._in_hole() & (self._deep < -seat.short_m)
+        slow = idle > seat.slow_after_s
+        torque = np.where(slow, seat.slow_nm, seat.rock_nm) * (resting & (idle > seat.rock_after_s))
+        phase = 2.0 * np.pi * np.where(slow, seat.slow_hz, seat.rock_hz) * observation.time
+        a, b = self._axes[:2]
+        result: Float = (torque * np.cos(phase))[:, None] * a + (torque * np.sin(phase))[:, None] * b
+        return result
+
+    def _kept(self, observation: Observation) -> Float:
+        """(N, 3) the force that keeps a push where the fixture may be."""
+        seat = self._seat
+        height = np.where(self._searched | self._entered(), np.clip(-self._deep, 0.0, seat.contact_m), 0.0)
+        beyond = self._off - self._most_aside(height)
+        if not np.count_nonzero(beyond > 0.0):
+            return np.zeros((len(beyond), 3))
+        away = observation.pose.position - self._ends - self._deep[:, None] * self._way
+        out = away / np.maximum(self._off, 1e-9)[:, None]
+        speed = (observation.twist[:, :3] * out).sum(axis=-1)
+        force = np.where(beyond > 0.0, seat.keep_n_m * beyond + KEEP_NS_M * speed, 0.0)
+        return -np.maximum(force, 0.0)[:, None] * out
+
+    def _entered(self) -> NDArray[np.bool_]:
+        result: NDArray[np.bool_] = self._deep > -self._seat.contact_m + ENTERED_M
+        return result
 
 
 def _rows(chosen: NDArray[np.bool_]) -> list[int]:

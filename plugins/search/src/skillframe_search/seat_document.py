@@ -44,9 +44,11 @@ class Seat:
         sunk_m: deeper than the stall by this is in the hole, beside what the tilt makes of the way across.
         stop_m: the push fades over so much before the end, where nothing else stops the part; 0: the part is stopped.
         catch_m_s, catch_ns_m: faster along the way than this is braked, with this damping.
-        upright_nm_rad: pulls upright until a search is over; lean_nm_rad: always, beyond `tilt_rad`.
+        keep_n_m: pulls back what is farther from the nominal axis than the fixture may be off, and `aside_m`.
+        upright_nm_rad: pulls upright until a search is over; lean_nm_rad: always, beyond sqrt(2) `tilt_rad`.
         follow_s: in the hole the attitude wanted follows the measured one within this; 0 does not.
-        rock_nm, rock_hz: torque that turns across the way in a hole, once the tool rests in it for rock_after_s.
+        rock_nm, rock_hz: torque that turns across the way in a hole, once the tool rests in it for rock_after_s;
+            slow_nm, slow_hz: the same once it rests for slow_after_s. Quickly it frees a jam, slowly it moves the tip.
     """
 
     way: Vector
@@ -69,19 +71,23 @@ class Seat:
     tries: int = 8
     progress_m: float = 0.0003
     stall_s: float = 0.5
-    patience_s: float = 1.5
+    patience_s: float = 2.0
     centre_n: float = 8.0
     aside_m: float = 0.001
     sunk_m: float = 0.0008
     stop_m: float = 0.0
     catch_m_s: float = 0.03
     catch_ns_m: float = 400.0
+    keep_n_m: float = 3000.0
     upright_nm_rad: float = 3.0
     lean_nm_rad: float = 20.0
     follow_s: float = 0.3
     rock_nm: float = 0.4
     rock_hz: float = 4.0
     rock_after_s: float = 0.15
+    slow_nm: float = 0.6
+    slow_hz: float = 1.0
+    slow_after_s: float = 0.75
 
 
 def read_seat(document: Document) -> Seat:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import degrees
+from math import degrees, sqrt
 
 from skillframe.extend.records import Document, Illustration
 from skillframe.extend.registry import registry
@@ -47,12 +47,15 @@ def _parts(seat: Seat, nowhere: bool) -> list[str]:
         f"catch: brakes above {1e3 * seat.catch_m_s:.3g} mm/s along the way with {seat.catch_ns_m:g} Ns/m; adds that a "
         "part that lets go does not hit the bottom",
         *([_stop(seat)] if seat.stop_m else []),
+        f"keep: pulls back with {seat.keep_n_m:g} N/m what is farther from the nominal axis than the fixture may be "
+        "off; adds that a push that slants does not pass the fixture by",
         f"lean: pulls upright with {seat.upright_nm_rad:g} Nm/rad on the rim, and with {seat.lean_nm_rad:g} beyond "
-        f"{degrees(seat.tilt_rad):.1f} degrees; adds that the part does not lie down on the rim",
+        f"{degrees(sqrt(2.0) * seat.tilt_rad):.1f} degrees; adds that the part does not lie down on the rim",
         f"follow: in the hole the attitude wanted follows the measured one within {seat.follow_s:g} s, by that tilt at "
         "most; adds that a tilted hole guides the part",
-        f"rock: turns {seat.rock_nm:g} Nm round at {seat.rock_hz:g} Hz where the part rests after a search; "
-        "adds that it does not jam",
+        f"rock: turns {seat.rock_nm:g} Nm round at {seat.rock_hz:g} Hz where the part rests after a search, then "
+        f"{seat.slow_nm:g} Nm at {seat.slow_hz:g} Hz; adds that it does not jam, and finds a second hole below the "
+        "first",
         f"centre: at the end, but more than {1e3 * seat.aside_m:g} mm from the nominal axis, it is drawn back until "
         f"{seat.centre_n:g} N hold it; adds that a part in a slot that is open at an end is where it was shown",
         f"lost: more than {1e3 * (seat.lost_m + seat.height_m):.1f} mm past the end is beside the hole: it returns",
@@ -78,7 +81,7 @@ def _sources(seat: Seat) -> list[str]:
         f"degrees and {1e3 * seat.height_m:g} mm along the way (--set shift, tilt, height); friction "
         f"{seat.friction:g} (--set friction)",
         "by hand (our choice): the default search's force, stiffness, speed, pitch, passes and dither, all figures of "
-        "catch, lean, rock, stall and lost; chosen by what they were worth on AutoMate's assemblies, not learned",
+        "catch, keep, lean, rock, stall and lost; chosen by what they were worth on AutoMate's assemblies, not learned",
     ]
 
 

@@ -1,0 +1,95 @@
+"""What a seating adds to its push: catch, keep, lean, rock, and an attitude that follows."""
+
+import numpy as np
+import pytest
+from seat_played import DOWN, MOST_TILT, SEAT, Played, searching
+
+from skillframe.frames import norm, rotation_matrix, rotation_vector
+from skillframe.skill import Status
+
+
+def test_what_falls_in_is_braked_along_the_way_beyond_the_speed_of_the_catch():
+    played = Played()
+    for speed in (0.02, 0.03, 0.13):
+        played.speed = speed
+        brake = 400.0 * max(speed - 0.03, 0.0)
+        np.testing.assert_allclose(
+            played.go().feedforward[:, :3], np.tile(np.ones(3) - brake * DOWN, (3, 1)), atol=1e-9
+        )
+
+
+def test_what_lies_down_is_pulled_upright_with_more_beyond_the_stated_tilt():
+    played = Played()
+    for angle in (0.05, 0.3):
+        played.turn[:] = (0.0, angle, 0.0)
+        pull = 3.0 * angle + 20.0 * max(angle - MOST_TILT, 0.0)
+        np.testing.assert_allclose(played.go().feedforward[0, 3:], (1.0, 1.0 - pull, 1.0), atol=1e-9)
+
+
+def test_a_part_that_rests_in_the_hole_after_a_search_is_rocked_and_only_then():
+    played = searching()
+    quiet = played.go().feedforward
+    np.testing.assert_allclose(quiet[0], np.ones(6))  # nothing is added to a search
+    played.search.ends = {0: Status.SUCCESS}
+    played.deep[:] = -0.008
+    rocked = played.go(0.3).feedforward - 1.0
+    assert norm(rocked[0, 3:]) == pytest.approx(0.4) and abs(rocked[0, 5]) < 1e-12
+    assert norm(rocked[1, 3:]) == 0.0  # a push that has not been searched for
+
+
+def test_in_the_hole_the_attitude_wanted_follows_the_measured_one_up_to_the_stated_tilt_and_no_farther():
+    played = searching()
+    played.search.ends = {0: Status.SUCCESS}
+    played.go(0.02)
+    for angle in (0.06, 0.5):
+        played.turn[:] = (angle, 0.0, 0.0)
+        wanted = played.go(1.4).pose.rotation  # e^(-1.4 / 0.31) is 1.1 %
+        followed = rotation_vector(wanted[0])
+        np.testing.assert_allclose(followed, (min(angle, MOST_TILT), 0.0, 0.0), atol=0.012 * angle)
+        played.deep[0] += 0.001
+    np.testing.assert_allclose(wanted[1], rotation_matrix(played.turn[1]))  # the push's own, before any search
+
+
+def test_a_part_that_stays_at_rest_in_the_hole_is_turned_more_slowly_and_harder():
+    """Quickly first, which frees a jam, then slowly: a tool's inertia and damping hold a quick turn to a degree."""
+    played = searching()
+    played.search.ends = {0: Status.SUCCESS}
+    played.deep[:] = -0.008
+    played.go(SEAT.slow_after_s + 0.05)
+    rocked = [played.go().feedforward[0, 3:] - 1.0 for _ in range(100)]  # one turn of 1 Hz
+    np.testing.assert_allclose(norm(np.array(rocked)), SEAT.slow_nm)
+    first, quarter, half = (np.array(rocked)[i] for i in (0, 25, 50))
+    np.testing.assert_allclose(half, -first, atol=1e-9)
+    assert abs(first @ quarter) < 1e-9 and SEAT.slow_hz == 1.0
+
+
+@pytest.mark.parametrize("height", [0.0, 0.006])
+def test_a_push_is_kept_where_the_fixture_may_be_which_is_wider_high_up_and_once_it_is_searched_for(height):
+    """With a shift of 2 mm and a tilt of 5 degrees: 3.8 mm before the search, and 4.6 mm after it, 6 mm high."""
+    played = searching(keep_n_m=1000.0) if height else Played(keep_n_m=1000.0)
+    played.search.ends = {0: Status.SUCCESS}
+    played.deep[:] = -height or -0.012
+    most = np.sqrt(2.0) * (SEAT.shift_m + SEAT.tilt_rad * height) + SEAT.aside_m
+    for beyond, pull in ((-1e-4, 0.0), (0.002, 2.0)):
+        played.aside[0] = most + beyond
+        played.go(0.02)
+        np.testing.assert_allclose(played.go().feedforward[0, :3], (1.0 - pull, 1.0, 1.0), atol=1e-9)
+
+
+def test_what_is_driven_back_fast_is_not_held_out_by_the_damping_of_the_keep(monkeypatch):
+    played = Played()
+    played.aside[:] = 0.005
+    seen = played.seen
+
+    def moving(speed):
+        found = seen()
+        found.twist[:, 0] = speed
+        return found
+
+    outward = []
+    for speed in (0.05, 0.0, -1.0):
+        monkeypatch.setattr(played, "seen", lambda speed=speed: moving(speed))
+        outward.append(float(played.go().feedforward[0, 0]) - 1.0)
+    assert outward[0] < outward[1] < 0.0
+    assert outward[1] - outward[0] == pytest.approx(100.0 * 0.05)  # Ns/m
+    assert outward[2] == 0.0
