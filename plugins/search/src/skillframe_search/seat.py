@@ -275,7 +275,6 @@ class Seating(Composition):
         added[:, 3:] += self._rocked(observation)
         return np.where(pushing[:, None], added, 0.0)
 
-
     def _rocked(self, observation: Observation) -> Float:
         """(N, 3) the torque that goes round: quickly once the tool rests short of the end, slowly where it stays."""
         seat, idle = self._seat, observation.time - self._since
@@ -298,7 +297,8 @@ class Seating(Composition):
         out = away / np.maximum(self._off, 1e-9)[:, None]
         speed = (observation.twist[:, :3] * out).sum(axis=-1)
         force = np.where(beyond > 0.0, seat.keep_n_m * beyond + KEEP_NS_M * speed, 0.0)
-        return -np.maximum(force, 0.0)[:, None] * out
+        kept: Float = -np.maximum(force, 0.0)[:, None] * out
+        return kept
 
     def _entered(self) -> NDArray[np.bool_]:
         result: NDArray[np.bool_] = self._deep > -self._seat.contact_m + ENTERED_M
