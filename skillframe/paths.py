@@ -35,10 +35,14 @@ def checkout() -> Path | None:
     return folder if (folder / "plugins" / "all.txt").is_file() else None
 
 
+def cache_base() -> Path:
+    """`$XDG_CACHE_HOME/skillframe`, which need not exist yet."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "skillframe"
+
+
 def cache_dir(kind: str) -> Path:
     """A folder for things that can be made again (created if absent): `$XDG_CACHE_HOME/skillframe/<kind>`."""
-    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = base / "skillframe" / kind
+    folder = cache_base() / kind
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 

@@ -12,6 +12,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from skillframe.paths import cache_base
+
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 CHANGING = {
     "os.mkdir": "makes the folder",
@@ -129,11 +131,13 @@ def _deed(event: str, arguments: tuple[Any, ...]) -> str:
 
 
 def _own(path: Any) -> bool:
-    """What the interpreter itself writes when a module is imported, and the device that takes everything.
+    """What the interpreter writes when it imports, what we cache, and the device that takes everything.
 
     A number stands for a file that was opened by its path before, and told then.
     """
-    return isinstance(path, int) or path == os.devnull or "__pycache__" in str(path)
+    if isinstance(path, int) or path == os.devnull or "__pycache__" in str(path):
+        return True
+    return isinstance(path, str | os.PathLike) and Path(path).is_relative_to(cache_base())
 
 
 def _name(path: Any) -> str:

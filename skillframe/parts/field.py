@@ -5,7 +5,9 @@ meet, and a coarse one of the whole part. How exact it is is measured, not assum
 that of every triangle, at points near the surface, most of them near edges. Where the two take a point for inside and
 outside, the winding number decides: normals of edges at which more than two triangles meet do not tell,
 
-    w(p) = sum of the triangles' solid angles at p / 4 pi,    inside where w > 1/2    (Jacobson et al., TOG 32(4), 2013)
+    w(p) = sum of the triangles' solid angles at p / 4 pi,    inside where |w| > 1/2  (Jacobson et al., TOG 32(4), 2013)
+
+which is -1 in a lobe of a surface that crosses itself.
 """
 
 from __future__ import annotations
@@ -58,7 +60,7 @@ def error_of(surface: Surface, low: Float, high: Float) -> float:
     points = some + draw.uniform(-_NEAR, _NEAR, some.shape)
     exact, seen = exact_distances(surface.triangles, points), surface.look_up(points)
     for i in np.flatnonzero((exact < 0.0) != (seen < 0.0)).tolist():
-        exact[i] = abs(exact[i]) * (-1.0 if winding_number(surface.triangles, points[i]) > 0.5 else 1.0)
+        exact[i] = abs(exact[i]) * (-1.0 if abs(winding_number(surface.triangles, points[i])) > 0.5 else 1.0)
     touches = (np.minimum(exact, seen) < 0.0) & (np.abs(exact) < _NEAR)
     return float(np.abs(seen - exact)[touches].max(initial=0.0))
 

@@ -5,6 +5,7 @@ import os
 import sys
 
 from skillframe.conformance.watch import watched
+from skillframe.paths import cache_dir
 
 
 def test_a_module_that_is_compiled_when_it_is_imported_is_no_deed(tmp_path, monkeypatch):
@@ -25,3 +26,12 @@ def test_a_file_that_is_opened_by_its_number_was_told_by_its_path(tmp_path):
         with open(number, "wb") as file:
             file.write(b"x")
     assert seen.deeds == ["opens the file 'own.txt' for writing"]
+
+
+def test_what_we_cache_while_foreign_code_runs_is_no_deed_of_it(tmp_path, monkeypatch):
+    """A world of meshes is cut into pieces once, whoever asks for it first."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with watched() as seen:
+        (cache_dir("pieces") / "one.json").write_text("{}")
+        (tmp_path / "own.json").write_text("{}")
+    assert seen.deeds == ["opens the file 'own.json' for writing"]

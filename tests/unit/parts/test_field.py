@@ -158,8 +158,12 @@ def test_a_closed_mesh_goes_once_round_what_is_inside_and_not_round_what_is_not(
     np.testing.assert_allclose(turns, box_distance(points) < 0.0, atol=1e-9)
 
 
-def test_a_sign_that_normals_get_wrong_is_no_contact_error(cube, monkeypatch):
-    """Where more than two triangles meet at an edge, normals cancel: the yardstick is then wrong, not contact."""
+@pytest.mark.parametrize("rounds", [1.0, -1.0])
+def test_a_sign_that_normals_get_wrong_is_no_contact_error(cube, monkeypatch, rounds):
+    """Where more than two triangles meet at an edge, normals cancel: the yardstick is then wrong, not contact.
+
+    Where a surface crosses itself, it goes round what is inside the other way.
+    """
 
     def turned_round(triangles, points):
         return -exact_distances(triangles, points)
@@ -167,4 +171,5 @@ def test_a_sign_that_normals_get_wrong_is_no_contact_error(cube, monkeypatch):
     low, high = np.full(3, -5e-3), np.full(3, 5e-3)
     right = error_of(cube, low, high)
     monkeypatch.setattr("skillframe.parts.field.exact_distances", turned_round)
+    monkeypatch.setattr("skillframe.parts.field.winding_number", lambda *given: rounds * winding_number(*given))
     assert error_of(cube, low, high) == pytest.approx(right, abs=1e-9)
