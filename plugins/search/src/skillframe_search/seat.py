@@ -17,8 +17,9 @@ What is added to the push is a wrench F at the centre of compliance, u the way, 
                                                                  which frees a jam, then slowly, which moves the tip
 
 a is the way from the nominal axis to the tool, across u, and v_a its rate, beyond the most. A fixture that is off on
-two axes at once is off by sqrt(2) tilt in attitude, and by sqrt(2) (shift + tilt h) at height h over the end. A push
-that nobody has searched for yet is kept nearer, within sqrt(2) shift, since to go wider is the search's part.
+two axes at once is off by sqrt(2) tilt in attitude, and by sqrt(2) (shift + tilt h) in place, h from where it is turned
+about, which may be the mouth or the end: nobody says. A push that nobody has searched for yet is kept nearer, within
+sqrt(2) shift, since to go wider is the search's part.
 
 Where the demonstrations ended without pressing, nothing stops the part: lead and speed of the push along u fade over
 the last `stop_m`. In the hole the attitude wanted follows the measured one, low-passed and never farther from the
@@ -167,7 +168,7 @@ class Seating(Composition):
         return bool(self._centred[row] and self._off[row] > self._most_aside(self._seat.contact_m))
 
     def _most_aside(self, height: float | Float) -> float | Float:
-        """How far from the nominal axis the hole may be at a height over the end, with `aside_m` beside [m]."""
+        """How far from the nominal axis the hole may be, turned about a point so high over it, and `aside_m` [m]."""
         seat = self._seat
         return SQRT2 * (seat.shift_m + seat.tilt_rad * height) + seat.aside_m
 
@@ -289,7 +290,7 @@ class Seating(Composition):
     def _kept(self, observation: Observation) -> Float:
         """(N, 3) the force that keeps a push where the fixture may be."""
         seat = self._seat
-        height = np.where(self._searched | self._entered(), np.clip(-self._deep, 0.0, seat.contact_m), 0.0)
+        height = np.where(self._searched | self._entered(), seat.contact_m, 0.0)
         beyond = self._off - self._most_aside(height)
         if not np.count_nonzero(beyond > 0.0):
             return np.zeros((len(beyond), 3))
