@@ -32,7 +32,8 @@ def test_a_part_that_rests_in_the_hole_after_a_search_is_rocked_and_only_then():
     np.testing.assert_allclose(quiet[0], np.ones(6))  # nothing is added to a search
     played.search.ends = {0: Status.SUCCESS}
     played.deep[:] = -0.008
-    rocked = played.go(0.3).feedforward - 1.0
+    assert norm(played.go(0.1).feedforward[0, 3:] - 1.0) < 1e-12  # it has rested for less than rock_after_s
+    rocked = played.go(0.2).feedforward - 1.0
     assert norm(rocked[0, 3:]) == pytest.approx(0.4) and abs(rocked[0, 5]) < 1e-12
     assert norm(rocked[1, 3:]) == 0.0  # a push that has not been searched for
 
@@ -63,13 +64,16 @@ def test_a_part_that_stays_at_rest_in_the_hole_is_turned_more_slowly_and_harder(
     assert abs(first @ quarter) < 1e-9 and SEAT.slow_hz == 1.0
 
 
-@pytest.mark.parametrize("searched", [False, True])
-def test_a_push_is_kept_where_the_fixture_may_be_which_is_wider_once_it_is_searched_for(searched):
-    """Shift 2 mm, tilt 5 degrees, a hole of 12 mm: within 3.8 mm before the search, and 5.3 mm after it."""
+@pytest.mark.parametrize(
+    ("searched", "deep", "wide"),
+    [(False, -0.012, False), (True, -0.012, True), (False, -0.009, True), (True, 0.0, True)],
+)  # as wide at the end as at the mouth, since the fixture may be turned about either
+def test_a_push_is_kept_where_the_fixture_may_be_which_is_wider_once_it_is_searched_for_or_is_in(searched, deep, wide):
+    """Shift 2 mm, tilt 5 degrees, a hole of 12 mm: within 3.8 mm on the rim before the search, and 5.3 mm else."""
     played = searching(keep_n_m=1000.0) if searched else Played(keep_n_m=1000.0)
     played.search.ends = {0: Status.SUCCESS}
-    played.deep[0] = 0.0 if searched else -0.012  # as wide at the end, since the fixture may be turned about its mouth
-    most = np.sqrt(2.0) * (SEAT.shift_m + searched * SEAT.tilt_rad * SEAT.contact_m) + SEAT.aside_m
+    played.deep[0] = deep
+    most = np.sqrt(2.0) * (SEAT.shift_m + wide * SEAT.tilt_rad * SEAT.contact_m) + SEAT.aside_m
     for beyond, pull in ((-1e-4, 0.0), (0.002, 2.0)):
         played.aside[0] = most + beyond
         played.go(0.02)
@@ -86,6 +90,10 @@ def test_what_is_driven_back_fast_is_not_held_out_by_the_damping_of_the_keep(mon
         found.twist[:, 0] = speed
         return found
 
+    played.aside[0] = 0.003
+    monkeypatch.setattr(played, "seen", lambda: moving(0.05))
+    assert played.go().feedforward[0, 0] == 1.0  # within it nothing is added, however fast it goes
+    played.aside[:] = 0.005
     outward = []
     for speed in (0.05, 0.0, -1.0):
         monkeypatch.setattr(played, "seen", lambda speed=speed: moving(speed))
