@@ -14,6 +14,7 @@ from skillframe_search.seat_words import NOWHERE, describe, goes_nowhere
 from skillframe.document.source import learned
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
+from skillframe.frames import quaternion_from_matrix
 
 
 def tip_path(*corners):
@@ -137,3 +138,22 @@ def test_a_seating_says_where_its_push_has_no_direction():
         made["phases"][0][part] |= {"desired_direction": None, "speed": 0.0}
     assert NOWHERE in describe(made)
     assert not goes_nowhere({"of another kind": {}})  # whatever it does is not ours to know
+
+
+def test_demonstrations_that_end_leaning_are_told_of_and_a_turn_about_the_way_is_no_lean():
+    whole = [seated(0.14), seated(-0.14, 1)]
+    kind = registry().skill("seat")
+    # 2.1 s: half of the 0.14 rad is left
+    leaning = learned(kind, [each.between(None, 2.1) for each in whole], LearnOptions())
+    assert leaning["seat"]["leant_rad"] == pytest.approx(0.07, abs=0.001)
+    assert any("leant up to 4.0 degrees from the mean" in line for line in describe(leaning))
+    turned = []
+    for each, angle in zip(whole, (0.3, -0.3), strict=True):
+        yaw = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+        about = np.array([0.4, 0.0, 0.0])
+        rotation = yaw @ each.pose.rotation
+        position = (each.position - about) @ yaw.T + about
+        turned.append(replace(each, position=position, quaternion=quaternion_from_matrix(rotation)))
+    upright = learned(kind, turned, LearnOptions())
+    assert upright["seat"]["leant_rad"] < 0.002
+    assert not any("leant" in line for line in describe(upright))

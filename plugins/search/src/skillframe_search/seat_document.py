@@ -30,6 +30,7 @@ class Seat:
         attitude: rotation vector of the tool then, in base [rad].
         start: the point when the demonstrations began, in base [m].
         contact_m: height of the first contact over the end, along the way.
+        leant_rad: how far the part leant at the end of a demonstration from the attitude that is taken, at most.
         above_m: height over the end to which it approaches and lifts.
         place: "base": where it was demonstrated; "start": as far from the run's start as it was from theirs.
         shift_m, tilt_rad, height_m: how far off the fixture may be: across the way, in attitude, along the way.
@@ -58,6 +59,7 @@ class Seat:
     start: Vector
     contact_m: float
     above_m: float
+    leant_rad: float = 0.0
     place: Literal["base", "start"] = "base"
     shift_m: float = 0.002
     tilt_rad: float = radians(5.0)

@@ -32,7 +32,7 @@ from skillframe.errors import InputError
 from skillframe.extend.reading import read_demonstration
 from skillframe.extend.records import Document, LearnOptions, SkillType, Stalled
 from skillframe.extend.registry import registry
-from skillframe.frames import Float, Pose, norm, rotation_vector, unit
+from skillframe.frames import Float, Pose, cross, norm, rotation_vector, unit
 from skillframe_search.learner import plain
 from skillframe_search.seat_document import Seat, as_phase
 
@@ -241,10 +241,12 @@ def _seat(shown: Sequence[_Shown], point: Float, settings: SeatSettings) -> Seat
         further = max(float((each.end - end - (each.start - start) * moved) @ way) for each in shown)
         end, depth = end + further * way, depth + further
     left, _, right = np.linalg.svd(np.sum([each.attitude for each in shown], axis=0))
-    attitude = rotation_vector(left @ right)  # the mean of rotations
+    mean = left @ right  # of rotations
+    leant = max(float(norm(cross(each.attitude.T @ way, mean.T @ way))) for each in shown)
     above = float(np.clip((end - start) @ way, depth + ABOVE_M, depth + MOST_ABOVE_M))
     return Seat(
-        way=_vector(way), point=_vector(point), end=_vector(end), start=_vector(start), attitude=_vector(attitude),
+        way=_vector(way), point=_vector(point), end=_vector(end), start=_vector(start),
+        attitude=_vector(rotation_vector(mean)), leant_rad=float(np.arcsin(min(leant, 1.0))),
         contact_m=depth, above_m=above, place=settings.place, shift_m=settings.shift, tilt_rad=settings.tilt,
         height_m=settings.height, friction=settings.friction, approach=settings.approach, search=settings.search,
         stop_m=STOP_M if free else 0.0, tries=settings.tries,

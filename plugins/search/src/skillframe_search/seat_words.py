@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from math import degrees, sqrt
+from math import degrees, radians, sqrt
 
 from skillframe.extend.records import Document, Illustration
 from skillframe.extend.registry import registry
 from skillframe_search.seat_document import PUSH, SEARCH, Seat, part_of, read_seat
 
 NAMES = ((PUSH, "push"), (SEARCH, "search"))
+LEANS_RAD = radians(2.0)
+"""Parts that were shown upright lean by less within their play, and those that were left leaning by more (ours)."""
 NOWHERE = (
     "push: has no direction, since the contact showed none (below: why); only what the search lets fall in is seated; "
     "show it again, and push the part in rather than carry it"
@@ -77,12 +79,20 @@ def _sources(seat: Seat) -> list[str]:
     return [
         f"from the demonstrations: the push; the way ({', '.join(f'{v:.3f}' for v in seat.way)}); the end {where}; the "
         f"first contact {1e3 * seat.contact_m:.1f} mm above it",
+        *([_leant(seat)] if seat.leant_rad > LEANS_RAD else []),
         f"from the user: the fixture may be off by {1e3 * seat.shift_m:g} mm across, {degrees(seat.tilt_rad):.3g} "
         f"degrees and {1e3 * seat.height_m:g} mm along the way (--set shift, tilt, height); friction "
         f"{seat.friction:g} (--set friction)",
         "by hand (our choice): the default search's force, stiffness, speed, pitch, passes and dither, all figures of "
         "catch, keep, lean, rock, stall and lost; chosen by what they were worth on AutoMate's assemblies, not learned",
     ]
+
+
+def _leant(seat: Seat) -> str:
+    return (
+        f"the part leant up to {degrees(seat.leant_rad):.1f} degrees from the mean of its demonstrated ends, which the "
+        "skill takes for upright: show it again, and let go once it stands as it should"
+    )
 
 
 def _phases(document: Document) -> list[str]:
