@@ -296,7 +296,7 @@ class Seating(Composition):
             return np.zeros((len(beyond), 3))
         away = observation.pose.position - self._ends - self._deep[:, None] * self._way
         out = away / np.maximum(self._off, 1e-9)[:, None]
-        speed = (observation.twist[:, :3] * out).sum(axis=-1)
+        speed = _dot(observation.twist[:, :3], out.T)
         force = np.where(beyond > 0.0, seat.keep_n_m * beyond + KEEP_NS_M * speed, 0.0)
         kept: Float = -np.maximum(force, 0.0)[:, None] * out
         return kept
@@ -318,6 +318,6 @@ def _dot_rows(rows: Float) -> Float:
 
 
 def _dot(rows: Float, way: Float) -> Float:
-    """(N,) how far rows (N, 3) go along a way (3,), each by itself."""
+    """(N,) how far rows (N, 3) go along a way (3,), or each along its own, (3, N), by itself."""
     result: Float = rows[:, 0] * way[0] + rows[:, 1] * way[1] + rows[:, 2] * way[2]
     return result
