@@ -19,6 +19,7 @@ class Script(Skill):
 
     def __init__(self):
         self.begun, self.ends, self.lead, self.speed = [], {}, np.zeros(3), 0.0
+        self.impedance = Impedance(np.eye(6))
 
     def start(self, observation, rngs):
         self.n = len(rngs)
@@ -34,7 +35,7 @@ class Script(Skill):
         self.ends = {}
         pose, twist = observation.pose._replace(position=observation.pose.position + self.lead), np.zeros((self.n, 6))
         twist[:, :3] = self.speed * DOWN
-        return Command(pose, twist, Impedance(np.eye(6)), np.ones((self.n, 6)), status, reason)
+        return Command(pose, twist, self.impedance, np.ones((self.n, 6)), status, reason)
 
 
 def known(monkeypatch, **kinds):

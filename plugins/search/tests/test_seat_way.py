@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from seat_played import Played, known, searching
+from seat_played import DOWN, Played, known, searching
 from skillframe_search.example import seated
 from skillframe_search.seat import SEARCHING
 from skillframe_search.seat_learner import _way_begins
@@ -15,6 +15,7 @@ from skillframe.document.source import learned
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import quaternion_from_matrix
+from skillframe.skill import Impedance
 
 
 def tip_path(*corners):
@@ -105,15 +106,25 @@ def test_a_push_is_learned_until_the_part_is_at_its_end_where_nothing_stops_it(m
     assert seen == [1.8, 2.1] and list(told[1]) == seat["way"]
 
 
-def test_a_part_that_nothing_stops_is_pushed_less_and_less_before_the_end_and_not_beyond_it():
+@pytest.mark.parametrize("slant", [0.0, 0.4])
+def test_a_part_that_nothing_stops_is_pushed_less_and_less_before_the_end_and_not_beyond_it(slant):
+    """Stiff along one direction alone, which may slant: then a lead aside pushes along the way, too."""
+    stiff = np.array([np.sin(slant), 0.0, -np.cos(slant)])
+    stiffness = np.zeros((6, 6))
+    stiffness[:3, :3] = 1000.0 * np.outer(stiff, stiff)
     played = Played(stop_m=0.001)
+    played.push.impedance = Impedance(stiffness)
     for deep, share in ((-0.002, 1.0), (-0.001, 1.0), (-0.0004, 0.4), (0.0, 0.0), (0.001, 0.0)):
         played.deep[:] = deep
-        played.push.lead, played.push.speed = np.array([0.001, 0.0, -0.010]), 0.02
+        played.push.lead, played.push.speed = np.array([0.002, 0.0, -0.010]), 0.02
         command = played.go()
         lead = command.pose.position - played.seen().pose.position
-        np.testing.assert_allclose(lead, np.tile((0.001, 0.0, -0.010 * share), (3, 1)), atol=1e-9)
+        force = lead @ stiffness[:3, :3] + command.feedforward[:, :3] - 1.0  # the script's own feed-forward
+        pushed = 1000.0 * (0.002 * np.sin(slant) + 0.010 * np.cos(slant)) * np.cos(slant)
+        np.testing.assert_allclose(force @ DOWN, pushed * share, atol=1e-9)
         np.testing.assert_allclose(command.twist[:, 2], -0.02 * share, atol=1e-9)
+    played.push.lead = np.array([0.0, 0.0, 0.010])  # what draws it back is left
+    np.testing.assert_allclose(played.go().feedforward[:, :3], 1.0, atol=1e-9)
 
 
 def test_a_search_keeps_its_lead_where_nothing_stops_the_part():

@@ -21,7 +21,7 @@ two axes at once is off by sqrt(2) tilt in attitude, and by sqrt(2) (shift + til
 about, which may be the mouth or the end: nobody says. A push that nobody has searched for yet is kept nearer, within
 sqrt(2) shift, since to go wider is the search's part.
 
-Where the demonstrations ended without pressing, nothing stops the part: lead and speed of the push along u fade over
+Where the demonstrations ended without pressing, nothing stops the part: force and speed of the push along u fade over
 the last `stop_m`. In the hole the attitude wanted follows the measured one, low-passed and never farther from the
 nominal one than the stated tilt: the hole knows better. All of this is ours. Searches and returns are counted together.
 """
@@ -252,11 +252,12 @@ class Seating(Composition):
             return command
         share = np.clip(-self._deep / self._seat.stop_m, 0.0, 1.0)
         gone = np.where(self.current == PUSHING, 1.0 - share, 0.0)
-        position, twist = command.pose.position.copy(), command.twist.copy()
-        lead = np.maximum(_dot(position - observation.pose.position, self._way), 0.0)
-        position -= (gone * lead)[:, None] * self._way
+        along = command.impedance.stiffness[..., :3, :3] @ self._way  # a lead aside pushes along where an axis slants
+        pushed = np.maximum(_dot(command.pose.position - observation.pose.position, along.T), 0.0)
+        twist, feedforward = command.twist.copy(), command.feedforward.copy()
         twist[:, :3] -= (gone * np.maximum(_dot(twist[:, :3], self._way), 0.0))[:, None] * self._way
-        return command._replace(pose=Pose(position, command.pose.rotation), twist=twist)
+        feedforward[:, :3] -= (gone * pushed)[:, None] * self._way
+        return command._replace(twist=twist, feedforward=feedforward)
 
     def _added(self, observation: Observation) -> Float:
         """(N, 6) the wrench that is added to the push: catch, keep, lean and rock."""
