@@ -23,7 +23,7 @@ sqrt(2) shift, since to go wider is the search's part.
 
 Where the demonstrations ended without pressing, nothing stops the part: force and speed of the push along u fade over
 the last `stop_m`. In the hole the attitude wanted follows the measured one, low-passed and never farther from the
-nominal one than the stated tilt: the hole knows better. All of this is ours. Searches and returns are counted together.
+nominal one than the most: the hole knows better. All of this is ours. Searches and returns are counted together.
 """
 
 from __future__ import annotations
@@ -47,7 +47,6 @@ from skillframe_search.seat_document import PUSH, SEARCH, Seat, part_of, read_se
 
 APPROACH, PUSHING, SEARCHING, CENTRING = 0, 1, 2, 3
 RUNNING = int(Status.RUNNING)  # a look into the enumeration takes as long as a sum over the batch
-SQRT2 = sqrt(2.0)
 FARTHEST_M = 0.08  # an approach may be longer than the demonstrated one by this
 KEEP_NS_M = 100.0
 REST_S = 0.3  # without progress, near the end
@@ -85,7 +84,6 @@ class Seating(Composition):
         self._upright = rotation_matrix(np.array(seat.attitude))
         self._end, self._start = (np.array(place) + self._upright @ shift for place in (seat.end, seat.start))
         self._axes = surface_axes(self._way)
-        self._most_tilt = SQRT2 * seat.tilt_rad
         parts = [Part("approach", self._reach), Part("push", push), Part("search", search)]
         super().__init__([*parts, Part("centre", self._centre)])
 
@@ -165,12 +163,7 @@ class Seating(Composition):
 
     def _beyond(self, row: int) -> bool:
         """Whether a part that was drawn back still rests farther aside than the fixture may be off, and `aside_m`."""
-        return bool(self._centred[row] and self._off[row] > self._most_aside(self._seat.contact_m))
-
-    def _most_aside(self, height: float | Float) -> float | Float:
-        """How far from the nominal axis the hole may be, turned about a point so high over it, and `aside_m` [m]."""
-        seat = self._seat
-        return SQRT2 * (seat.shift_m + seat.tilt_rad * height) + seat.aside_m
+        return bool(self._centred[row] and self._off[row] > self._seat.most_aside_m)
 
     def _near(self) -> NDArray[np.bool_]:
         result: NDArray[np.bool_] = self._deep >= -(self._seat.short_m + self._seat.height_m)
@@ -210,7 +203,7 @@ class Seating(Composition):
         self.switch(row, APPROACH, time, f"lifts and returns, as the tool {past}")
 
     def _enter(self, observation: Observation, due: NDArray[np.intp]) -> None:
-        """Begin a search about the nominal axis, and a push in an attitude within the stated tilt."""
+        """Begin a search about the nominal axis, and a push in an attitude that the fixture may have."""
         position, rotation = observation.pose.position.copy(), observation.pose.rotation.copy()
         rows = np.flatnonzero(due == SEARCHING)
         self._rim[rows] = self._deep[rows]
@@ -221,9 +214,9 @@ class Seating(Composition):
         super()._enter(observation._replace(pose=Pose(position, rotation)), due)
 
     def _within(self, rotation: Float) -> Float:
-        """Attitudes (N, 3, 3) no farther from the nominal one than the stated tilt."""
+        """Attitudes (N, 3, 3) no farther from the nominal one than the fixture may be."""
         turn = rotation_vector(rotation @ self._upright.T)
-        share = np.minimum(1.0, self._most_tilt / np.maximum(norm(turn), 1e-9))
+        share = np.minimum(1.0, self._seat.most_tilt_rad / np.maximum(norm(turn), 1e-9))
         return rotation_matrix(share[:, None] * turn) @ self._upright
 
     def _followed(self, observation: Observation, command: Command) -> Command:
@@ -271,7 +264,7 @@ class Seating(Composition):
         angle = np.maximum(norm(turn), 1e-9)
         pull = (
             np.where(self._searched, 0.0, seat.upright_nm_rad)
-            + seat.lean_nm_rad * np.maximum(angle - self._most_tilt, 0.0) / angle
+            + seat.lean_nm_rad * np.maximum(angle - seat.most_tilt_rad, 0.0) / angle
         )
         added[:, 3:] = -pull[:, None] * turn
         added[:, 3:] += self._rocked(observation)
@@ -291,8 +284,8 @@ class Seating(Composition):
     def _kept(self, observation: Observation) -> Float:
         """(N, 3) the force that keeps a push where the fixture may be."""
         seat = self._seat
-        height = np.where(self._searched | self._entered(), seat.contact_m, 0.0)
-        beyond = self._off - self._most_aside(height)
+        wide = self._searched | self._entered()
+        beyond = self._off - np.where(wide, seat.most_aside_m, sqrt(2.0) * seat.shift_m + seat.aside_m)
         if not np.count_nonzero(beyond > 0.0):
             return np.zeros((len(beyond), 3))
         away = observation.pose.position - self._ends - self._deep[:, None] * self._way

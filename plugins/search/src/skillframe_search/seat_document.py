@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import radians
+from math import radians, sqrt
 from typing import Any, Literal
 
 import numpy as np
@@ -90,6 +90,16 @@ class Seat:
     slow_nm: float = 0.6
     slow_hz: float = 1.0
     slow_after_s: float = 0.75
+
+    @property
+    def most_tilt_rad(self) -> float:
+        """How far off a fixture may be turned that is off about two axes at once."""
+        return sqrt(2.0) * self.tilt_rad
+
+    @property
+    def most_aside_m(self) -> float:
+        """How far off it may be, turned about a point as far away as the hole is deep, and `aside_m`."""
+        return sqrt(2.0) * (self.shift_m + self.tilt_rad * self.contact_m) + self.aside_m
 
 
 def read_seat(document: Document) -> Seat:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import degrees, radians, sqrt
+from math import degrees, radians
 
 from skillframe.extend.records import Document, Illustration
 from skillframe.extend.registry import registry
@@ -52,7 +52,7 @@ def _parts(seat: Seat, nowhere: bool) -> list[str]:
         f"keep: pulls back with {seat.keep_n_m:g} N/m what is farther from the nominal axis than the fixture may be "
         "off; adds that a push that slants does not pass the fixture by",
         f"lean: pulls upright with {seat.upright_nm_rad:g} Nm/rad on the rim, and with {seat.lean_nm_rad:g} beyond "
-        f"{degrees(sqrt(2.0) * seat.tilt_rad):.1f} degrees; adds that the part does not lie down on the rim",
+        f"{degrees(seat.most_tilt_rad):.1f} degrees; adds that the part does not lie down on the rim",
         f"follow: in the hole the attitude wanted follows the measured one within {seat.follow_s:g} s, by that tilt at "
         "most; adds that a tilted hole guides the part",
         f"rock: turns {seat.rock_nm:g} Nm round at {seat.rock_hz:g} Hz where the part rests after a search, then "
