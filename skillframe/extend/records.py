@@ -69,6 +69,8 @@ class LearnOptions:
         settings: the learner's own settings by name, checked by the learner.
         toward: (3,) where the part is to go, in `axes`, if that is known: a learner that finds no direction to push in
             may take it, and says so.
+        straight: whether it is known that the part goes straight there. What was turned was then aligned, and a learner
+            gives way to it and does not turn on purpose.
     """
 
     at: str | None = None
@@ -76,6 +78,7 @@ class LearnOptions:
     axes: str = "base"
     settings: Mapping[str, Any] = field(default_factory=dict)
     toward: tuple[float, float, float] | None = None
+    straight: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -48,12 +48,13 @@ def main() -> None:
 
 
 def _world(name: str, path: str, given: argparse.Namespace) -> None:
-    try:
-        shown = record(path, robot="panda", count=2, seed=given.seed).demonstrations
-        skills = {"LMC": learn(shown).document, "LMC + search": learn(shown, "seat").document}
-    except SkillframeError as error:
-        print(json.dumps({"world": name, "refused": str(error)}), flush=True)
-        return
+    shown = record(path, robot="panda", count=2, seed=given.seed).demonstrations
+    skills = {}
+    for label, kind in (("LMC", "lmc"), ("LMC + search", "seat")):
+        try:
+            skills[label] = learn(shown, kind).document
+        except SkillframeError as error:
+            print(json.dumps({"world": name, "skill": label, "refused": str(error)}), flush=True)
     scene = load_world(path, {})
     for robot in given.robots:
         for label, document in skills.items():

@@ -97,3 +97,17 @@ def test_of_a_push_that_was_told_nothing_is_said_to_be_known_from_what_was_shown
     assert alone["desired_direction"] is None and alone["evidence"]["pyramid_angle_rad"] > math.radians(25.0)
     assert told["desired_direction"] == DOWN.tolist() and told["evidence"]["pyramid_angle_rad"] is None
     assert "not learned, because no one push explains what was seen" in told["evidence"]["message"]
+
+
+def test_of_a_part_that_is_known_to_go_straight_the_turn_is_given_way_to_and_not_made() -> None:
+    """One person turns it upright from one side, which by itself is a turn on purpose."""
+    shown = syn.pair_of_alignments(syn.Recipe(noise_m=5e-5, noise_n=0.3))[:1]
+    alone, told = (learn(shown, each)["phases"][0] for each in (LearnOptions(), LearnOptions(straight=True)))
+    assert alone["rotation"]["desired_direction"] is not None and alone["pitch"] is not None
+    turn = told["rotation"]
+    assert turn["desired_direction"] is None and turn["speed"] == 0.0 and not turn["fully_compliant"]
+    assert abs(turn["compliant_axes"][0][1]) > 0.99  # about y, which it was turned about
+    assert turn["evidence"]["message"].startswith("the part goes straight") and turn["evidence"]["votes"] is None
+    assert told["translation"]["desired_direction"] == alone["translation"]["desired_direction"]
+    both = syn.pair_of_alignments(syn.Recipe(noise_m=5e-5, noise_n=0.3))  # from both sides there is none to drop
+    assert learn(both, LearnOptions(straight=True)) == learn(both, LearnOptions())

@@ -12,6 +12,7 @@ from skillframe_search.seat_learner import _way_begins
 from skillframe_search.seat_words import NOWHERE, describe, goes_nowhere
 
 from skillframe.document.source import learned
+from skillframe.errors import InputError
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import quaternion_from_matrix
@@ -63,6 +64,18 @@ def resting(high_m, *forces):
     )  # fmt: skip
 
 
+def yawed(demonstration, angle):
+    """The demonstration turned about the way by an angle [rad], or one at each sample."""
+    c, s = np.broadcast_arrays(np.cos(angle), np.sin(angle), demonstration.time)[:2]
+    yaw = np.zeros((len(demonstration.time), 3, 3))
+    yaw[:, 0, 0] = yaw[:, 1, 1] = c
+    yaw[:, 1, 0], yaw[:, 0, 1], yaw[:, 2, 2] = s, -s, 1.0
+    about = np.array([0.4, 0.0, 0.0])
+    position = np.einsum("tij,tj->ti", yaw, demonstration.position - about) + about
+    quaternion = quaternion_from_matrix(yaw @ demonstration.pose.rotation)
+    return replace(demonstration, position=position, quaternion=quaternion)
+
+
 def learned_of(*demonstrations, **settings):
     return learned(registry().skill("seat"), demonstrations, LearnOptions(settings=settings))
 
@@ -97,13 +110,13 @@ def test_a_push_is_learned_until_the_part_is_at_its_end_where_nothing_stops_it(m
 
     def learn(given, options):
         seen.append(round(given[0].duration, 1))
-        told.append(options.toward)
+        told.append(options)
         return real.learn(given, options)
 
     known(monkeypatch, lmc=replace(real, learn=learn))
     for force in (1.0, 10.0):
         seat, _ = end_of(resting(0.0, force))
-    assert seen == [1.8, 2.1] and list(told[1]) == seat["way"]
+    assert seen == [1.8, 2.1] and list(told[1].toward) == seat["way"] and told[1].straight
 
 
 @pytest.mark.parametrize("slant", [0.0, 0.4])
@@ -158,13 +171,32 @@ def test_demonstrations_that_end_leaning_are_told_of_and_a_turn_about_the_way_is
     leaning = learned(kind, [each.between(None, 2.1) for each in whole], LearnOptions())
     assert leaning["seat"]["leant_rad"] == pytest.approx(0.07, abs=0.001)
     assert any("leant up to 4.0 degrees from the mean" in line for line in describe(leaning))
-    turned = []
-    for each, angle in zip(whole, (0.3, -0.3), strict=True):
-        yaw = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
-        about = np.array([0.4, 0.0, 0.0])
-        rotation = yaw @ each.pose.rotation
-        position = (each.position - about) @ yaw.T + about
-        turned.append(replace(each, position=position, quaternion=quaternion_from_matrix(rotation)))
-    upright = learned(kind, turned, LearnOptions())
+    upright = learned(kind, [yawed(one, angle) for one, angle in zip(whole, (0.3, -0.3), strict=True)], LearnOptions())
     assert upright["seat"]["leant_rad"] < 0.002
     assert not any("leant" in line for line in describe(upright))
+
+
+def test_what_is_screwed_in_is_refused_and_what_is_aligned_about_its_way_is_not():
+    """Turned about the way from the contact, at 1.5 s, to the end: 20 degrees are a screw, 10 are not, nor are both."""
+    inside = np.clip((seated(0.0).time - 1.5) / 1.2, 0.0, 1.0)
+    with pytest.raises(InputError, match=r"turned by 20 degrees about its way.*leave --exception out"):
+        learned_of(yawed(seated(0.0), np.radians(20.0) * inside))
+    for angles in ((10.0,), (20.0, -20.0)):
+        made = learned_of(*(yawed(seated(0.0, i), np.radians(a) * inside) for i, a in enumerate(angles)))
+        assert made["phases"][0]["rotation"]["desired_direction"] is None
+    learned_of(yawed(seated(0.0), np.radians(20.0) * np.clip(seated(0.0).time / 1.0, 0.0, 1.0)))  # above the parts
+
+
+def test_who_touches_only_near_the_end_says_nothing_of_the_way_if_others_do():
+    """He came swaying, which is no straight way, and touched 1.6 mm over the end."""
+    first = seated(0.0)
+    late = first.time < 2.8
+    sway = np.where(late, 0.008 * np.sin(20.0 * (2.8 - first.time)), 0.0)
+    brief = replace(
+        first, position=first.position + sway[:, None] * np.array([1.0, 0.0, 0.0]),
+        wrench=first.wrench - np.where(late & (first.time > 1.5), 10.0, 0.0)[:, None] * np.eye(6)[2],
+    )  # fmt: skip
+    with pytest.raises(InputError, match=r"1\.\d mm from first contact to end"):
+        learned_of(brief)
+    alone, both = learned_of(first)["seat"], learned_of(first, brief)["seat"]
+    assert both["contact_m"] == pytest.approx(alone["contact_m"], abs=1e-4) and both["way"] == alone["way"]

@@ -30,7 +30,7 @@ ONE_WAY, CONTRADICTS = radians(10.0), radians(20.0)  # mean ways this near each 
 
 def as_document(part: Learned, settings: Settings) -> dict[str, Any]:
     """The evidence of one part as plain JSON values."""
-    choice, done = part.choice if part.told is None else None, part.work
+    choice, done = None if part.aligned or part.told is not None else part.choice, part.work
     open_direction = is_ambiguous(part)
     return {
         "held": part.held,
@@ -53,7 +53,7 @@ def as_document(part: Learned, settings: Settings) -> dict[str, Any]:
 def is_ambiguous(part: Learned) -> bool:
     """Whether a demonstration from the other side would narrow the direction down."""
     choice = part.choice
-    if choice is None or choice.direction is None or choice.half_width < OPEN_HALF_WIDTH:
+    if choice is None or choice.direction is None or part.aligned or choice.half_width < OPEN_HALF_WIDTH:
         return False
     sideways = part.means - (part.means @ choice.direction)[:, None] * choice.direction
     lean = norm(sideways)
@@ -63,6 +63,8 @@ def is_ambiguous(part: Learned) -> bool:
 def _message(part: Learned, settings: Settings, open_direction: bool) -> str:
     if part.held:
         return _held_message(part, settings)
+    if part.aligned:
+        return "the part goes straight, so that the turn was to align it: what turned it is given way to"
     if part.told is not None:
         why = _untold(part, settings)
         return f"doubtful: the push is that along the way that was given, and not learned, because {why}"

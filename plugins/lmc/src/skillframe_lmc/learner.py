@@ -8,6 +8,7 @@ First the pitch, then for translation and rotation alike
     where to push?     intersection of the pyramids; may not exist      [sectors, directions, heading, modes, votes]
                        its middle, where faces of one side were passed  [expected]
                        where none exists, the way that was told (`LearnOptions.toward`)
+                       of a turn none, where it is known that the part goes straight (`LearnOptions.straight`)
     where to give?     where faces turned the push aside; where none did, or the tool turned,
                        principal axes of the motion that the push does not explain              [faces, axes]
     how stiff?         zero along compliant axes, k elsewhere                                   [gains]
@@ -66,6 +67,7 @@ class Learned:
         speed: mean demonstrated speed, without the pauses [m/s or rad/s].
         pressed: the standing force of each demonstration, where it decided; empty where the motion did.
         told: (3,) direction that was given from outside and taken, because the demonstrations show none.
+        aligned: the demonstrations show a push, which was only to align the part, because it is known to go straight.
     """
 
     name: Name
@@ -79,6 +81,7 @@ class Learned:
     speed: float
     pressed: Sequence[Press] = ()
     told: Float | None = None
+    aligned: bool = False
 
     @property
     def held(self) -> bool:
@@ -93,7 +96,8 @@ class Learned:
     @property
     def direction(self) -> Float | None:
         """The desired direction, if it exists."""
-        return self.told if self.choice is None or self.choice.direction is None else self.choice.direction
+        shown = None if self.choice is None or self.aligned else self.choice.direction
+        return self.told if shown is None else shown
 
 
 def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
@@ -107,7 +111,7 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     frame = frame_of(demonstrations, options)
     at, hand = np.array(frame["learned_at"]), np.array(frame["work_at"])
     tracks = [intervals.track(d, at, hand, options.axes) for d in demonstrations]
-    rotation = _learn_part("rotation", tracks, intervals.rotation, settings)
+    rotation = _learn_part("rotation", tracks, intervals.rotation, settings, straight=options.straight)
     toward = None if options.toward is None else unit(np.array(options.toward))
     translation = _learn_part("translation", tracks, intervals.translation, settings, not rotation.held, toward)
     return {
@@ -119,7 +123,7 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
 
 def _learn_part(
     name: Name, tracks: Sequence[Track], cut: Callable[[Track, Settings], Motion], settings: Settings,
-    turned: bool = True, toward: Float | None = None,
+    turned: bool = True, toward: Float | None = None, straight: bool = False,
 ) -> Learned:  # fmt: skip
     motions = [cut(blocks, settings) for blocks in tracks]
     if settings.contact_only:
@@ -136,7 +140,8 @@ def _learn_part(
     elif votes.choice is not None and votes.choice.direction is None and not turned:
         moving, votes = touched(name, moving, votes, settings)
     choice, means, axes = votes.choice, _means(moving), None
-    direction = None if choice is None else choice.direction
+    aligned = straight and choice is not None and choice.direction is not None
+    direction = None if choice is None or aligned else choice.direction
     told = toward if done is not None and direction is None else None
     if done is not None and (told is not None or not done.environment_drove):
         direction = direction if told is None else told
@@ -148,6 +153,7 @@ def _learn_part(
     return Learned(
         name=name, motions=motions, moving=moving, given=votes.given, work=done, choice=choice, axes=axes, means=means,
         speed=path / time if time > 0.0 else 0.0, pressed=() if stood is None else stood.presses, told=told,
+        aligned=aligned,
     )  # fmt: skip
 
 

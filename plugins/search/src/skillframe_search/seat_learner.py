@@ -6,9 +6,10 @@ and the height of the first contact. The end is as deep as the deepest, since wh
 bottom; where all ended without pressing there is none, and it is the mean. Loose parts touch only near the end, and how
 they slide there is not the way: where the tip came straight from more than twice as far, and more than 30 degrees
 otherwise than it went in contact, the way is that straight and begins with it. So it is where they touch within
-`LEAST_M` of the end and rest there, as at the bottom of a shallow hole that is wide (our choices). From the user comes
-how far off the fixture may be. The rest is by hand. The search is as wide as the mouth can be off its place, both ways
-at once (our choice):
+`LEAST_M` of the end and rest there, as at the bottom of a shallow hole that is wide; who still begins so near says
+nothing of the way, if others do (our choices). The part goes straight in, so that a turn that was shown is how it was
+aligned. From the user comes how far off the fixture may be. The rest is by hand. The search is as wide as the mouth can
+be off its place, both ways at once (our choice):
 
     radius = sqrt(2) (shift + tilt * height of the first contact)
 """
@@ -17,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from math import radians, sqrt
+from math import degrees, radians, sqrt
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -38,6 +39,7 @@ from skillframe_search.seat_document import Seat, as_phase
 
 BEFORE_S = 0.3  # of each demonstration before its contact that the push is learned with
 LEAST_M = 0.002  # from the first contact to the end
+SCREWED = radians(15.0)  # about the way, from the first contact to the end, in the mean; more does not go straight
 RESTED_S, RESTED_M = 0.1, 0.0005  # where that is shorter: it stood at the end, in contact, for so long within so much
 STRAIGHT = 0.15  # of its length that a straight way is off its line, at most
 SLID = np.cos(radians(30.0))  # between that way and the one in contact; more is no insertion
@@ -123,7 +125,9 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     push = registry().skill(settings.skill)
     if push.learn is None:
         raise InputError(f"--skill {push.name}", "is not learned from demonstrations", "name one that is, such as lmc")
-    body = push.learn([_pushed(each, seat) for each in shown], replace(options, settings=own, toward=seat.way))
+    body = push.learn(
+        [_pushed(each, seat) for each in shown], replace(options, settings=own, toward=seat.way, straight=True)
+    )
     at_point = with_center({"frame": {**body["frame"], "learned_at": point.tolist()}}, point.tolist())
     stalled = Stalled(
         way=seat.way, radius=sqrt(2.0) * (seat.shift_m + seat.tilt_rad * seat.contact_m), tilt=seat.tilt_rad,
@@ -225,9 +229,9 @@ def _pushed(shown: _Shown, seat: Seat) -> Demonstration:
 
 
 def _seat(shown: Sequence[_Shown], point: Float, settings: SeatSettings) -> Seat:
-    start, contact, end = (
-        np.mean(each, axis=0) for each in ([s.start for s in shown], [s.contact for s in shown], [s.end for s in shown])
-    )
+    start, end = np.mean([s.start for s in shown], axis=0), np.mean([s.end for s in shown], axis=0)
+    telling = [s for s in shown if norm(s.end - s.contact) >= LEAST_M] or shown
+    contact = end - np.mean([s.end - s.contact for s in telling], axis=0)
     depth = float(norm(end - contact))
     if depth < LEAST_M:
         raise InputError(
@@ -235,6 +239,7 @@ def _seat(shown: Sequence[_Shown], point: Float, settings: SeatSettings) -> Seat
             "record until the part is seated, and begin before it touches",
         )  # fmt: skip
     way = unit(end - contact)
+    _goes_straight(shown, way)
     free = all(_pressed_at_end(each, way) < FREE_N for each in shown)
     if not free:  # nobody goes deeper than the bottom, and some stop short of it
         moved = settings.place == "start"
@@ -251,6 +256,16 @@ def _seat(shown: Sequence[_Shown], point: Float, settings: SeatSettings) -> Seat
         height_m=settings.height, friction=settings.friction, approach=settings.approach, search=settings.search,
         stop_m=STOP_M if free else 0.0, tries=settings.tries,
     )  # fmt: skip
+
+
+def _goes_straight(shown: Sequence[_Shown], way: Float) -> None:
+    """Raise `InputError` if the part was turned about its way from the contact on, as a bayonet is."""
+    turned = [rotation_vector(s.attitude @ s.part.pose.rotation[0].T) @ way for s in shown]
+    if (mean := abs(float(np.mean(turned)))) > SCREWED:
+        raise InputError(
+            "learn", f"the part was turned by {degrees(mean):.0f} degrees about its way, which a seating does not do",
+            "leave --exception out: the push alone learns the turn",
+        )  # fmt: skip
 
 
 def _vector(values: Float) -> tuple[float, float, float]:
