@@ -39,6 +39,7 @@ _FREE = 1e-5
 _MOST_LOADED = 8
 _LOADED: dict[tuple[str, ...], LoadedParts] = {}
 """The last parts by what their files hold, wherever these lie: a campaign's folder has copies of them."""
+_CLIMB = 1e-3
 _TRIES = (1.0, 0.75, 0.5, 0.25, 0.0)
 
 
@@ -226,15 +227,18 @@ def _inertia(found: PartsFit, plug: MeshPart, file: FixtureFile) -> tuple[float,
 def _starts(found: PartsFit, file: FixtureFile) -> tuple[tuple[float, Float], ...]:
     """Heights of the tip and tilts from which it is shown: tilted about y, then about x, as deep as it fits.
 
-    Where the tilted part does not fit into the mouth with its lowest corner that deep, it is a quarter less, and so on.
+    Where the tilted part does not fit into the mouth with its lowest corner that deep, it is a quarter less, and so on,
+    and then higher and higher, at most over all of the standing part, which may rise above its mouth.
     """
     shown, starts, points = file.task.demonstration, [], corners(found)
+    top = max(0.0, float(found.socket.bounding_box()[5]))
     for axis in (1, 0):
         tilt = shown.tilt * np.eye(3)[axis]
         lift = -float(lowest(points, tilt[None])[0])
-        heights = [lift - share * min(shown.deep, found.depth) for share in _TRIES]
-        free = [h for h in heights if _is_free(found, tilt, h)]
-        starts.append((free[0] if free else lift + file.task.start.above_mouth, tilt))
+        inside = [lift - share * min(shown.deep, found.depth) for share in _TRIES]
+        over = lift + file.task.start.above_mouth + np.arange(0.0, top + _CLIMB, _CLIMB)
+        free = next((h for h in [*inside, *over.tolist()] if _is_free(found, tilt, h)), float(over[-1]))
+        starts.append((free, tilt))
     return tuple(starts)
 
 

@@ -10,6 +10,8 @@ from skillframe.errors import InputError
 from skillframe.extend.registry import registry
 from skillframe.extend.worlds import make_scene
 from skillframe.frames import Pose, matrix_from_quaternion, norm, rotation_matrix
+from skillframe.parts import load
+from skillframe.parts.fit import corners, lowest
 from skillframe.parts.world import GRIPPER
 from skillframe.world.scene import State
 from tests.part_meshes import FILE, round_pair, write
@@ -102,6 +104,20 @@ def test_demonstrations_start_tilted_in_the_mouth_from_two_sides(path):
     ]
     for start in starts:
         assert -0.0017 - 1e-9 <= start["start.offset_z"] < 0.0  # 1 mm above the mouth, and 0.7 mm into it
+
+
+@pytest.mark.parametrize("free_above", [0.004, np.inf])
+def test_a_demonstration_begins_above_what_rises_over_the_mouth(path, monkeypatch, free_above):
+    """Where the tilted part does not fit into the mouth it climbs; where nothing is free it is over all of it."""
+    loaded = load.load(path)
+    rising = loaded.fit._replace(socket=loaded.fit.socket.translate([0.0, 0.0, 0.01]))
+    monkeypatch.setattr(load, "_is_free", lambda found, tilt, height: height > free_above)
+    for height, tilt in load._starts(rising, loaded.file):
+        lowest_corner = height + float(lowest(corners(rising), tilt[None])[0])
+        if free_above < np.inf:
+            assert free_above < height <= free_above + 0.001
+        else:
+            assert lowest_corner >= 0.01 + loaded.file.task.start.above_mouth - 1e-12
 
 
 def test_results_say_depth_clearance_error_and_the_hashes_of_every_file(path):

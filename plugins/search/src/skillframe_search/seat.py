@@ -13,6 +13,8 @@ What is added to the push is a wrench F at the centre of compliance, u the way, 
     catch      - c max(0, v.u - v_max) u                     so that a part that lets go does not fall in
     lean       - k_0 rho - k_1 max(0, |rho| - most) rho/|rho|    so that it does not lie down; k_0 on the rim only
     keep       - k max(0, |a| - most) a/|a| - d v_a              so that a slanting push does not pass the fixture by
+    free       - (1 - u u^T) K (x_d - x)                         in the hole, which guides the part: a push that slants
+                                                                 or is stiff on an axis across jams it
     rock       m (a cos wt + b sin wt),  a, b across u           in the hole, where it rests short of the end: quickly,
                                                                  which frees a jam, then slowly, which moves the tip
 
@@ -119,7 +121,7 @@ class Seating(Composition):
             np.where(moved, self._deep, self._best),
             np.where(moved, observation.time, self._since),
         )
-        command = self._stopped(observation, self._followed(observation, super().step(observation)))
+        command = self._guided(observation, self._followed(observation, super().step(observation)))
         self._look(observation, command.status == RUNNING)
         if np.count_nonzero(self._status):
             told = np.where(self._status == RUNNING, "", self._reason)
@@ -239,17 +241,22 @@ class Seating(Composition):
         result: NDArray[np.bool_] = self._searched | self._urged
         return result
 
-    def _stopped(self, observation: Observation, command: Command) -> Command:
-        """The command, its push along the way fading before the end where nothing else stops the part."""
-        if not self._seat.stop_m:
+    def _guided(self, observation: Observation, command: Command) -> Command:
+        """The command, its push without what goes across the way in the hole, and fading before an end that is open."""
+        seat, pushing = self._seat, self.current == PUSHING
+        inside = pushing & (self._in_hole() | self._entered())
+        if not (seat.stop_m or np.count_nonzero(inside)):
             return command
-        share = np.clip(-self._deep / self._seat.stop_m, 0.0, 1.0)
-        gone = np.where(self.current == PUSHING, 1.0 - share, 0.0)
-        along = command.impedance.stiffness[..., :3, :3] @ self._way  # a lead aside pushes along where an axis slants
-        pushed = np.maximum(_dot(command.pose.position - observation.pose.position, along.T), 0.0)
+        gone = 1.0 - np.clip(-self._deep / seat.stop_m, 0.0, 1.0) if seat.stop_m else np.zeros(len(pushing))
+        gone = np.where(pushing, gone, 0.0)
+        lead = command.pose.position - observation.pose.position
+        force = (command.impedance.stiffness[..., :3, :3] * lead[:, None, :]).sum(axis=-1)
         twist, feedforward = command.twist.copy(), command.feedforward.copy()
-        twist[:, :3] -= (gone * np.maximum(_dot(twist[:, :3], self._way), 0.0))[:, None] * self._way
-        feedforward[:, :3] -= (gone * pushed)[:, None] * self._way
+        for wanted, given in ((twist, command.twist[:, :3]), (feedforward, force)):
+            along = _dot(given, self._way)
+            across = given - along[:, None] * self._way
+            left_out = (gone * np.maximum(along, 0.0))[:, None] * self._way + np.where(inside[:, None], across, 0.0)
+            wanted[:, :3] -= left_out
         return command._replace(twist=twist, feedforward=feedforward)
 
     def _added(self, observation: Observation) -> Float:

@@ -53,6 +53,8 @@ def _parts(seat: Seat, nowhere: bool) -> list[str]:
         "off; adds that a push that slants does not pass the fixture by",
         f"lean: pulls upright with {seat.upright_nm_rad:g} Nm/rad on the rim, and with {seat.lean_nm_rad:g} beyond "
         f"{degrees(seat.most_tilt_rad):.1f} degrees; adds that the part does not lie down on the rim",
+        "free: in the hole nothing of the push goes across the way; adds that a push that slants, or gives way on one "
+        "axis alone, does not jam the part",
         f"follow: in the hole the attitude wanted follows the measured one within {seat.follow_s:g} s, by that tilt at "
         "most; adds that a tilted hole guides the part",
         f"rock: turns {seat.rock_nm:g} Nm round at {seat.rock_hz:g} Hz where the part rests after a search, then "
