@@ -15,8 +15,8 @@ What is added to the push is a wrench F at the centre of compliance, u the way, 
     keep       - k max(0, |a| - most) a/|a| - d v_a              so that a slanting push does not pass the fixture by
     free       - (1 - u u^T) K (x_d - x)                         in the hole, which guides the part: a push that slants
                                                                  or is stiff on an axis across jams it
-    rock       m (a cos wt + b sin wt),  a, b across u           in the hole, where it rests short of the end: quickly,
-                                                                 which frees a jam, then slowly, which moves the tip
+    rock       a torque that goes round: quickly, slowly, then   in the hole, where it rests short of the end: frees a
+               on a spiral of the tip, see `rocking`             jam, and finds a second hole below
 
 a is the way from the nominal axis to the tool, across u, and v_a its rate, beyond the most. A fixture that is off on
 two axes at once is off by sqrt(2) tilt in attitude, and by sqrt(2) (shift + tilt h) in place, h from where it is turned
@@ -43,8 +43,8 @@ from skillframe.frames import Float, Pose, norm, rotation_matrix, rotation_vecto
 from skillframe.sequence import END, Composition, Part
 from skillframe.skill import Command, Observation, Skill, Status
 from skillframe_search.centre import Centre
-from skillframe_search.contact import surface_axes
 from skillframe_search.reach import Reach
+from skillframe_search.rocking import Rocking
 from skillframe_search.seat_document import PUSH, SEARCH, Seat, part_of, read_seat
 
 APPROACH, PUSHING, SEARCHING, CENTRING = 0, 1, 2, 3
@@ -85,7 +85,7 @@ class Seating(Composition):
         self._seat, self._way = seat, np.array(seat.way)
         self._upright = rotation_matrix(np.array(seat.attitude))
         self._end, self._start = (np.array(place) + self._upright @ shift for place in (seat.end, seat.start))
-        self._axes = surface_axes(self._way)
+        self._rocking = Rocking(seat, self._upright)
         parts = [Part("approach", self._reach), Part("push", push), Part("search", search)]
         super().__init__([*parts, Part("centre", self._centre)])
 
@@ -106,6 +106,7 @@ class Seating(Composition):
         self._tried = np.zeros(n, dtype=np.intp)
         self._searched, self._urged, self._centred = (np.zeros(n, dtype=bool) for _ in range(3))
         self._held = observation.pose.rotation.copy()
+        self._rocking.start(n)
         self._best, self._since, self._rim = np.full(n, -np.inf), observation.time.copy(), np.zeros(n)
         super().start(observation, rngs)
         if not self._seat.approach:
@@ -185,7 +186,7 @@ class Seating(Composition):
         idle = time - self._since
         lost = here & (self.current != APPROACH) & (self._deep > self._seat.lost_m + self._seat.height_m)
         still = here & ~lost & (self.current == PUSHING)
-        patience = np.where(self._in_hole(), self._seat.patience_s, self._seat.stall_s)
+        patience = np.where(self._in_hole(), self._rocking.patience(self._deep, self._urged), self._seat.stall_s)
         still &= (idle >= patience) | ((self._deep >= -self._seat.short_m) & (idle >= REST_S))
         for i in _rows(still):
             self.leave(i, float(time[i]), Status.SUCCESS, f"no progress for {idle[i]:.1f} s")
@@ -274,19 +275,11 @@ class Seating(Composition):
             + seat.lean_nm_rad * np.maximum(angle - seat.most_tilt_rad, 0.0) / angle
         )
         added[:, 3:] = -pull[:, None] * turn
-        added[:, 3:] += self._rocked(observation)
-        return np.where(pushing[:, None], added, 0.0)
-
-    def _rocked(self, observation: Observation) -> Float:
-        """(N, 3) the torque that goes round: quickly once the tool rests short of the end, slowly where it stays."""
-        seat, idle = self._seat, observation.time - self._since
         resting = self._in_hole() & (self._deep < -seat.short_m)
-        slow = idle > seat.slow_after_s
-        torque = np.where(slow, seat.slow_nm, seat.rock_nm) * (resting & (idle > seat.rock_after_s))
-        phase = 2.0 * np.pi * np.where(slow, seat.slow_hz, seat.rock_hz) * observation.time
-        a, b = self._axes[:2]
-        result: Float = (torque * np.cos(phase))[:, None] * a + (torque * np.sin(phase))[:, None] * b
-        return result
+        added[:, 3:] += self._rocking.torque(
+            observation, observation.time - self._since, self._deep, resting, self._urged
+        )
+        return np.where(pushing[:, None], added, 0.0)
 
     def _kept(self, observation: Observation) -> Float:
         """(N, 3) the force that keeps a push where the fixture may be."""

@@ -50,6 +50,8 @@ class Seat:
         follow_s: in the hole the attitude wanted follows the measured one within this; 0 does not.
         rock_nm, rock_hz: torque that turns across the way in a hole, once the tool rests in it for rock_after_s;
             slow_nm, slow_hz: the same once it rests for slow_after_s. Quickly it frees a jam, slowly it moves the tip.
+        tip_pitch_m, tip_hz: where that did not help either, the tip goes round on a spiral of this pitch, so often;
+            tip_nm_rad, tip_nm: with this stiffness, and this torque at most.
     """
 
     way: Vector
@@ -90,6 +92,10 @@ class Seat:
     slow_nm: float = 0.6
     slow_hz: float = 1.0
     slow_after_s: float = 0.75
+    tip_pitch_m: float = 0.0007
+    tip_hz: float = 1.25
+    tip_nm_rad: float = 40.0
+    tip_nm: float = 0.9
 
     @property
     def most_tilt_rad(self) -> float:
@@ -120,8 +126,9 @@ def read_seat(document: Document) -> Seat:
         value = getattr(seat, name)
         if isinstance(value, float | int) and not 0.0 <= value < 1e4:
             raise InputError(f"seat.{name}", f"should not be negative, is {value:g}", "fix it, or learn again")
-    if not (seat.approach_speed and seat.stall_s and seat.patience_s and seat.short_m):
-        raise InputError("seat", "approach_speed, stall_s, patience_s and short_m should be positive", "fix them")
+    if not (seat.approach_speed and seat.stall_s and seat.patience_s and seat.short_m and seat.tip_hz):
+        what = "approach_speed, stall_s, patience_s, short_m and tip_hz should be positive"
+        raise InputError("seat", what, "fix them")
     return seat
 
 

@@ -58,8 +58,8 @@ def _parts(seat: Seat, nowhere: bool) -> list[str]:
         f"follow: in the hole the attitude wanted follows the measured one within {seat.follow_s:g} s, by that tilt at "
         "most; adds that a tilted hole guides the part",
         f"rock: turns {seat.rock_nm:g} Nm round at {seat.rock_hz:g} Hz where the part rests after a search, then "
-        f"{seat.slow_nm:g} Nm at {seat.slow_hz:g} Hz; adds that it does not jam, and finds a second hole below the "
-        "first",
+        f"{seat.slow_nm:g} Nm at {seat.slow_hz:g} Hz, then its tip on a spiral of {1e3 * seat.tip_pitch_m:g} mm pitch; "
+        "adds that it does not jam, and finds a second hole below the first",
         f"centre: at the end, but more than {1e3 * seat.aside_m:g} mm from the nominal axis, it is drawn back until "
         f"{seat.centre_n:g} N hold it; adds that a part in a slot that is open at an end is where it was shown",
         f"lost: more than {1e3 * (seat.lost_m + seat.height_m):.1f} mm past the end is beside the hole: it returns",
