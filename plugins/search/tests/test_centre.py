@@ -12,14 +12,17 @@ from skillframe.skill import Observation, Status
 END = np.array([[0.4, 0.0, 0.2]])
 
 
-def drawn(wall_m, seconds=1.0):
-    """The last command and place of a tool 3 mm aside that follows, and touches a wall so far from the axis [m]."""
+def drawn(wall_m, seconds=1.0, lag_m=0.0):
+    """The last command and place of a tool 3 mm aside that follows, and touches a wall so far from the axis [m].
+
+    Friction lets it follow so far behind.
+    """
     skill, x = Centre(END, DOWN, 8.0), 0.003
     wanted = x
     for k in range(round(seconds / 0.01)):
         pose = Pose(END + np.array([[x, 0.0, 0.0]]), np.eye(3)[None])
         wrench = np.zeros((1, 6))
-        wrench[0, 0] = ACROSS * max(wall_m - wanted, 0.0)
+        wrench[0, 0] = ACROSS * (max(wall_m - wanted, 0.0) + min(lag_m, x - wanted))
         seen = Observation(np.array([0.01 * k]), 0.01, pose, np.zeros((1, 6)), wrench)
         if not k:
             skill.start(seen, [np.random.default_rng(0)])
@@ -27,14 +30,34 @@ def drawn(wall_m, seconds=1.0):
         if command.status[0]:
             break
         wanted = float(command.pose.position[0, 0]) - 0.4
-        x = max(wanted, wall_m)
+        x = min(x, max(wanted + lag_m, wall_m))
     return command, x
 
 
 def test_a_part_that_nothing_holds_arrives_over_the_axis():
     command, x = drawn(-1.0)
-    assert command.status[0] == Status.SUCCESS and x == pytest.approx(0.0, abs=1e-9)
-    assert "drawn back by 3.0 of 3.0 mm" in command.reason[0]
+    assert command.status[0] == Status.SUCCESS and x == pytest.approx(0.0, abs=0.00021)
+    assert "drawn back by 2.8 of 3.0 mm" in command.reason[0] and "held" not in command.reason[0]
+
+
+def test_what_friction_holds_back_with_less_than_that_arrives_as_well():
+    """6 N at 4000 N/m are 1.5 mm."""
+    command, x = drawn(-1.0, lag_m=0.0015)
+    assert command.status[0] == Status.SUCCESS and x == pytest.approx(0.0, abs=0.00021)
+    assert "held" not in command.reason[0]
+
+
+def test_what_yields_to_the_stated_force_alone_is_wanted_no_farther_beyond_the_axis():
+    """A script that never moves and feels nothing: it ends, wanted 8 N / 4000 N/m beyond."""
+    skill = Centre(END, DOWN, 8.0)
+    pose = Pose(END + 0.003 * np.eye(3)[:1], np.eye(3)[None])
+    for k in range(40):
+        seen = Observation(np.array([0.01 * k]), 0.01, pose, np.zeros((1, 6)), np.zeros((1, 6)))
+        if not k:
+            skill.start(seen, [np.random.default_rng(0)])
+        command = skill.step(seen)
+    assert command.status[0] == Status.SUCCESS
+    assert command.pose.position[0, 0] - 0.4 == pytest.approx(-8.0 / ACROSS)
 
 
 def test_a_wall_ends_it_where_it_holds_with_more_than_the_stated_force():
@@ -81,7 +104,7 @@ def test_what_nothing_stops_is_not_pressed_while_it_is_drawn_back():
     played = Played(stop_m=0.001)
     played.go()
     played.deep[:], played.aside[:] = 0.0, 0.0015
-    command = played.go(0.4)  # drawn back from 0.3 s on, for 0.08 + 0.1 s
+    command = played.go(0.4)  # drawn back from 0.3 s on
     assert (played.skill.current == CENTRING).all()
     np.testing.assert_array_equal(command.feedforward, 0.0)
 

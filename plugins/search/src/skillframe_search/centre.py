@@ -1,10 +1,11 @@
 r"""Drawing a part that rests at its depth back over the nominal axis, as far as its contacts let it.
 
-    x_d = x_0 + u e,    0 <= u <= |a|,    e = - a / |a|,  a: from the nominal axis to the tool, across the way
+    x_d = x_0 + u e,    0 <= u <= |a| + F / k,    e = - a / |a|,  a: from the nominal axis to the tool, across the way
 
 A search leaves a part wherever it sank. Walls hold it there, or nothing does: in a slot that is open at an end the
 depth tells nothing of the place along it, and the demonstrated place is the best guess. It presses lightly, where there
-is a bottom, and has done what it can where it arrives, or where more than a stated force holds it (all ours).
+is a bottom, and has done what it can where it arrives, or where more than a stated force F holds it. Friction holds it
+back with less, so that it is wanted up to F / k beyond the axis, k the stiffness across (all ours).
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from skillframe.frames import Float, Pose, norm
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons, rows_of
 
 SPEED, PRESS_N, ACROSS, TURN = 0.02, 4.0, 4000.0, 3.0  # m/s, N, N/m, Nm/rad: the default search's
-SETTLE_S, SMOOTHING_S = 0.1, 0.02
+SETTLE_S, SMOOTHING_S, THERE_M = 0.1, 0.02, 2e-4
 ROWS = ("_back", "_length", "_began", "_felt", "_status", "_reason")
 
 
@@ -64,12 +65,14 @@ class Centre(Skill):
         gone = SPEED * (observation.time - self._began)
         held = -(observation.wrench[:, :3] * self._back).sum(axis=1)
         self._felt += (held - self._felt) * (observation.dt / (SMOOTHING_S + observation.dt))
-        done = (self._felt > self._most) | (gone > self._length + SPEED * SETTLE_S)
+        farthest = self._length + self._most / ACROSS
+        moved = ((observation.pose.position - self._home.position) * self._back).sum(axis=1)
+        done = (self._felt > self._most) | (moved > self._length - THERE_M) | (gone > farthest + SPEED * SETTLE_S)
         for i in np.flatnonzero(done & (self._status == Status.RUNNING)).tolist():
             self._status[i], self._reason[i] = Status.SUCCESS, self._told(observation, i)
         wrench = np.zeros((len(gone), 6))
         wrench[:, :3] = PRESS_N * self._pressed * self._way
-        place = self._home.position + np.minimum(gone, self._length)[:, None] * self._back
+        place = self._home.position + np.minimum(gone, farthest)[:, None] * self._back
         pose = Pose(place, self._home.rotation)
         zero = np.zeros((len(gone), 6))
         return Command(pose, zero, Impedance(self._stiffness), wrench, self._status.copy(), self._reason.copy())

@@ -62,6 +62,8 @@ class Rocking:
             resting: (N,) who is in the hole and short of the end.
             urged: (N,) whose push goes on after rocking.
         """
+        if not np.count_nonzero(resting):
+            return np.zeros((len(resting), 3))
         seat = self._seat
         slow = idle > seat.slow_after_s
         size = np.where(slow, seat.slow_nm, seat.rock_nm) * (resting & (idle > seat.rock_after_s))
