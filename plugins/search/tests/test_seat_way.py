@@ -187,16 +187,32 @@ def test_what_is_screwed_in_is_refused_and_what_is_aligned_about_its_way_is_not(
     learned_of(yawed(seated(0.0), np.radians(20.0) * np.clip(seated(0.0).time / 1.0, 0.0, 1.0)))  # above the parts
 
 
-def test_who_touches_only_near_the_end_says_nothing_of_the_way_if_others_do():
-    """He came swaying, which is no straight way, and touched 1.6 mm over the end."""
-    first = seated(0.0)
-    late = first.time < 2.8
-    sway = np.where(late, 0.008 * np.sin(20.0 * (2.8 - first.time)), 0.0)
-    brief = replace(
-        first, position=first.position + sway[:, None] * np.array([1.0, 0.0, 0.0]),
-        wrench=first.wrench - np.where(late & (first.time > 1.5), 10.0, 0.0)[:, None] * np.eye(6)[2],
+def swaying(one):
+    """The demonstration of one who came swaying, which is no straight way, and touched 1.6 mm over the end."""
+    late = one.time < 2.8
+    sway = np.where(late, 0.008 * np.sin(20.0 * (2.8 - one.time)), 0.0)
+    return replace(
+        one, position=one.position + sway[:, None] * np.array([1.0, 0.0, 0.0]),
+        wrench=one.wrench - np.where(late & (one.time > 1.5), 10.0, 0.0)[:, None] * np.eye(6)[2],
     )  # fmt: skip
+
+
+def test_who_touches_only_near_the_end_says_nothing_of_the_way_if_others_do():
+    first = seated(0.0)
     with pytest.raises(InputError, match=r"1\.\d mm from first contact to end"):
-        learned_of(brief)
-    alone, both = learned_of(first)["seat"], learned_of(first, brief)["seat"]
+        learned_of(swaying(first))
+    alone, both = learned_of(first)["seat"], learned_of(first, swaying(first))["seat"]
     assert both["contact_m"] == pytest.approx(alone["contact_m"], abs=1e-4) and both["way"] == alone["way"]
+
+
+def test_where_all_touch_only_near_the_end_the_way_is_that_in_which_they_pressed_at_rest():
+    """It is as long as the least way, 2 mm. Who leans on a wall as hard as he presses shows none, and is refused."""
+    seat = learned_of(swaying(resting(0.0, 10.0)))["seat"]
+    assert np.array(seat["way"]) @ DOWN > np.cos(0.01) and seat["contact_m"] == pytest.approx(0.002, abs=1e-4)
+    pressed = swaying(resting(0.0, 10.0))
+    for aside, alone in ((10.0, False), (-30.0, True)):
+        leaning = replace(pressed, wrench=pressed.wrench + aside * (pressed.time > 3.0)[:, None] * np.eye(6)[0])
+        with pytest.raises(InputError, match="from first contact to end"):
+            learned_of(leaning, *([] if alone else [replace(leaning, wrench=leaning.wrench * [-1, 1, 1, 1, 1, 1])]))
+    with pytest.raises(InputError, match="from first contact to end"):
+        learned_of(swaying(resting(0.0, 2.0)))

@@ -7,7 +7,8 @@ bottom; where all ended without pressing there is none, and it is the mean. Loos
 they slide there is not the way: where the tip came straight from more than twice as far, and more than 30 degrees
 otherwise than it went in contact, the way is that straight and begins with it. So it is where they touch within
 `LEAST_M` of the end and rest there, as at the bottom of a shallow hole that is wide; who still begins so near says
-nothing of the way, if others do (our choices). The part goes straight in, so that a turn that was shown is how it was
+nothing of the way, if others do, and where all do it is the way in which they pressed at rest, `LEAST_M` long (our
+choices). The part goes straight in, so that a turn that was shown is how it was
 aligned. From the user comes how far off the fixture may be. The rest is by hand. The search is as wide as the mouth can
 be off its place, both ways at once (our choice):
 
@@ -94,6 +95,7 @@ class _Shown(NamedTuple):
     Attributes:
         start, contact, end: three points (3,) of its way [m].
         attitude: (3, 3) at its end.
+        pressing: (3,) mean force over the last `RESTED_S` of its contact; zero if it did not rest there [N].
         time, position, force: (T,), (T, 3), (T, 3) of the point, and of what the tool exerts on the parts [s, m, N].
         part: from shortly before its contact on.
     """
@@ -102,6 +104,7 @@ class _Shown(NamedTuple):
     contact: Float
     end: Float
     attitude: Float
+    pressing: Float
     time: Float
     position: Float
     force: Float
@@ -177,12 +180,14 @@ def _shown(demonstration: Demonstration, point: Float) -> _Shown:
     pose = demonstration.pose
     position = Pose(pose.position, pose.rotation).at(point).position
     first = int(np.searchsorted(demonstration.time, began))
-    last = position[demonstration.time >= max(began, contacts[-1][1] - RESTED_S)]
-    rested = contacts[-1][1] - began >= RESTED_S and float(norm(last[0] - last[-1])) < RESTED_M
+    last, force = demonstration.time >= max(began, contacts[-1][1] - RESTED_S), -demonstration.wrench[:, :3]
+    moved = float(norm(position[last][0] - position[last][-1]))
+    rested = contacts[-1][1] - began >= RESTED_S and moved < RESTED_M
     brief = LEAST_M if rested else 0.0
     return _Shown(
-        position[0], _way_begins(position, first, brief), position[-1], pose.rotation[-1], demonstration.time, position,
-        -demonstration.wrench[:, :3], demonstration.between(began - BEFORE_S, None),
+        position[0], _way_begins(position, first, brief), position[-1], pose.rotation[-1],
+        force[last].mean(axis=0) * rested, demonstration.time, position, force,
+        demonstration.between(began - BEFORE_S, None),
     )  # fmt: skip
 
 
@@ -230,10 +235,12 @@ def _pushed(shown: _Shown, seat: Seat) -> Demonstration:
 
 def _seat(shown: Sequence[_Shown], point: Float, settings: SeatSettings) -> Seat:
     start, end = np.mean([s.start for s in shown], axis=0), np.mean([s.end for s in shown], axis=0)
-    telling = [s for s in shown if norm(s.end - s.contact) >= LEAST_M] or shown
-    contact = end - np.mean([s.end - s.contact for s in telling], axis=0)
+    telling = [s.end - s.contact for s in shown if norm(s.end - s.contact) >= LEAST_M]
+    if not telling and (pressed := _pressed_way(shown)) is not None:
+        telling = [LEAST_M * pressed]
+    contact = end - np.mean(telling or [s.end - s.contact for s in shown], axis=0)
     depth = float(norm(end - contact))
-    if depth < LEAST_M:
+    if not telling or depth < 0.5 * LEAST_M:  # or ways that contradict each other
         raise InputError(
             "learn", f"the demonstrations go {1e3 * depth:.1f} mm from first contact to end, which seats nothing",
             "record until the part is seated, and begin before it touches",
@@ -256,6 +263,15 @@ def _seat(shown: Sequence[_Shown], point: Float, settings: SeatSettings) -> Seat
         height_m=settings.height, friction=settings.friction, approach=settings.approach, search=settings.search,
         stop_m=STOP_M if free else 0.0, tries=settings.tries,
     )  # fmt: skip
+
+
+def _pressed_way(shown: Sequence[_Shown]) -> Float | None:
+    """The way (3,) in which all pressed at rest at their ends, within 30 degrees of it and of how they came, if any."""
+    ways = np.array([unit(s.pressing) for s in shown if norm(s.pressing) >= FREE_N])
+    if len(ways) < len(shown):
+        return None
+    mean, came = unit(ways.mean(axis=0)), np.array([unit(s.end - s.start) for s in shown])
+    return mean if min((ways @ mean).min(), (came @ mean).min()) > SLID else None
 
 
 def _goes_straight(shown: Sequence[_Shown], way: Float) -> None:
