@@ -69,8 +69,8 @@ class LearnOptions:
         settings: the learner's own settings by name, checked by the learner.
         toward: (3,) where the part is to go, in `axes`, if that is known: a learner that finds no direction to push in
             may take it, and says so.
-        straight: whether it is known that the part goes straight there. What was turned was then aligned, and a learner
-            gives way to it and does not turn on purpose.
+        straight: whether it is known that the part goes straight there. A turn that was shown then only aligned the
+            part: a learner gives way to such turns, and does not push them.
     """
 
     at: str | None = None

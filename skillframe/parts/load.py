@@ -40,6 +40,7 @@ _MOST_LOADED = 8
 _LOADED: dict[tuple[str, ...], LoadedParts] = {}
 """The last parts by what their files hold, wherever these lie: a campaign's folder has copies of them."""
 _CLIMB = 1e-3
+"""Of a start that is not free, from one try to the next [m]."""
 _TRIES = (1.0, 0.75, 0.5, 0.25, 0.0)
 
 

@@ -48,7 +48,11 @@ def main() -> None:
 
 
 def _world(name: str, path: str, given: argparse.Namespace) -> None:
-    shown = record(path, robot="panda", count=2, seed=given.seed).demonstrations
+    try:
+        shown = record(path, robot="panda", count=2, seed=given.seed).demonstrations
+    except SkillframeError as error:
+        print(json.dumps({"world": name, "refused": str(error)}), flush=True)
+        return
     skills = {}
     for label, kind in (("LMC", "lmc"), ("LMC + search", "seat")):
         try:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from seat_played import DOWN, MOST_TILT, SEAT, Played, searching
+from skillframe_search.seat import PUSHING, SEARCHING
 
 from skillframe.frames import norm, rotation_matrix, rotation_vector
 from skillframe.skill import Impedance, Status
@@ -136,3 +137,32 @@ def test_in_the_hole_a_push_is_not_led_across_the_way_and_a_search_is(monkeypatc
 def _led(command, aside):
     command.twist[:, :3] += aside
     return command
+
+
+def test_the_tip_goes_on_a_spiral_once_the_push_goes_on_and_the_push_is_patient_with_it():
+    """20 mm are left of a hole of 60: six turns, of which the first leans by a sixth of the most."""
+    played = Played(contact_m=0.060)
+    played.deep[:] = -0.060
+    played.go()
+    for script in (played.push, played.search):
+        script.ends = {0: Status.SUCCESS}
+        played.go(0.02)
+    played.deep[:] = -0.020
+    torque = played.go(SEAT.slow_after_s + 0.8).feedforward[0, 3:] - 1.0
+    assert norm(torque) == pytest.approx(SEAT.slow_nm)  # after a search a torque alone
+    assert not played.skill._urged[0]
+    played.go(SEAT.patience_s - SEAT.slow_after_s - 0.8 + 0.02)
+    assert played.skill._urged[0]
+    torque = played.go(SEAT.slow_after_s + 1.0 / SEAT.tip_hz).feedforward[0, 3:] - 1.0
+    assert norm(torque) == pytest.approx(SEAT.tip_nm_rad * MOST_TILT / 6.0, rel=0.03)
+    played.go(3.0)  # 4.6 s in all, and it waits 5.75
+    assert played.skill.current[0] == PUSHING
+    played.go(1.5)
+    assert played.skill.current[0] == SEARCHING
+
+
+def test_a_part_at_its_end_is_not_rocked():
+    played = searching()
+    played.search.ends = {0: Status.SUCCESS}
+    played.deep[:] = -0.0004
+    assert norm(played.go(0.25).feedforward[0, 3:] - 1.0) < 1e-12

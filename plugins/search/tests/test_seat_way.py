@@ -181,6 +181,8 @@ def test_what_is_screwed_in_is_refused_and_what_is_aligned_about_its_way_is_not(
     inside = np.clip((seated(0.0).time - 1.5) / 1.2, 0.0, 1.0)
     with pytest.raises(InputError, match=r"turned by 20 degrees about its way.*leave --exception out"):
         learned_of(yawed(seated(0.0), np.radians(20.0) * inside))
+    twisted = yawed(seated(0.0), np.radians(20.0) * inside)  # as people twist a round peg while they push it in
+    assert learned_of(twisted, round=True)["phases"][0]["rotation"]["desired_direction"] is None
     for angles in ((10.0,), (20.0, -20.0)):
         made = learned_of(*(yawed(seated(0.0, i), np.radians(a) * inside) for i, a in enumerate(angles)))
         assert made["phases"][0]["rotation"]["desired_direction"] is None

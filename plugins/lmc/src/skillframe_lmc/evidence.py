@@ -64,7 +64,7 @@ def _message(part: Learned, settings: Settings, open_direction: bool) -> str:
     if part.held:
         return _held_message(part, settings)
     if part.aligned:
-        return "the part goes straight, so that the turn was to align it: what turned it is given way to"
+        return "the part goes straight, so the turn that was shown only aligned it; the skill gives way to such turns"
     if part.told is not None:
         why = _untold(part, settings)
         return f"doubtful: the push is that along the way that was given, and not learned, because {why}"

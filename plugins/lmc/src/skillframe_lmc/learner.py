@@ -8,7 +8,7 @@ First the pitch, then for translation and rotation alike
     where to push?     intersection of the pyramids; may not exist      [sectors, directions, heading, modes, votes]
                        its middle, where faces of one side were passed  [expected]
                        where none exists, the way that was told (`LearnOptions.toward`)
-                       of a turn none, where it is known that the part goes straight (`LearnOptions.straight`)
+                       no turn is pushed, where it is known that the part goes straight (`LearnOptions.straight`)
     where to give?     where faces turned the push aside; where none did, or the tool turned,
                        principal axes of the motion that the push does not explain              [faces, axes]
     how stiff?         zero along compliant axes, k elsewhere                                   [gains]

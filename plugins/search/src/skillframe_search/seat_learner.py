@@ -8,9 +8,8 @@ they slide there is not the way: where the tip came straight from more than twic
 otherwise than it went in contact, the way is that straight and begins with it. So it is where they touch within
 `LEAST_M` of the end and rest there, as at the bottom of a shallow hole that is wide; who still begins so near says
 nothing of the way, if others do, and where all do it is the way in which they pressed at rest, `LEAST_M` long (our
-choices). The part goes straight in, so that a turn that was shown is how it was
-aligned. From the user comes how far off the fixture may be. The rest is by hand. The search is as wide as the mouth can
-be off its place, both ways at once (our choice):
+choices). The part goes straight in: a turn that was shown only aligned it. From the user comes how far off the fixture
+may be. The rest is by hand. The search is as wide as the mouth can be off its place, both ways at once (our choice):
 
     radius = sqrt(2) (shift + tilt * height of the first contact)
 """
@@ -40,7 +39,7 @@ from skillframe_search.seat_document import Seat, as_phase
 
 BEFORE_S = 0.3  # of each demonstration before its contact that the push is learned with
 LEAST_M = 0.002  # from the first contact to the end
-SCREWED = radians(15.0)  # about the way, from the first contact to the end, in the mean; more does not go straight
+SCREWED = radians(15.0)  # about the way, from the first contact to the end, in the mean; more is taken for a screw
 RESTED_S, RESTED_M = 0.1, 0.0005  # where that is shorter: it stood at the end, in contact, for so long within so much
 STRAIGHT = 0.15  # of its length that a straight way is off its line, at most
 SLID = np.cos(radians(30.0))  # between that way and the one in contact; more is no insertion
@@ -69,6 +68,7 @@ class SeatSettings:
         approach: whether it goes to where contact began first.
         search: whether it searches on a stall.
         tries: searches and returns before it gives up.
+        round: how the part is turned about its way does not matter, as of a round peg.
     """
 
     skill: str = "lmc"
@@ -82,6 +82,7 @@ class SeatSettings:
     approach: bool = True
     search: bool = True
     tries: int = 8
+    round: bool = False
 
     def __post_init__(self) -> None:
         for name, most in (("shift", 0.05), ("tilt", 0.6), ("height", 0.05), ("friction", 2.0), ("tries", 100)):
@@ -246,7 +247,8 @@ def _seat(shown: Sequence[_Shown], point: Float, settings: SeatSettings) -> Seat
             "record until the part is seated, and begin before it touches",
         )  # fmt: skip
     way = unit(end - contact)
-    _goes_straight(shown, way)
+    if not settings.round:
+        _goes_straight(shown, way)
     free = all(_pressed_at_end(each, way) < FREE_N for each in shown)
     if not free:  # nobody goes deeper than the bottom, and some stop short of it
         moved = settings.place == "start"
@@ -280,7 +282,7 @@ def _goes_straight(shown: Sequence[_Shown], way: Float) -> None:
     if (mean := abs(float(np.mean(turned)))) > SCREWED:
         raise InputError(
             "learn", f"the part was turned by {degrees(mean):.0f} degrees about its way, which a seating does not do",
-            "leave --exception out: the push alone learns the turn",
+            "leave --exception out, and the push learns the turn; or --set round=true, if it is a round peg",
         )  # fmt: skip
 
 
