@@ -139,15 +139,27 @@ def check_walls(fit: PartsFit, plug: MeshPart, socket: MeshPart) -> None:
     import manifold3d
 
     miter = manifold3d.JoinType.Miter
-    for part, solid in ((plug, fit.plug), (socket, fit.socket)):
-        section = solid.slice(-0.5 * fit.depth)
-        left = section - section.offset(-0.5 * THIN, miter).offset(0.5 * THIN, miter)
-        thin = [each for each in left.decompose() if each.area() > 4.0 * THIN**2]
+    for part, solid, against in ((plug, fit.plug, fit.socket), (socket, fit.socket, fit.plug)):
+        section, other = (each.slice(-0.5 * fit.depth) for each in (solid, against))
+        thick = section.offset(-0.5 * THIN, miter).offset(0.5 * THIN, miter)
+        walls = _reachable(section, thick, other) ^ (section - thick)
+        thin = [each for each in walls.decompose() if each.area() > 4.0 * THIN**2]
         if thin:
             where = np.reshape(thin[0].bounds(), (2, 2)).mean(axis=0)
             place = f"({1000.0 * where[0]:.1f}, {1000.0 * where[1]:.1f}) mm from the middle of the mouth"
             what = f"a wall near {place} is thinner than {1000.0 * THIN:g} mm"
             raise InputError(part.name, what, "a part could be pushed through it; make it thicker")
+
+
+def _reachable(section: Any, thick: Any, other: Any) -> Any:
+    """Where another part's section can come that does not pass the thick walls of this one: a cross-section."""
+    import manifold3d
+
+    low, high = np.reshape([section.bounds(), other.bounds()], (2, 2, 2)).transpose(1, 0, 2)
+    corner, far = low.min(axis=0) - THIN, high.max(axis=0) + THIN
+    whole = manifold3d.CrossSection.square([float(x) for x in far - corner]).translate([float(x) for x in corner])
+    rooms = [room for room in (whole - thick).decompose() if not (room ^ other).is_empty()]
+    return manifold3d.CrossSection.batch_boolean([whole - whole, *rooms], manifold3d.OpType.Add)
 
 
 def unfit_pieces(pieces: ConvexPieces, fit: PartsFit, part: MeshPart) -> InputError | None:

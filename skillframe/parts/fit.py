@@ -250,17 +250,33 @@ def _with_turns(lifts: Float, way: WayOut) -> Float:
 
 
 def _mouth(plug: Any, socket: Any) -> float:
-    """Height of the mouth: the highest point of the standing part near the held part's shadow.
+    """Height of the mouth: the highest point of the standing part near the held part's shadow, or in a hole of it.
 
-    Near is `NEAR`, or twice, four or eight times that where nothing is so near above the held part's lowest end.
+    Near is `NEAR`, or twice, four or eight times that where nothing is so near above the held part's lowest end. A tube
+    is over a post, however loose, once its end is below the post's.
     """
     low, high, tip = (float(solid.bounding_box()[k]) for solid, k in ((socket, 2), (socket, 5), (plug, 2)))
+    outline = _filled(plug.project())
     for near in NEAR * np.array([1.0, 2.0, 4.0, 8.0]):
-        shadow = plug.project().offset(float(near)).extrude(high - low + 2.0 * NEAR).translate([0.0, 0.0, low - NEAR])
+        shadow = outline.offset(float(near)).extrude(high - low + 2.0 * NEAR).translate([0.0, 0.0, low - NEAR])
         beside = shadow ^ socket
         if not beside.is_empty() and (top := float(beside.bounding_box()[5])) > tip + NEAR:
             return top
     return tip
+
+
+def _filled(shadow: Any) -> Any:
+    """A cross-section without its holes."""
+    import manifold3d
+
+    outer = [line for line in shadow.to_polygons() if _area(line) > 0.0]  # holes run the other way round
+    return manifold3d.CrossSection(outer, manifold3d.FillRule.NonZero)
+
+
+def _area(line: Float) -> float:
+    """Signed area inside a closed line of points (P, 2) [m2]."""
+    x, y = line.T
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
 def _tip(plug: Any, mouth: float, turn: Float, file: FixtureFile) -> Float:

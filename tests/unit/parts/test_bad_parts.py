@@ -172,8 +172,14 @@ def test_an_overlap_is_let_pass_as_far_as_the_file_says(tmp_path):
 
 def test_a_thin_wall_is_refused(tmp_path):
     plug, socket = round_pair()
-    slit = box((5.9, -3, -17), (14, 3, 0)) - box((5.9, -0.05, -17), (14, 0.05, 0))
+    slit = box((4, -3, -17), (14, 3, 0)) - box((4, -0.05, -17), (14, 0.05, 0))  # open to the hole
     refused(pair(tmp_path, plug, socket - slit), "socket.stl", "thinner than 0.2 mm")
+
+
+def test_a_thin_wall_that_the_other_part_cannot_come_to_is_let_pass(tmp_path):
+    plug, socket = round_pair()
+    slit = box((5.9, -3, -17), (14, 3, 0)) - box((5.9, -0.05, -17), (14, 0.05, 0))  # behind 0.7 mm
+    assert pair(tmp_path, plug, socket - slit)().fit.depth == pytest.approx(0.012)
 
 
 def test_parts_without_play_are_refused(tmp_path):

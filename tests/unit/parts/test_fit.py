@@ -61,6 +61,19 @@ def test_the_mouth_is_the_middle_of_what_goes_in():
     np.testing.assert_allclose([low[0], high[0]], [-0.006, 0.006], atol=1e-9)
 
 
+def test_the_mouth_of_a_tube_over_a_loose_post_is_the_top_of_the_post():
+    """Nothing of the post is within 5 mm of the tube, and still a tube that starts below its top begins around it."""
+    tube = rod(12.0, 0.0, 20.0) - rod(10.0, -1.0, 21.0, outside=True)
+    socket = box((-20, -20, -5), (20, 20, 0)) + rod(13.0, -1.0, 3.0) - rod(12.2, 0.0, 4.0, outside=True)
+    assert fitted(tube, socket).depth == pytest.approx(0.003)
+    assert fitted(tube, socket + rod(4.0, -1.0, 15.0)).depth == pytest.approx(0.015)
+
+
+def test_what_rises_beside_a_part_is_no_mouth():
+    pin, socket = round_pair()
+    assert fitted(pin, socket + box((9, -15, -1), (15, 15, 15))).depth == pytest.approx(0.012)
+
+
 def test_a_part_on_top_of_another_is_refused():
     with pytest.raises(InputError, match="nothing of it lies below a mouth"):
         fitted(box((-3, -3, 0), (3, 3, 5)), box((-15, -15, -5), (15, 15, 0)))
