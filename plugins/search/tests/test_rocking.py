@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from seat_played import MOST_TILT, SEAT
-from skillframe_search.rocking import AFTER_S, MEAN_S, Rocking
+from skillframe_search.rocking import AFTER_S, MEAN_S, SETTLE_AFTER_S, Rocking
 
 from skillframe.frames import Pose, norm, rotation_matrix
 from skillframe.skill import Observation
@@ -81,3 +81,13 @@ def test_a_push_is_patient_until_the_spiral_is_at_its_widest(lever, turns):
     assert found[0] == pytest.approx(SEAT.slow_after_s + turns / SEAT.tip_hz + AFTER_S)
     none = replace(seat, tilt_rad=0.0, tip_pitch_m=0.0)  # nothing to be searched for, and nothing divided by
     assert played(none).patience(np.zeros(1), np.array([True]))[0] == SEAT.patience_s
+
+
+def test_what_settles_a_part_rises_holds_and_fades_within_its_time():
+    seat = replace(SEAT, settle_s=0.6)
+    idle = SETTLE_AFTER_S + 0.6 * np.array([-0.1, 0.0, 0.0625, 0.125, 0.5, 0.75, 1.0, 2.0])
+    np.testing.assert_allclose(played(seat).settling(idle), [0.0, 0.0, 0.5, 1.0, 0.6, 0.3, 0.0, 0.0], atol=1e-9)
+    np.testing.assert_array_equal(played(replace(SEAT, settle_s=0.0)).settling(idle), 0.0)
+    ways = [played(seat).settle(np.full(2, t), np.array([1.0, 0.5])) for t in (0.0, 0.25 / seat.rock_hz)]
+    np.testing.assert_allclose(norm(ways[0]), [seat.settle_nm, 0.5 * seat.settle_nm])
+    assert ways[0][0] @ ways[1][0] == pytest.approx(0.0, abs=1e-12) and not ways[0][:, 2].any()

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from seat_played import DOWN, MOST_TILT, SEAT, Played, searching
-from skillframe_search.seat import PUSHING, SEARCHING
+from skillframe_search.rocking import Rocking
+from skillframe_search.seat import MOST_TURNING_S, PUSHING, REST_S, SEARCHING
 
 from skillframe.frames import norm, rotation_matrix, rotation_vector
 from skillframe.skill import Impedance, Status
@@ -161,8 +162,50 @@ def test_the_tip_goes_on_a_spiral_once_the_push_goes_on_and_the_push_is_patient_
     assert played.skill.current[0] == SEARCHING
 
 
-def test_a_part_at_its_end_is_not_rocked():
-    played = searching()
+@pytest.mark.parametrize("changes", [{"settle_s": 0.0}, {"stop_m": 0.001}])
+def test_a_part_at_its_end_is_not_rocked_where_that_is_switched_off_or_nothing_stops_it(changes):
+    played = searching(**changes)
     played.search.ends = {0: Status.SUCCESS}
     played.deep[:] = -0.0004
-    assert norm(played.go(0.25).feedforward[0, 3:] - 1.0) < 1e-12
+    added = played.go(0.25).feedforward[0] - 1.0
+    assert norm(added[3:]) < 1e-12 and abs(added[0]) < 1e-12 and abs(added[1]) < 1e-12
+
+
+def test_a_part_that_rests_near_its_end_is_rocked_and_drawn_to_the_nominal_axis():
+    """Before it is called seated. A third of a millimetre aside is drawn by less than 6 N at 4000 N/m, 1 mm by 6 N."""
+    played = Played()
+    played.go()
+    played.deep[:], played.aside[:] = -0.0004, [0.0, 0.0005, 0.0009]
+    before = played.go(0.11).feedforward - 1.0  # a tick after the depth was reached it begins to rest
+    np.testing.assert_allclose(before[:, [0, 1, 3, 4]], 0.0, atol=1e-12)
+    added = played.go(0.14).feedforward - 1.0
+    share = Rocking(SEAT, np.eye(3)).settling(np.array([0.24]))[0]
+    assert 0.8 < share < 0.9
+    np.testing.assert_allclose(added[:, 0], -share * np.minimum(4000.0 * played.aside, SEAT.settle_n), atol=1e-9)
+    np.testing.assert_allclose(norm(added[:, 3:]), share * SEAT.settle_nm)
+    np.testing.assert_allclose((played.go(0.4).feedforward - 1.0)[:, [0, 1, 3, 4]], 0.0, atol=1e-12)
+
+
+def test_a_part_that_still_turns_is_not_seated_yet_but_not_for_ever():
+    """At 2 degrees a second it turns by 10 mrad in 0.3 s. At a tenth of that it rests."""
+    played = Played()
+    played.go()
+    played.deep[:], rate = 0.0, np.radians([2.0, 0.2, 0.0])
+    seated = np.full(3, np.nan)
+    for _ in range(400):
+        played.turn[:, 0] += 0.01 * rate
+        status = played.go().status
+        seated = np.where(np.isnan(seated) & (status == Status.SUCCESS), played.time, seated)
+    np.testing.assert_allclose(
+        seated, REST_S + SEAT.settle_s + np.array([MOST_TURNING_S - REST_S, 0.0, 0.0]), atol=0.05
+    )
+
+
+def test_a_part_that_went_in_without_a_search_is_not_pulled_upright_any_more():
+    played = Played()
+    played.go()
+    played.turn[:, 0] = 0.02
+    played.deep[:] = -0.0115
+    assert played.go().feedforward[0, 3] - 1.0 == pytest.approx(-0.02 * SEAT.upright_nm_rad)
+    played.deep[:] = -0.009
+    assert played.go().feedforward[0, 3] - 1.0 == pytest.approx(0.0, abs=1e-12)

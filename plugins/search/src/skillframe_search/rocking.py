@@ -1,6 +1,7 @@
 r"""What turns a part that rests in a hole short of its end: a torque that goes round, then a spiral of the tip.
 
     quick, slow    m (a cos wt + b sin wt)                        a, b across the way: frees a jam, and moves the tip
+    settle         the same, its size fading, near the end        a loose part wedged aslant stands flush after it
     tip            K (rho_m + s - rho) - d w, at most m_t         once the push goes on: finds a second hole
     s = p f t (a cos 2 pi f t + b sin 2 pi f t)                   the spiral, up to the most that a fixture leans
 
@@ -25,6 +26,7 @@ MOST_TURNS, LEAST_TURNS = 6.0, 1.5
 MEAN_S, TIP_NMS_RAD = 1.0, 0.5
 AFTER_S = 0.2  # of patience once the spiral is at its widest
 LEAST_LEVER_M, LEAST_PITCH = 1e-4, 1e-4
+SETTLE_AFTER_S, RISES, FALLS = 0.1, 8.0, 1.2  # the size while settling: rises within 1/8, falls from 1/6 to the end
 
 
 class Rocking:
@@ -74,6 +76,18 @@ class Rocking:
         if np.count_nonzero(searches):
             torque[searches] = self._spiral(observation, idle - seat.slow_after_s, pitch, searches)[searches]
         return torque
+
+    def settling(self, idle: Float) -> Float:
+        """(N,) share of the most by which a part at rest near the end is settled, after (N,) `idle` [s]."""
+        if not self._seat.settle_s:
+            return np.zeros(len(idle))
+        gone = (idle - SETTLE_AFTER_S) / self._seat.settle_s
+        result: Float = np.clip(np.minimum(RISES * gone, FALLS * (1.0 - gone)), 0.0, 1.0)
+        return result
+
+    def settle(self, time: Float, share: Float) -> Float:
+        """(N, 3) torque that settles parts at (N,) times [s], each its (N,) share of the most [Nm]."""
+        return self._round(self._seat.settle_nm * share, 2.0 * np.pi * self._seat.rock_hz * time)
 
     def _spiral(self, observation: Observation, gone: Float, pitch: Float, searches: NDArray[np.bool_]) -> Float:
         seat = self._seat

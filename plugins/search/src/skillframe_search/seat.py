@@ -17,6 +17,8 @@ What is added to the push is a wrench F at the centre of compliance, u the way, 
                                                                  or is stiff on an axis across jams it
     rock       a torque that goes round: quickly, slowly, then   in the hole, where it rests short of the end: frees a
                on a spiral of the tip, see `rocking`             jam, and finds a second hole below
+    settle     a torque that goes round, and a force to the      where it rests near the end: lets it stand flush where
+               nominal axis; both fade                           it is loose, before it is called seated
 
 a is the way from the nominal axis to the tool, across u, and v_a its rate, beyond the most. A fixture that is off on
 two axes at once is off by sqrt(2) tilt in attitude, and by sqrt(2) (shift + tilt h) in place, h from where it is turned
@@ -42,7 +44,7 @@ from skillframe.extend.registry import registry
 from skillframe.frames import Float, Pose, norm, rotation_matrix, rotation_vector
 from skillframe.sequence import END, Composition, Part
 from skillframe.skill import Command, Observation, Skill, Status
-from skillframe_search.centre import Centre
+from skillframe_search.centre import ACROSS, Centre
 from skillframe_search.reach import Reach
 from skillframe_search.rocking import Rocking
 from skillframe_search.seat_document import PUSH, SEARCH, Seat, part_of, read_seat
@@ -51,7 +53,8 @@ APPROACH, PUSHING, SEARCHING, CENTRING = 0, 1, 2, 3
 RUNNING = int(Status.RUNNING)  # a look into the enumeration takes as long as a sum over the batch
 FARTHEST_M = 0.08  # an approach may be longer than the demonstrated one by this
 KEEP_NS_M = 100.0
-REST_S = 0.3  # without progress, near the end
+REST_S, REST_RAD = 0.3, 0.005  # without progress, near the end, and without a turn as large
+MOST_TURNING_S = 2.0  # for so long it may turn there
 ENTERED_M = 0.002  # deeper than the first contact was by this is in the hole: rocked before it is searched for
 
 
@@ -106,6 +109,7 @@ class Seating(Composition):
         self._tried = np.zeros(n, dtype=np.intp)
         self._searched, self._urged, self._centred = (np.zeros(n, dtype=bool) for _ in range(3))
         self._held = observation.pose.rotation.copy()
+        self._stood, self._stands = observation.pose.rotation.copy(), observation.time.copy()
         self._rocking.start(n)
         self._best, self._since, self._rim = np.full(n, -np.inf), observation.time.copy(), np.zeros(n)
         super().start(observation, rngs)
@@ -187,7 +191,7 @@ class Seating(Composition):
         lost = here & (self.current != APPROACH) & (self._deep > self._seat.lost_m + self._seat.height_m)
         still = here & ~lost & (self.current == PUSHING)
         patience = np.where(self._in_hole(), self._rocking.patience(self._deep, self._urged), self._seat.stall_s)
-        still &= (idle >= patience) | ((self._deep >= -self._seat.short_m) & (idle >= REST_S))
+        still &= np.where(self._deep >= -self._seat.short_m, self._settled(observation, idle), idle >= patience)
         for i in _rows(still):
             self.leave(i, float(time[i]), Status.SUCCESS, f"no progress for {idle[i]:.1f} s")
         sunk = self._deep - self._rim - self._seat.sunk_m - np.tan(self._seat.tilt_rad) * self._off
@@ -196,6 +200,19 @@ class Seating(Composition):
             self.leave(i, float(time[i]), Status.SUCCESS, f"sank {deeper:.1f} mm")
         for i in _rows(lost):
             self._return(i, float(time[i]))
+
+    def _settled(self, observation: Observation, idle: Float) -> NDArray[np.bool_]:
+        """(N,) whether parts near the end have rested there for so long [s], and do not turn any more."""
+        result: NDArray[np.bool_] = idle >= REST_S
+        if self._seat.stop_m or not self._seat.settle_s:
+            return result
+        time, rotation = observation.time, observation.pose.rotation
+        turned = norm(rotation_vector(rotation @ np.swapaxes(self._stood, -1, -2))) > REST_RAD
+        self._stood = np.where(turned[:, None, None], rotation, self._stood)
+        self._stands = np.where(turned, time, self._stands)
+        since = idle - self._seat.settle_s
+        result = (since >= REST_S) & ((time - self._stands >= REST_S) | (since >= MOST_TURNING_S))
+        return result
 
     def _return(self, row: int, time: float) -> None:
         past = f"went {1e3 * self._deep[row]:.1f} mm past the end, which is beside the hole"
@@ -271,15 +288,26 @@ class Seating(Composition):
         turn = rotation_vector(observation.pose.rotation @ self._upright.T)
         angle = np.maximum(norm(turn), 1e-9)
         pull = (
-            np.where(self._searched, 0.0, seat.upright_nm_rad)
+            np.where(self._searched | self._entered(), 0.0, seat.upright_nm_rad)
             + seat.lean_nm_rad * np.maximum(angle - seat.most_tilt_rad, 0.0) / angle
         )
         added[:, 3:] = -pull[:, None] * turn
+        idle = observation.time - self._since
         resting = self._in_hole() & (self._deep < -seat.short_m)
-        added[:, 3:] += self._rocking.torque(
-            observation, observation.time - self._since, self._deep, resting, self._urged
-        )
+        added[:, 3:] += self._rocking.torque(observation, idle, self._deep, resting, self._urged)
+        if not seat.stop_m:
+            self._settle(added, observation, np.where(self._deep < -seat.short_m, 0.0, self._rocking.settling(idle)))
         return np.where(pushing[:, None], added, 0.0)
+
+    def _settle(self, added: Float, observation: Observation, share: Float) -> None:
+        """Add to (N, 6) what lets parts at rest near the end stand flush, each its share (N,) of the most."""
+        if not np.count_nonzero(share):
+            return
+        seat = self._seat
+        back = self._ends + self._deep[:, None] * self._way - observation.pose.position
+        pull = share * np.minimum(ACROSS, seat.settle_n / np.maximum(self._off, 1e-9))
+        added[:, :3] += pull[:, None] * back
+        added[:, 3:] += self._rocking.settle(observation.time, share)
 
     def _kept(self, observation: Observation) -> Float:
         """(N, 3) the force that keeps a push where the fixture may be."""

@@ -46,12 +46,14 @@ class Seat:
         stop_m: the push fades over so much before the end, where nothing else stops the part; 0: the part is stopped.
         catch_m_s, catch_ns_m: faster along the way than this is braked, with this damping.
         keep_n_m: pulls back what is farther from the nominal axis than the fixture may be off, and `aside_m`.
-        upright_nm_rad: pulls upright until a search is over; lean_nm_rad: always, beyond sqrt(2) `tilt_rad`.
+        upright_nm_rad: pulls upright until the part is in the hole; lean_nm_rad: always, beyond sqrt(2) `tilt_rad`.
         follow_s: in the hole the attitude wanted follows the measured one within this; 0 does not.
         rock_nm, rock_hz: torque that turns across the way in a hole, once the tool rests in it for rock_after_s;
             slow_nm, slow_hz: the same once it rests for slow_after_s. Quickly it frees a jam, slowly it moves the tip.
         tip_pitch_m, tip_hz: where that did not help either, the tip goes round on a spiral of this pitch, so often;
             tip_nm_rad, tip_nm: with this stiffness, and this torque at most.
+        settle_s, settle_nm, settle_n: at rest near the end it is rocked for so long, by a torque of up to settle_nm at
+            rock_hz that fades, and drawn to the nominal axis by up to settle_n, before it is seated; 0 s does not.
     """
 
     way: Vector
@@ -96,6 +98,9 @@ class Seat:
     tip_hz: float = 1.25
     tip_nm_rad: float = 40.0
     tip_nm: float = 0.9
+    settle_s: float = 0.5
+    settle_nm: float = 0.4
+    settle_n: float = 6.0
 
     @property
     def most_tilt_rad(self) -> float:

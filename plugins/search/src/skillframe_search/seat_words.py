@@ -60,6 +60,7 @@ def _parts(seat: Seat, nowhere: bool) -> list[str]:
         f"rock: turns {seat.rock_nm:g} Nm round at {seat.rock_hz:g} Hz where the part rests after a search, then "
         f"{seat.slow_nm:g} Nm at {seat.slow_hz:g} Hz, then its tip on a spiral of {1e3 * seat.tip_pitch_m:g} mm pitch; "
         "adds that it does not jam, and finds a second hole below the first",
+        *([_settle(seat)] if seat.settle_s and not seat.stop_m else []),
         f"centre: at the end, but more than {1e3 * seat.aside_m:g} mm from the nominal axis, it is drawn back until "
         f"{seat.centre_n:g} N hold it; adds that a part in a slot that is open at an end is where it was shown",
         f"lost: more than {1e3 * (seat.lost_m + seat.height_m):.1f} mm past the end is beside the hole: it returns",
@@ -70,6 +71,13 @@ def _stop(seat: Seat) -> str:
     return (
         f"stop: the demonstrations ended without pressing, so the push fades over the last {1e3 * seat.stop_m:g} mm; "
         "adds that a part that nothing stops stands where it was shown"
+    )
+
+
+def _settle(seat: Seat) -> str:
+    return (
+        f"settle: where it rests near the end, {seat.settle_nm:g} Nm go round for {seat.settle_s:g} s and fade, and up "
+        f"to {seat.settle_n:g} N draw it to the nominal axis; adds that a loose part does not stay wedged aslant"
     )
 
 
@@ -86,7 +94,8 @@ def _sources(seat: Seat) -> list[str]:
         f"degrees and {1e3 * seat.height_m:g} mm along the way (--set shift, tilt, height); friction "
         f"{seat.friction:g} (--set friction)",
         "by hand (our choice): the default search's force, stiffness, speed, pitch, passes and dither, all figures of "
-        "catch, keep, lean, rock, stall and lost; chosen by what they were worth on AutoMate's assemblies, not learned",
+        "catch, keep, lean, rock, settle, stall and lost; chosen by what they were worth on AutoMate's assemblies, not "
+        "learned",
     ]
 
 
