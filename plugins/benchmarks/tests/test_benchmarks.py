@@ -180,6 +180,8 @@ def test_two_pairs_of_meshes_become_a_table_a_page_and_are_not_run_again(tmp_pat
         "push",
         "--workers",
         "1",
+        "--draws",
+        "4",
     ]
     assert run(words) == 0
     said = capsys.readouterr()
@@ -196,7 +198,9 @@ def test_two_pairs_of_meshes_become_a_table_a_page_and_are_not_run_again(tmp_pat
     page = (tmp_path / "automate/automate.html").read_text()
     assert "00001" in page and "data:image/png" in page and "http://" not in page
     assert run(words) == 0 and "2 of 2 assemblies are there already" in capsys.readouterr().err
-    assert run([*words, "--seed", "2"]) == 2
+    assert "seed = 4\n" in (tmp_path / "automate/00001/1mm-2deg/campaign.toml").read_text()
+    assert "(seed 1; of the draws 4)" in page
+    assert run([*words, "--seed", "2"]) == 2 and run([*words, "--draws", "1"]) == 2
 
 
 def test_the_levels_are_those_that_are_told_and_the_widest_is_the_published_noise():

@@ -92,7 +92,7 @@ class Plan:
     Attributes:
         robot: name of a shipped robot, or a robot.toml.
         trials: per level, the same draws for every method.
-        seed: of demonstrations and draws.
+        seed: of demonstrations; draws: of the draws, None: the same.
         methods: names of `METHODS`.
         levels: names of `LEVELS`.
         duration_s: of a trial, at most.
@@ -101,6 +101,7 @@ class Plan:
     robot: str = "panda"
     trials: int = 20
     seed: int = 1
+    draws: int | None = None
     methods: tuple[str, ...] = tuple(METHODS)
     levels: tuple[str, ...] = tuple(level.name for level in LEVELS)
     duration_s: float = 15.0
@@ -246,10 +247,11 @@ def _campaign(
     if out.exists() and not _whole(out):
         shutil.rmtree(out)
     if not out.exists():
+        seed = plan.seed if plan.draws is None else plan.draws
         frictions = {"values": [level.friction for level in levels for _ in range(plan.trials)]}
         Campaign(
             world=str(fixture), robot=plan.robot, skills=[str(path) for path in skills.values()],
-            trials=plan.trials * len(levels), seed=plan.seed, coc="tip", duration_s=plan.duration_s,
+            trials=plan.trials * len(levels), seed=seed, coc="tip", duration_s=plan.duration_s,
             vary=levels[0].vary() | {FRICTION: frictions}, scores=list(SCORES),
             name=f"AutoMate {fixture.parent.name}, {levels[0].noise}",
         ).prepare(out)  # fmt: skip

@@ -45,13 +45,14 @@ def command() -> None:
 @click.option("--level", "levels", multiple=True, help="As 1mm-2deg-0.2: shift, tilt, friction [all four].")
 @click.option("--method", "methods", multiple=True, help="As lmc [all].")
 @click.option("--seed", default=1, show_default=True, type=SEED, help="Of demonstrations and draws.")
+@click.option("--draws", type=SEED, help="Seed of the draws, for others with the same demonstrations [--seed].")
 @click.option("--workers", type=COUNT, help="Assemblies at a time [number of cores].")
 @click.option("--list", "only_list", is_flag=True, help="List the assemblies, run nothing.")
 @click.option("--json", "as_json", is_flag=True, help="The table as JSON on stdout.")
 @quiet_option
 def automate(
     folder: Path, assemblies: tuple[str, ...], out: Path, robot: str, trials: int, levels: tuple[str, ...],
-    methods: tuple[str, ...], seed: int, workers: int | None, only_list: bool, as_json: bool,
+    methods: tuple[str, ...], seed: int, draws: int | None, workers: int | None, only_list: bool, as_json: bool,
 ) -> int:  # fmt: skip
     """AutoMate's plugs and sockets: each becomes a world, is shown twice, learned, and run beside a plain push.
 
@@ -73,8 +74,8 @@ def automate(
         return _list(found, as_json)
     known = [level.name for level in LEVELS]
     plan = Plan(
-        robot=robot, trials=trials, seed=seed, methods=_chosen("method", methods, list(METHODS)),
-        levels=_chosen("level", levels, known),
+        robot=robot, trials=trials, seed=seed, draws=seed if draws is None else draws,
+        methods=_chosen("method", methods, list(METHODS)), levels=_chosen("level", levels, known),
     )  # fmt: skip
     _agree(out, plan)
     jobs = [AssemblyJob(pair=pair, folder=(out / pair.name).resolve(), plan=plan) for pair in found]
@@ -131,6 +132,8 @@ def _agree(out: Path, plan: Plan) -> None:
     path, mine = out / "plan.json", {**json.loads(json.dumps(asdict(plan))), "layout": LAYOUT}
     if path.exists():
         theirs = json.loads(path.read_text(encoding="utf-8"))
+        if theirs.get("draws") is None and "seed" in theirs:
+            theirs["draws"] = theirs["seed"]  # a folder of before they could differ
         other = [f"{key} = {theirs.get(key)!r}" for key in mine if theirs.get(key) != mine[key]]
         if other:
             raise InputError(out, f"was begun with {', '.join(other)}", "type the same, or choose another --out")

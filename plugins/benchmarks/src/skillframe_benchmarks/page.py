@@ -102,7 +102,8 @@ def render(found: Sequence[Found], given: Sequence[Total], plan: Plan, count: in
     refused = [each for each in found if each.refused]
     said = (
         f"{len(found)} of {count} assemblies done, {len(refused)} of them refused. {_unlearned(found)}"
-        f"{plan.robot}, {plan.trials} trials a level and method, two demonstrations each (seed {plan.seed}). "
+        f"{plan.robot}, {plan.trials} trials a level and method, two demonstrations each "
+        f"(seed {plan.seed}; of the draws {plan.draws}). "
         f"Seated: within 1 mm of the assembled height and 2 mm sideways, and the skill ended by itself. "
         f"Intervals draw assemblies again. "
         f"The column >= 80 % counts assemblies of which {OFTEN:.0%} of the trials and more are seated."
