@@ -152,9 +152,14 @@ def check_walls(fit: PartsFit, plug: MeshPart, socket: MeshPart) -> None:
 
 
 def _reachable(section: Any, thick: Any, other: Any) -> Any:
-    """Where another part's section can come that does not pass the thick walls of this one: a cross-section."""
+    """Where another part's section can come that does not pass the thick walls of this one: a cross-section.
+
+    Everywhere where the other part has no section there: nothing says on which side of the walls it is.
+    """
     import manifold3d
 
+    if section.is_empty() or other.is_empty():
+        return section
     low, high = np.reshape([section.bounds(), other.bounds()], (2, 2, 2)).transpose(1, 0, 2)
     corner, far = low.min(axis=0) - THIN, high.max(axis=0) + THIN
     whole = manifold3d.CrossSection.square([float(x) for x in far - corner]).translate([float(x) for x in corner])

@@ -182,6 +182,19 @@ def test_a_thin_wall_that_the_other_part_cannot_come_to_is_let_pass(tmp_path):
     assert pair(tmp_path, plug, socket - slit)().fit.depth == pytest.approx(0.012)
 
 
+def test_a_thin_wall_counts_where_the_other_part_is_not_at_that_height(tmp_path):
+    """A plate on a foot that stands beside the hole's middle: at half depth there is nothing of the plug."""
+    plug = (
+        box((-4, -4, -1), (4, 4, 10))
+        + box((-1, -1, -12), (1, 1, -7))
+        + box((3, 3, -12), (4, 4, 0))
+        - box((2, 2, -7), (5, 5, -5))
+    )
+    socket = box((-15, -15, -17), (15, 15, 0)) - box((-5, -5, -13), (5, 5, 1))
+    slit = box((6, -3, -17), (14, 3, 0)) - box((6, -0.05, -17), (14, 0.05, 0))
+    refused(pair(tmp_path, plug, socket - slit), "socket.stl", "thinner than 0.2 mm")
+
+
 def test_parts_without_play_are_refused(tmp_path):
     block = box((-15, -15, -17), (15, 15, 0)) - box((-5, -5, -12), (5, 5, 1))
     refused(pair(tmp_path, box((-5, -5, -12), (5, 5, 8)), block), "the play along the way is 0 mm")
