@@ -6,11 +6,12 @@ import subprocess
 import tomllib
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import click
 import pytest
 
-from tests.first_lines import with_semicolon
+from tests.first_lines import below, semicolons
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "skillframe"
@@ -78,19 +79,38 @@ def top(path):
     return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
 
 
+@cache
 def core_files():
     return sorted(p for p in PACKAGE.rglob("*.py") if "_data" not in p.parts and "template" not in p.parts)
 
 
+@cache
 def loop_files():
     return [p for p in core_files() if top(p) in LOOP and relative(p) not in SET_UP]
 
 
+class Facts(NamedTuple):
+    """What the rules ask of a file. Its syntax tree is let go: all of them slow whatever runs after them."""
+
+    imports: list  # (line, module, only for types) of every import, wherever it stands; `from a import b` gives a.b
+    calls: list  # (line, dotted name) of every call whose target is a plain dotted name
+    classes: list  # names of public classes at top level
+    semicolons: list  # first lines of docstrings that have one
+
+
 @cache
-def tree(path):
-    return ast.parse(path.read_text(encoding="utf-8"))
+def facts(path):
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    called = (n for n in ast.walk(tree) if isinstance(n, ast.Call) and isinstance(n.func, ast.Name | ast.Attribute))
+    return Facts(
+        imports=list(imports_below(tree, relative(path))),
+        calls=[(node.lineno, ast.unparse(node.func)) for node in called] if path in loop_files() else [],
+        classes=[n.name for n in tree.body if isinstance(n, ast.ClassDef) and not n.name.startswith("_")],
+        semicolons=[f"{relative(path)}:{line}: {text}" for line, text in semicolons(tree)],
+    )
 
 
+@cache
 def relative(path):
     return path.relative_to(ROOT).as_posix()
 
@@ -99,50 +119,26 @@ def only_for_types(node):
     return isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
 
 
-def run_time_nodes(node):
-    """Every node under one, without what stands under `if TYPE_CHECKING`."""
-    for child in ast.iter_child_nodes(node):
-        if not only_for_types(child):
-            yield child
-            yield from run_time_nodes(child)
+def imports_below(node, place, typed=False):
+    for child in below(node):
+        if isinstance(child, ast.Import):
+            yield from ((child.lineno, alias.name, typed) for alias in child.names)
+        elif isinstance(child, ast.ImportFrom):
+            assert child.level == 0, f"{place}:{child.lineno}: relative import; write the whole name"
+            yield from ((child.lineno, f"{child.module}.{alias.name}", typed) for alias in child.names)
+        else:
+            yield from imports_below(child, place, typed or only_for_types(child))
 
 
-def loading_nodes(node):
-    """Every node under one that runs when the module is imported."""
-    for child in ast.iter_child_nodes(node):
-        if not only_for_types(child) and not isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
-            yield child
-            yield from loading_nodes(child)
-
-
-def imports(path, at_run_time=True, when_loading=False):
-    """(line, module) of every import, wherever it stands; `from a import b` gives a.b."""
-    nodes = (
-        loading_nodes(tree(path))
-        if when_loading
-        else run_time_nodes(tree(path))
-        if at_run_time
-        else ast.walk(tree(path))
-    )
-    for node in nodes:
-        if isinstance(node, ast.Import):
-            yield from ((node.lineno, alias.name) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{relative(path)}:{node.lineno}: relative import; write the whole name"
-            yield from ((node.lineno, f"{node.module}.{alias.name}") for alias in node.names)
+def imports(path, at_run_time=True):
+    """(line, module) of every import, of those for types only where it need not be at run time."""
+    return [(line, module) for line, module, typed in facts(path).imports if not (typed and at_run_time)]
 
 
 def own(module):
     """The part of a dotted name directly under skillframe, or None."""
     parts = module.split(".")
     return parts[1] if parts[0] == "skillframe" and len(parts) > 1 else None
-
-
-def calls(path):
-    """(line, dotted name) of every call whose target is a plain dotted name."""
-    for node in ast.walk(tree(path)):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name | ast.Attribute):
-            yield node.lineno, ast.unparse(node.func)
 
 
 def test_every_module_of_the_core_has_a_floor():
@@ -198,7 +194,12 @@ def test_seven_files_explain_the_method():
 
 
 def test_the_first_line_of_a_docstring_has_no_semicolon():
-    found = [line for folder in ("skillframe", "plugins") for line in with_semicolon(ROOT / folder)]
+    found = [
+        said
+        for folder in ("skillframe", "plugins")
+        for p in (ROOT / folder).rglob("*.py")
+        for said in facts(p).semicolons
+    ]
     assert not found
 
 
@@ -215,9 +216,8 @@ def test_oil_stays_in_its_room():
 def test_every_class_name_stands_once():
     found = {}
     for path in core_files():
-        for node in tree(path).body:
-            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-                found.setdefault(node.name, []).append(relative(path))
+        for name in facts(path).classes:
+            found.setdefault(name, []).append(relative(path))
     twice = {name: places for name, places in found.items() if len(places) > 1 and name not in TWICE}
     assert not twice
 
@@ -299,7 +299,7 @@ HANDED_IN = {"Generator", "SeedSequence", "default_rng"}
 @pytest.mark.parametrize("path", loop_files(), ids=relative)
 def test_what_runs_in_the_loop_prints_logs_reads_and_asks_nothing(path):
     found = [f"line {line}: import {m}" for line, m in imports(path) if m.split(".")[0] in BANNED_IMPORTS]
-    found += [f"line {line}: {name}(...)" for line, name in calls(path) if BANNED_CALLS.search(name)]
+    found += [f"line {line}: {name}(...)" for line, name in facts(path).calls if BANNED_CALLS.search(name)]
     found += [
         f"line {line}: asks the registry" for line, m in imports(path) if m.startswith("skillframe.extend.registry")
     ]
@@ -315,7 +315,7 @@ def test_chance_in_the_loop_comes_from_a_generator_only(path):
 @pytest.mark.parametrize("path", loop_files(), ids=relative)
 def test_slow_calls_stay_out_of_the_loop(path):
     slow = [f"line {line}: {m}" for line, m in imports(path) if m.startswith("scipy.spatial")]
-    slow += [f"line {line}: {name}; see skillframe.frames" for line, name in calls(path) if name in SLOW]
+    slow += [f"line {line}: {name}; see skillframe.frames" for line, name in facts(path).calls if name in SLOW]
     assert not slow, f"{relative(path)}: {'; '.join(slow)}"
 
 
