@@ -14,6 +14,7 @@ import pytest
 
 import skillframe
 from skillframe.errors import EXTRAS, LIBRARIES, MissingDependency, extras_named, missing_extra, need
+from tests.first_lines import statements
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -45,7 +46,7 @@ def test_every_library_is_named_with_an_extra_that_installs_it():
 
 def imported(path):
     """Modules at top level that a file imports, wherever it does."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in statements(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (alias.name.partition(".")[0] for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
