@@ -15,6 +15,13 @@ def pytest_collection_modifyitems(items):
             item.add_marker(pytest.mark.core)
 
 
+def pytest_ignore_collect(collection_path, config):
+    """Where the core's tests are not asked for, files that hold nothing else are not even imported."""
+    if config.option.markexpr.startswith("not core") and collection_path.match("test_*.py"):
+        return True if "needs_plugins" not in collection_path.read_text(encoding="utf-8") else None
+    return None
+
+
 @pytest.fixture
 def install(tmp_path, monkeypatch):
     """Puts a plug-in's distribution on the path: install("one", code) gives one 1.0 with entry point and module one."""
