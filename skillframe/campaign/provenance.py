@@ -9,7 +9,9 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
+import sys
 from collections.abc import Mapping
+from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,12 @@ LIBRARIES = ("skillframe", "numpy", "scipy", "mujoco", "pin")
 
 def environment() -> dict[str, str]:
     """Versions of what computes, and the processor it runs on."""
+    return dict(_environment(tuple(sys.path)))
+
+
+@lru_cache(maxsize=8)
+def _environment(path: tuple[str, ...]) -> Mapping[str, str]:
+    """Read once for where modules come from: what runs stays what it was when it was imported."""
     found = {"python": platform.python_version(), "platform": platform.platform(), "processor": _processor()}
     for name in [*LIBRARIES, *sorted(_plugins() - {"skillframe"})]:
         try:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -68,7 +69,7 @@ class SkillSource(NamedTuple):
     @property
     def label(self) -> str:
         """What the skill is called in a campaign's results: the text with file names instead of paths."""
-        return self.moved(lambda file: Path(file).name).text
+        return _label(self)
 
     @property
     def name(self) -> str:
@@ -78,6 +79,12 @@ class SkillSource(NamedTuple):
     def moved(self, place: Callable[[str], str]) -> SkillSource:
         """With every file replaced."""
         return self._replace(files=tuple(place(file) for file in self.files))
+
+
+@lru_cache(maxsize=1024)
+def _label(source: SkillSource) -> str:
+    """Kept, because tables ask for it once a row."""
+    return source.moved(lambda file: Path(file).name).text
 
 
 def parse_source(text: str, folder: Path | None = None) -> SkillSource:

@@ -106,11 +106,11 @@ def test_no_more_than_one_in_twenty_campaigns_of_four_equal_skills_finds_a_diffe
     spec = CampaignSpec(
         name="n", seed=1, trials=200, robot="r", world="w", skills=("a.json", "b.json", "c.json", "d.json")
     )
-    found = single = 0
+    labels, found, single = spec.labels, 0, 0
     for seed in range(200):
         wins = np.random.default_rng(seed).random((4, 200)) < 0.8
         rows = [
-            {"trial": t, "skill": spec.labels[k], "success": bool(wins[k, t]), "failure": ""}
+            {"trial": t, "skill": labels[k], "success": bool(wins[k, t]), "failure": ""}
             for t in range(200) for k in range(4)
         ]  # fmt: skip
         pairs = comparisons(spec, rows, complete=True)
