@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from typing import Any
 
 from skillframe.config.ranges import Range, range_of, require_within
@@ -46,7 +47,8 @@ def require_ranges(given: Any, where: str) -> None:
         require_within(value, value, row["unit"], limits and Range(*limits), f"{where}.{row['name']}")
 
 
-def texts(kind: type) -> dict[str, str]:
+@lru_cache(maxsize=256)
+def texts(kind: type) -> Mapping[str, str]:
     """Entries under "Attributes:" in the docstrings of a dataclass and its bases. Several names may share one."""
     said: dict[str, str] = {}
     for each in reversed(kind.__mro__):

@@ -7,6 +7,7 @@ import re
 import types
 import typing
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -43,12 +44,12 @@ def build(cls: type[T], values: Mapping[str, Any], where: str) -> T:
     Raises:
         InputError: an unknown or missing key, or a value of the wrong type.
     """
-    hints = typing.get_type_hints(cls)
+    kind: type = cls
+    hints, said = _hints(kind), texts(kind)
     fields = {f.name: f for f in dataclasses.fields(cls) if f.init}  # type: ignore[arg-type]
     for key in values:
         if key not in fields:
             raise InputError(where, str(UnknownName("key", str(key), fields)))
-    said = texts(cls)
     ready = {
         key: _value(value, hints[key], said.get(key, ""), f"{where}.{key}") for key, value in values.items()
     }  # fmt: skip
@@ -56,6 +57,12 @@ def build(cls: type[T], values: Mapping[str, Any], where: str) -> T:
     if missing:
         raise InputError(where, f"missing {', '.join(missing)}", "add it")
     return cls(**ready)
+
+
+@lru_cache(maxsize=256)
+def _hints(cls: type) -> Mapping[str, Any]:
+    """Kept, because Python evaluates the annotations again at every call, and a file has a table in every line."""
+    return typing.get_type_hints(cls)
 
 
 def _value(value: Any, hint: Any, about: str, where: str) -> Any:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from skillframe.config.units import SAID, TYPED, UNITS, parse
@@ -43,6 +44,7 @@ def shown(value: float, unit: str) -> str:
     return f"{value / UNITS[word][1]:.6g}{word}" if word in UNITS else f"{value:.6g}{f' {unit}' if unit else ''}"
 
 
+@lru_cache(maxsize=1024)
 def range_of(about: str) -> Range | None:
     """The range that a text about a quantity states, in SI, or None if it states none."""
     for said in SAID.findall(about):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from skillframe.errors import InputError
@@ -49,6 +50,7 @@ def parse(text: str) -> Quantity | None:
     return Quantity(float(found[1]) * factor, unit)
 
 
+@lru_cache(maxsize=1024)
 def unit_of(text: str) -> str:
     """The SI unit that a text about a quantity states, "of the peg [m]", or "" if it states none that is known."""
     for said in SAID.findall(text):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -58,8 +59,12 @@ class _Call(ctypes.Structure):
     ]  # fmt: skip
 
 
+@lru_cache(maxsize=16)
 def source(function: ca.Function) -> str:
-    """C text of a function and its loop over trials. Sizes are distances between trials, zero for shared inputs."""
+    """C text of a function and its loop over trials. Sizes are distances between trials, zero for shared inputs.
+
+    It is kept for the very function that was given, which several batches and runs share.
+    """
     generator = ca.CodeGenerator(function.name(), {"with_header": False})
     generator.add(function)
     sizes = {

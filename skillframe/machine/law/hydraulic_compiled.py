@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from skillframe.frames import Float
 from skillframe.machine.law.generated import Batch
 from skillframe.machine.law.hydraulic import Demand, HydraulicGains, Measured, Reference, Terms, plane_axes
-from skillframe.machine.law.hydraulic_symbolic import cylinder_table, law_function, terms_function
+from skillframe.machine.law.hydraulic_symbolic import cylinder_table, functions
 from skillframe.machine.law.vdc_actuator import Cylinders, friction_parameters
 from skillframe.machine.law.vdc_adaptation import relative_bounds
 from skillframe.machine.law.vdc_body import parameters
@@ -85,7 +85,7 @@ class CompiledLaw:
         self._told_of = (*measured, *given)
         own = [self.theta, self.friction, self._memory, self.deadband, self.supply]
         inputs = [*measured, *given, *own, *knowledge]
-        law, terms = law_function(self.chain, axes), terms_function(self.chain, axes)
+        law, terms = functions(self.chain, axes)
         after = [np.zeros_like(memory) for memory in own[:3]]
         carried = {law.n_out() - 3 + i: len(self._told_of) + i for i in range(3)}
         self._steps = [

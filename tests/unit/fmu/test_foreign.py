@@ -2,6 +2,7 @@
 
 import time
 import zipfile
+from functools import cache
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ PATIENT = SandboxLimits(memory_bytes=1500 * 1024**2, start_s=60.0, step_s=20.0) 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
     folder = tmp_path_factory.mktemp("foreign")
-    return lambda kind, version=2: make(folder, kind, version)
+    return cache(lambda kind, version=2: make(folder, kind, version))
 
 
 def pair(built, bad):
