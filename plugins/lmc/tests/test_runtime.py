@@ -62,7 +62,7 @@ def still(seconds: float, force: float = 5.0) -> Iterator[Observation]:
     return (observe(k * DT, np.zeros((1, 3)), force=force) for k in range(int(seconds / DT)))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=6, deadline=None)  # of four trials with 1500 steps each, any of which breaks a wrong limit
 @given(seed=st.integers(0, 10_000), turn=st.booleans())
 def test_the_desired_pose_never_leads_by_more_than_the_limit(seed: int, turn: bool) -> None:
     rng = np.random.default_rng(seed)

@@ -58,10 +58,19 @@ def check_ended(process, out, code):
     return stored
 
 
-@pytest.mark.parametrize("options", [[], ["--workers", "1"]], ids=["in one process", "with a worker"])
+ALONE, CREW = [], ["--workers", "1"]
+CTRL_C, TERM = (os.killpg, signal.SIGINT, 130), (os.kill, signal.SIGTERM, 143)  # Ctrl-C goes to the workers too
+
+
 @pytest.mark.parametrize(
-    ("end", "number", "code"), [(os.killpg, signal.SIGINT, 130), (os.kill, signal.SIGTERM, 143)], ids=["int", "term"]
-)  # a terminal's Ctrl-C goes to the workers too
+    ("options", "end", "number", "code"),
+    [
+        pytest.param(ALONE, *CTRL_C, id="int-in one process", marks=pytest.mark.slow),
+        pytest.param(CREW, *CTRL_C, id="int-with a worker"),
+        pytest.param(ALONE, *TERM, id="term-in one process"),
+        pytest.param(CREW, *TERM, id="term-with a worker", marks=pytest.mark.slow),
+    ],
+)
 def test_a_signal_keeps_what_is_finished_says_how_to_go_on_and_exits_with_its_code(
     tmp_path, options, end, number, code
 ):
