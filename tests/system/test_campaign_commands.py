@@ -18,7 +18,7 @@ trials = {trials}
 robot = "free_tool"
 world = "valley"
 skills = ["replay:demo.npz"]
-duration_s = 4.0
+duration_s = {seconds}
 [vary]
 {vary}
 """
@@ -43,10 +43,10 @@ def demonstration(tmp_path_factory):
 
 @pytest.fixture
 def campaign(demonstration, tmp_path):
-    def write(vary=VARY, seed=3, trials=12, extra=""):
+    def write(vary=VARY, seed=3, trials=12, extra="", seconds=4.0):
         (tmp_path / "demo.npz").write_bytes(demonstration.read_bytes())
         path = tmp_path / "valley.toml"
-        path.write_text(CAMPAIGN.format(seed=seed, trials=trials, vary=vary) + extra)
+        path.write_text(CAMPAIGN.format(seed=seed, trials=trials, vary=vary, seconds=seconds) + extra)
         return str(path)
 
     return write
@@ -70,7 +70,7 @@ def test_run_status_and_replay_tell_one_story(campaign, tmp_path, capsys):
     assert status["complete"]
     assert status["skills"] == summary["skills"]
     assert status["skills"]["replay:demo.npz"]["successes"] == successes
-    for trial in (0, 5, 11):  # tests/laws/test_identity.py compares the rows of all trials
+    for trial in (0, 11):  # tests/laws/test_identity.py compares the rows of all trials
         trace = tmp_path / f"{trial}.npz"
         assert run(["campaign", "replay", str(out), str(trial), "--out", str(trace)]) == 0
         meta = Trace.load(trace).meta
@@ -108,7 +108,7 @@ def test_a_campaign_runs_again_from_its_own_folder(campaign, tmp_path):
 
 def test_a_rate_below_its_bar_exits_1(campaign, tmp_path, capsys):
     vary = '"fixture.offset_x" = { uniform = [0.2, 0.3] }'  # the valley is somewhere else
-    path = campaign(vary, trials=4, extra="[expect]\nrate = 0.9\n")
+    path = campaign(vary, trials=4, extra="[expect]\nrate = 0.9\n", seconds=0.5)
     assert run(["campaign", "run", path, "--out", str(tmp_path / "out"), "--traces", "0"]) == 1
     assert "below the threshold of 0.9" in capsys.readouterr().err
 
@@ -133,7 +133,7 @@ def test_what_cannot_run_exits_2_says_why_and_leaves_no_folder(campaign, tmp_pat
 
 def test_a_start_out_of_reach_is_that_trials_failure_and_not_the_campaigns(campaign, tmp_path, capsys):
     vary = '"start.offset_x" = { values = [0.0, 0.0, 2.5, 0.0] }'
-    text = campaign(vary, trials=4).replace("free_tool", "panda")
+    text = campaign(vary, trials=4, seconds=0.1).replace("free_tool", "panda")
     path = tmp_path / "valley.toml"
     path.write_text(path.read_text().replace("free_tool", "panda"))
     assert run(["campaign", "run", text, "--out", str(tmp_path / "out"), "--traces", "0"]) == 0
@@ -172,7 +172,8 @@ def test_a_campaign_tells_its_outcome_as_json_names_robot_and_world_and_is_quiet
     vary = '"fixture.offset_x" = { uniform = ["-30mm", "30mm"] }\n"start.tilt_z" = { choice = [0, "1deg"] }\n'
     out = str(tmp_path / "results")
     capsys.readouterr()
-    assert run(["campaign", "run", campaign(vary, trials=4), "--out", out, "--traces", "2", "--json", "-q"]) == 0
+    path = campaign(vary, trials=4, seconds=0.1)  # what it says is asked, and not whether the part arrives
+    assert run(["campaign", "run", path, "--out", out, "--traces", "2", "--json", "-q"]) == 0
     told = capsys.readouterr()
     said = json.loads(told.out)
     assert told.err == ""

@@ -1,3 +1,5 @@
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -199,9 +201,15 @@ def demonstrate(world, count=2, seed=1, noise=0.05, **options):
     return record(robot("free_tool"), scene(world), TeacherSettings(aim_noise=noise), count=count, seed=seed, **options)
 
 
+@cache
+def once(world, count):
+    """What several tests look at and none changes."""
+    return demonstrate(world, count)
+
+
 @pytest.mark.parametrize("world", ["free", "valley", "funnel", "hose_coupler", "edge"])
 def test_every_world_can_be_demonstrated(world):
-    recording = demonstrate(world)
+    recording = once(world, 2)
     assert len(recording.demonstrations) == 2
     for one in recording.demonstrations:
         assert one.duration > 0.3
@@ -222,7 +230,7 @@ def test_the_peg_can_be_demonstrated_from_both_tilts():
 
 
 def test_a_demonstration_follows_from_its_seed_alone():
-    first, again, other = demonstrate("valley"), demonstrate("valley"), demonstrate("valley", seed=2)
+    first, again, other = once("valley", 1), demonstrate("valley", 1), demonstrate("valley", 1, seed=2)
     for one, same, different in zip(*(r.demonstrations for r in (first, again, other)), strict=True):
         np.testing.assert_array_equal(one.position, same.position)
         np.testing.assert_array_equal(one.wrench, same.wrench)
@@ -230,7 +238,7 @@ def test_a_demonstration_follows_from_its_seed_alone():
 
 
 def test_a_demonstration_does_not_depend_on_how_many_are_made_with_it():
-    alone, several = demonstrate("valley", count=1), demonstrate("valley", count=3)
+    alone, several = once("valley", 1), once("valley", 2)
     np.testing.assert_array_equal(alone.demonstrations[0].wrench, several.demonstrations[0].wrench)
 
 
@@ -253,7 +261,7 @@ def test_failed_demonstrations_are_counted_with_their_reasons_and_given_up_after
 
 
 def test_a_start_asked_for_is_added_to_the_task_s_own():
-    near = demonstrate("valley", count=1).demonstrations[0]
+    near = once("valley", 1).demonstrations[0]
     far = demonstrate("valley", count=1, draws={"start.offset_x": 0.005}).demonstrations[0]
     assert far.position[0, 0] - near.position[0, 0] == pytest.approx(0.005, abs=5e-4)  # encoder noise is 0.05 mm
 
