@@ -1,10 +1,7 @@
 """What docs/how-to/own-fmu.md shows is built, checked and run."""
 
-import os
 import re
 import shutil
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,18 +24,17 @@ def block(language, word=""):
 
 
 @pytest.mark.parametrize("remembers", [False, True])
-def test_the_fmu_of_the_page_builds_and_checks(tmp_path, remembers):
+def test_the_fmu_of_the_page_builds_and_checks(tmp_path, monkeypatch, capsys, remembers):
     folder = tmp_path / "fmus" / "winch"
     folder.mkdir(parents=True)
     (folder / "fmu.toml").write_text(block("toml", "winch"))
     (folder / "winch.c").write_text(block("c"))
     if remembers:
         (folder / "own.h").write_text(re.search(r"`(typedef struct .*? Own;)`", PAGE).group(1))
-    env = {**os.environ, "SKILLFRAME_PATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache")}
-    for command in (["build", "winch"], ["check", "winch"]):
-        program = [sys.executable, "-m", "skillframe.cli.main", "fmu", *command]
-        result = subprocess.run(program, env=env, capture_output=True, text=True)
-        assert result.returncode == 0, result.stderr + result.stdout
+    monkeypatch.setenv("SKILLFRAME_PATH", str(tmp_path))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    for command in ("build", "check"):
+        assert run(["fmu", command, "winch"]) == 0, capsys.readouterr()
 
 
 def test_the_python_of_the_page_runs():

@@ -13,6 +13,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit" / "reports"))
 from report_fakes import campaign, trace
 
+from skillframe.cli.main import run
 from skillframe.reports.page import write_report
 
 BROWSER = next((b for b in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if b), None)
@@ -104,13 +105,12 @@ def test_a_report_with_stills_needs_neither_opengl_nor_the_simulator(tmp_path):
     assert "without OpenGL, as a shaded wireframe" in page
 
 
-def test_the_command_writes_the_file_and_says_where(tmp_path):
+def test_the_command_writes_the_file_and_says_where(tmp_path, monkeypatch, capsys):
     trace().save(tmp_path / "run.npz")
-    program = [sys.executable, "-m", "skillframe.cli.main", "report"]
-    done = subprocess.run([*program, "run.npz", "--out", "r.html"], cwd=tmp_path, capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.startswith("r.html (")
-    wrong = subprocess.run([*program, "nothing.npz", "--out", "r2.html"], cwd=tmp_path, capture_output=True, text=True)
-    assert wrong.returncode == 2
-    assert "no such file" in wrong.stderr
+    monkeypatch.chdir(tmp_path)
+    assert run(["report", "run.npz", "--out", "r.html"]) == 0
+    said = capsys.readouterr()
+    assert said.out.startswith("r.html (") and said.err == ""
+    assert run(["report", "nothing.npz", "--out", "r2.html"]) == 2
+    assert "no such file" in capsys.readouterr().err
     assert not (tmp_path / "r2.html").exists()

@@ -231,6 +231,7 @@ def test_em_never_lowers_the_likelihood_of_more_components_than_needed():
     assert len(gmm.select(samples, 6).priors) == 1  # one cloud: BIC wants one
 
 
+@pytest.mark.slow  # what it follows from is asked in the next test
 def test_a_thousand_random_starts_converge_and_the_lyapunov_function_decreases(documents):
     skill = seds.build(documents["seds"])
     rng = np.random.default_rng(5)

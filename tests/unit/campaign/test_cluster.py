@@ -110,6 +110,7 @@ def test_a_trial_that_says_the_same_again_and_again_is_hung_and_the_replacement_
     assert notes[-1].startswith("trial 37 of a.skill.json ran again alone, and this is its row now: worker died (time")
 
 
+@pytest.mark.slow
 def test_progress_never_runs_backwards_when_chunks_are_lost(campaign, tmp_path, monkeypatch):
     out, told = fakes.start(campaign(trials=38), tmp_path / "out"), []
     monkeypatch.setattr("skillframe.campaign.cluster.TELL_S", 0.1)
@@ -155,6 +156,7 @@ def talks_to_a_stranger(port):
         return False
 
 
+@pytest.mark.slow
 def test_rows_that_die_with_their_worker_before_they_are_fetched_are_made_again(out, reference, monkeypatch):
     gather, gathers = distributed.Client._gather, []
 

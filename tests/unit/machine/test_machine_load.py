@@ -49,6 +49,7 @@ def test_the_load_is_found_over_the_whole_rating_and_the_law_goes_by_it():
     assert np.abs(away).max() < 5e-3  # stiction over the spring of the force loop: 1 mm; at 4c3a7e9 0.07 to 0.7 m
 
 
+@pytest.mark.slow
 def test_what_was_not_as_told_or_is_beyond_a_bound_is_said_and_nothing_else_is():
     draws = {
         "robot.payload": np.array([475.0, 200.0, 475.0]), "actuator.friction_scale": np.array([1.0, 1.0, 2.0]),

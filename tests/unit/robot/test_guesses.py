@@ -322,7 +322,7 @@ def test_a_run_and_a_campaign_that_fail_name_the_guessed_masses(tmp_path, capsys
     campaign = ['name = "c"', "seed = 1", "trials = 2", "duration_s = 0.1", 'robot = "my_panda"', 'world = "edge"']
     campaign += [f'skills = ["{skill}"]', "[vary]", '"world.friction" = { uniform = [0.1, 0.2] }', ""]
     (tmp_path / "c.toml").write_text("\n".join(campaign))
-    assert run(["campaign", "run", str(tmp_path / "c.toml"), "--out", str(tmp_path / "c")]) == 0
+    assert run(["campaign", "run", str(tmp_path / "c.toml"), "--out", str(tmp_path / "c"), "--traces", "0"]) == 0
     told = capsys.readouterr()
     assert ("note: my_panda runs on guessed masses" in told.err) == guessed
     assert "2 x link 'link4' is inside the fixture" in told.out
