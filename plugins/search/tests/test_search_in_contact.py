@@ -1,6 +1,7 @@
 """Searches in the simulated world: short runs that end in each way there is."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -47,8 +48,14 @@ def test_it_starts_in_contact_as_well_as_slightly_above():
         assert run(given("spiral"), offset=(0.002, 0.0, height)).success[0]
 
 
+@cache
+def beside():
+    """Two searches where there is no hole."""
+    return run(given("spiral"), offset=(0.019, 0.0, 0.0), count=2)
+
+
 def test_where_there_is_no_hole_it_fails_in_its_time_and_does_not_cry_found():
-    result = run(given("spiral"), offset=(0.019, 0.0, 0.0), count=2)
+    result = beside()
     assert (result.status == Status.FAILURE).all()
     assert all("did not fall in" in reason for reason in result.reason)
     # 1 mm of approach and 3 N at 1000 N/m, both at 5 mm/s, take 0.8 s; then 4 s of search
@@ -57,7 +64,7 @@ def test_where_there_is_no_hole_it_fails_in_its_time_and_does_not_cry_found():
 
 def test_it_presses_with_its_push_while_it_slides():
     """Ten newtons within 3 % in the mean, once the push has grown. The sensor's bias is removed by the tare."""
-    trace = run(given("spiral"), offset=(0.019, 0.0, 0.0)).traces[0]
+    trace = beside().traces[0]
     late = trace.time > 1.0
     assert trace.wrench_true[late, 2].mean() == pytest.approx(10.0, rel=0.03)
 
