@@ -21,6 +21,10 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+# No test cuts the power, and waiting for the disk takes the tests of campaigns longer than their work.
+os.fsync = lambda descriptor: None
+
+
 def pytest_collection_finish() -> None:
     """Leave what was imported and collected out of garbage collections: a million objects that stay."""
     gc.collect()

@@ -26,6 +26,7 @@ class TestDmpConforms(SkillConformance):
     skill_type = "dmp"
 
 
+@pytest.mark.slow  # the same law with other numbers
 class TestLearnedDmpConforms(SkillConformance):
     skill_type = "dmp"
 
@@ -115,7 +116,8 @@ def test_at_another_centre_of_compliance_the_tool_moves_the_same(documents, kind
 def test_the_wrench_profile_is_what_the_person_s_tool_exerted(documents, kind):
     late = commands(documents[kind], start_of(approach(1.0)), [0.0, 2.2])[-1]
     assert late.feedforward[0, 2] == pytest.approx(-8.0, abs=0.5)  # robot on environment; a profile of 25 functions
-    quiet = learn(kind, feedforward=False)
+    fewest = {"most_components": 5} if kind == "gmr" else {}  # the wrench is left out whatever the mixture
+    quiet = learn(kind, feedforward=False, **fewest)
     assert not np.any(commands(quiet, start_of(approach(1.0)), [0.0, 2.2])[-1].feedforward)
 
 

@@ -29,6 +29,7 @@ class TestReplayConforms(SkillConformance):
     skill_type = "replay"
 
 
+@pytest.mark.slow  # the same law in another mode
 class TestAbsoluteReplayConforms(SkillConformance):
     skill_type = "replay"
 

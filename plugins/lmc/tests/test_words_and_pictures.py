@@ -1,5 +1,6 @@
 import math
 import xml.etree.ElementTree as ElementTree
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from skillframe_lmc.projection import Plane
 from skillframe_lmc.words import axis_words, direction_words, listed
 
 from skillframe.document.source import learned
-from skillframe.extend.records import Document, LearnOptions, SkillType
+from skillframe.extend.records import Document, Illustration, LearnOptions, SkillType
 from skillframe.extend.registry import registry
 from skillframe.frames import norm, unit
 from skillframe.testing import SkillConformance
@@ -33,10 +34,16 @@ def document(case: str) -> Document:
     return learn(CASES[case], LearnOptions())
 
 
+@cache
+def drawn(case: str) -> list[Illustration]:
+    return list(explain(document(case)))
+
+
 class TestLmc(SkillConformance):
     skill_type = "lmc"
 
 
+@pytest.mark.slow  # the same law in other axes
 class TestLmcInTheAxesOfTheStart(SkillConformance):
     skill_type = "lmc"
 
@@ -66,7 +73,7 @@ def test_every_skill_can_be_told_and_drawn(case: str) -> None:
     lines = describe(found)
     assert len(lines) >= 4
     assert all(lines)
-    for picture in explain(found):
+    for picture in drawn(case):
         assert ElementTree.fromstring(picture.svg).tag.endswith("svg")
         assert picture.title
         assert picture.caption
@@ -79,11 +86,11 @@ def test_an_open_direction_is_said_in_a_line() -> None:
 
 
 def test_drawing_twice_gives_the_same_text() -> None:
-    assert [p.svg for p in explain(document("valley"))] == [p.svg for p in explain(document("valley"))]
+    assert [p.svg for p in explain(document("valley"))] == [p.svg for p in drawn("valley")]
 
 
 def test_pictures_reach_for_nothing_outside() -> None:
-    for picture in explain(document("alignment")):
+    for picture in drawn("alignment"):
         addresses = [part.split('"')[0] for part in picture.svg.split('href="')[1:]]
         assert all(address.startswith(("#", "data:")) for address in addresses)
 

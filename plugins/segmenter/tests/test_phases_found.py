@@ -1,6 +1,7 @@
 """Phases found in quasi-static demonstrations: the acceptance figures on a few seeds. All of them in `make figures`."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from tests.figures.phases import NOTHING, one_story, phases_of, score
 SEEDS = (11, 12)
 
 
+@cache
 def found(task, seed, kind="wrench_hmm", phases=None, **options):
     taught = made.demonstrations(task, seed, **options)
     return segment([t.demonstration for t in taught], phases, {}, kind), taught

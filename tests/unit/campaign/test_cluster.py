@@ -142,7 +142,7 @@ def talks_in_plain(ports):
     """Whether who listens at one of some ports begins to talk, as a Dask server without TLS does, and so takes code."""
     with ExitStack() as stack:
         knocked = [stack.enter_context(socket.create_connection(("127.0.0.1", port))) for port in ports]
-        return bool(select.select(knocked, [], [], 2.0)[0])
+        return bool(select.select(knocked, [], [], 1.0)[0])
 
 
 def talks_to_a_stranger(port):
@@ -150,7 +150,7 @@ def talks_to_a_stranger(port):
     stranger = Security.temporary().get_connection_args("client")["ssl_context"]
     stranger.verify_mode = ssl.CERT_NONE
     try:
-        with stranger.wrap_socket(socket.create_connection(("127.0.0.1", port), timeout=2)) as encrypted:
+        with stranger.wrap_socket(socket.create_connection(("127.0.0.1", port), timeout=1)) as encrypted:
             return bool(encrypted.recv(1))
     except OSError:  # silence, or that the key is refused
         return False

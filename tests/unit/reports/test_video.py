@@ -35,7 +35,7 @@ def test_a_second_of_a_run_lasts_a_second_and_the_last_sample_is_shown():
 
 
 def test_a_film_moves_and_ends_with_what_was_drawn_last(tmp_path):
-    run = shortened(trace(samples=101), 6)  # of 25 samples a second
+    run = shortened(trace(samples=101), 4)  # of 25 samples a second
     told = []
     count, drawn_by = write_film(run, tmp_path / "run.mp4", lambda done, total: told.append((done, total)))
     assert drawn_by == OWN
@@ -64,10 +64,10 @@ def test_where_opengl_stops_half_way_the_whole_film_is_drawn_again_and_that_is_s
         yield [np.zeros((height, width, 3), dtype=np.uint8) for _, width in cameras]
         raise opengl.NoPicture("OpenGL stopped drawing")
 
-    run = shortened(trace(samples=101), 3)
+    run = shortened(trace(samples=101), 2)
     assert write_film(run, tmp_path / "own.mp4").renderer == OWN
     monkeypatch.setattr(opengl, "backend", lambda: "egl")
     monkeypatch.setattr(opengl, "pictures", dies)
-    assert write_film(run, tmp_path / "run.mp4") == (3, f"{STOPPED}OpenGL stopped drawing")
+    assert write_film(run, tmp_path / "run.mp4") == (2, f"{STOPPED}OpenGL stopped drawing")
     assert np.array_equal(frames(tmp_path / "run.mp4"), frames(tmp_path / "own.mp4"))
     assert sorted(p.name for p in tmp_path.iterdir()) == ["own.mp4", "run.mp4"]

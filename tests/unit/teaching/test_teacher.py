@@ -158,7 +158,7 @@ def test_an_active_hand_turns_the_part_to_its_attitude_at_its_rate_and_stays_the
 
 def test_an_active_hand_turns_no_harder_than_its_torque():
     task = Task(direction=None, aligned=(0.0, np.sin(0.5), 0.0, np.cos(0.5)), hand="aligning")
-    command = held(task, STEADY, 5000)[-1]  # the part is stuck
+    command = held(task, STEADY, 4000)[-1]  # the part is stuck
     torque = HANDS["aligning"].turn_stiffness * norm(rotation_vector(command.pose.rotation))[0]
     assert torque == pytest.approx(HANDS["aligning"].torque_max, rel=1e-6)
 
@@ -230,7 +230,8 @@ def test_the_peg_can_be_demonstrated_from_both_tilts():
 
 
 def test_a_demonstration_follows_from_its_seed_alone():
-    first, again, other = once("valley", 1), demonstrate("valley", 1), demonstrate("valley", 1, seed=2)
+    first, again = once("hose_coupler", 1), demonstrate("hose_coupler", 1)
+    other = demonstrate("hose_coupler", 1, seed=2)
     for one, same, different in zip(*(r.demonstrations for r in (first, again, other)), strict=True):
         np.testing.assert_array_equal(one.position, same.position)
         np.testing.assert_array_equal(one.wrench, same.wrench)
