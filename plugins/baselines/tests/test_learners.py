@@ -38,6 +38,10 @@ class TestLearnedDmpConforms(SkillConformance):
 class TestGmrConforms(SkillConformance):
     skill_type = "gmr"
 
+    @property
+    def document(self):
+        return once("gmr")
+
 
 class TestSedsConforms(SkillConformance):
     skill_type = "seds"
