@@ -184,10 +184,11 @@ class MachineDrive:
         self._leave(broken)
         self.estimator.calibrate(True)
         ringing = Ringing(self.count, self.dt, SWING_S)
+        zero, still = np.zeros((self.count, 2)), np.zeros_like(self.joint)
+        stiff = LEAST_DAMPING * np.broadcast_to(np.eye(2), (self.count, 2, 2))
+        stiffness = 6.0 * stiff
         for tick in range(round(SWING_S / self.dt)):
             position, velocity, joint, joint_rate = swing(tick * self.dt)
-            stiff = LEAST_DAMPING * np.broadcast_to(np.eye(2), (self.count, 2, 2))
-            zero = np.zeros((self.count, 2))
             self._sample()
             if tick == 0:
                 self._weigh()
@@ -196,8 +197,8 @@ class MachineDrive:
             self._look_at_valves(tick)
             self._valve(
                 Reference(
-                    self.home + position, zero + velocity, 6.0 * stiff, stiff, zero, self.joint + joint,
-                    np.zeros_like(self.joint) + joint_rate,
+                    self.home + position, zero + velocity, stiffness, stiff, zero, self.joint + joint,
+                    still + joint_rate,
                 )
             )  # fmt: skip
             if failed := [*self._suspect(tick, ringing), *self.advance(self.active)]:

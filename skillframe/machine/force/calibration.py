@@ -6,6 +6,8 @@ Friction and payload are identified as an explicit step, by the phase of the tas
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from skillframe.frames import Float
@@ -19,10 +21,12 @@ CALIBRATION_S, SETTLE_S, SWING_M = 6.0, 1.0, (0.10, 0.10, 0.05)
 """Two or three reversals of every cylinder, and a moment to come to rest."""
 
 
+@lru_cache(maxsize=1 << 14)
 def swing(time: float) -> tuple[Float, Float, float, float]:
     """Displacement (2,) [m] and velocity of the tool, and of the open joint, at a time of the calibration [s].
 
-    Up and back to the start, to and fro along the first axis, the joint out and in: every cylinder reverses.
+    Up and back to the start, to and fro along the first axis, the joint out and in: every cylinder reverses. All runs
+    ask for the same times, so what was computed is kept.
     """
     h = 1e-4
     now, rate = _displacement(time), (_displacement(time + h) - _displacement(time - h)) / (2 * h)
