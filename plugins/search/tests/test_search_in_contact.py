@@ -117,6 +117,6 @@ def test_the_learned_spread_and_force_are_near_the_person_s():
 def test_the_socket_is_learned_in_three_dimensions():
     settings = BlindSettings(believed=scene("socket").task.believed, time_s=15.0)
     recording = record_blind(robot(), scene("socket"), settings, count=2, seed=4)
-    from test_learning import phase_of
+    from plugins.search.tests.test_learning import phase_of
 
     assert phase_of(*recording.demonstrations, at="tip").searched == ("across_1", "across_2", "turn")
