@@ -1,0 +1,88 @@
+"""Assemblies of a benchmark's folder that nothing holds along a direction, and what that leaves to be reached.
+
+    python -m tests.figures.unheld automate [00444 ...]
+
+A part that slides freely along a direction both ways tells nobody where it belongs along it. The best guess is the
+place that was shown, and the fixture stands farther from it than what counts as seated in some draws, however good the
+skill is. For each such assembly: the direction, how far it slides, and of the draws of the benchmark those in which a
+part that is held everywhere else, and stands where it was shown along that direction, is seated.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+
+from skillframe import CampaignResults
+from skillframe.errors import InputError
+from skillframe.frames import Float, rotation_matrix
+from skillframe.parts.declared import read_fixture
+from skillframe.parts.fit import TOUCH, PartsFit, fit, thickness
+from skillframe.parts.solid import read_part
+
+RAISED_M, FURTHER_M, LEAST_M, MOST_M = 3e-4, 5e-4, 2e-3, 3e-3
+DIRECTIONS = np.radians(np.arange(0.0, 180.0, 10.0))
+
+
+def slides(parts: PartsFit, along: Float) -> float:
+    """How far an assembled part, raised a little, goes along a unit vector (2,) before it overlaps the other [m]."""
+    there = 0.0
+    for way in np.arange(FURTHER_M, MOST_M + 1e-9, FURTHER_M):
+        moved = parts.plug.translate([float(way * along[0]), float(way * along[1]), RAISED_M])
+        if thickness(moved ^ parts.socket) > TOUCH:
+            break
+        there = float(way)
+    return there
+
+
+def unheld(parts: PartsFit) -> tuple[float, float]:
+    """The direction [rad] along which a part slides farthest both ways, and how far [m]."""
+    ways = np.stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)], axis=-1)
+    both = [min(slides(parts, way), slides(parts, -way)) for way in ways]
+    best = int(np.argmax(both))
+    return float(DIRECTIONS[best]), both[best]
+
+
+def reached(folder: Path, parts: PartsFit, direction: float, within: float) -> dict[float, list[bool]]:
+    """For each friction, whether each draw's place lies so near [m] to the shown one along a direction [rad]."""
+    along = np.array([np.cos(direction), np.sin(direction), 0.0])
+    end, found = np.array([0.0, 0.0, -parts.depth]), defaultdict(list)
+    for row in CampaignResults(folder).rows:
+        turn = rotation_matrix(np.array([row[f"fixture.tilt_{axis}"] for axis in "xyz"]))
+        place = np.array([row["fixture.offset_x"], row["fixture.offset_y"], 0.0]) + turn @ end
+        found[row["world.friction"]].append(abs(float((place - end) @ along)) < within)
+    return dict(found)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("assemblies", nargs="*")
+    given = parser.parse_args()
+    for path in sorted(given.folder.glob("*/fixture.toml")):
+        if given.assemblies and path.parent.name not in given.assemblies:
+            continue
+        try:
+            file = read_fixture(path)
+            sides = ((file.tool, True), (file.fixture, False))
+            parts = fit(*(read_part(path.parent / each.mesh, each.units, held=held) for each, held in sides), file)
+        except InputError as error:
+            print(f"{path.parent.name}: {error}", flush=True)
+            continue
+        direction, way = unheld(parts)
+        if way < LEAST_M:
+            continue
+        said = f"{path.parent.name}: slides {1e3 * way:.1f} mm both ways at {np.degrees(direction):.0f} degrees"
+        for campaign in sorted(path.parent.glob("*deg")):
+            left = reached(campaign, parts, direction, file.task.seated.sideways)
+            said += f"; {campaign.name}: " + ", ".join(
+                f"{sum(near)} of {len(near)} can be seated at friction {friction:g}" for friction, near in left.items()
+            )
+        print(said, flush=True)
+
+
+if __name__ == "__main__":
+    main()
