@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from skillframe_search.centre import ACROSS, Centre
-from skillframe_search.seat import CENTRING, REST_S
+from skillframe_search.seat import CENTRING
 
 from plugins.search.tests.test_seat import DOWN, SEAT, Played
 from skillframe.frames import Pose
@@ -88,7 +88,7 @@ def rests(aside, **changes):
     played = Played(**changes)
     played.go()
     played.deep[:], played.aside[:] = 0.0, aside
-    return played, played.go(REST_S + SEAT.settle_s + 0.05)
+    return played, played.go(SEAT.stall_s + 0.05)
 
 
 def test_at_the_end_and_aside_it_is_drawn_back_once_and_then_done():

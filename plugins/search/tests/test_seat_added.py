@@ -1,5 +1,7 @@
 """What a seating adds to its push: catch, keep, lean, rock, and an attitude that follows."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from seat_played import DOWN, MOST_TILT, SEAT, Played, searching
@@ -162,8 +164,8 @@ def test_the_tip_goes_on_a_spiral_once_the_push_goes_on_and_the_push_is_patient_
     assert played.skill.current[0] == SEARCHING
 
 
-@pytest.mark.parametrize("changes", [{"settle_s": 0.0}, {"stop_m": 0.001}])
-def test_a_part_at_its_end_is_not_rocked_where_that_is_switched_off_or_nothing_stops_it(changes):
+@pytest.mark.parametrize("changes", [{}, {"settle_s": 0.5, "stop_m": 0.001}])
+def test_a_part_at_its_end_is_not_rocked_unless_that_is_asked_for_and_it_is_stopped(changes):
     played = searching(**changes)
     played.search.ends = {0: Status.SUCCESS}
     played.deep[:] = -0.0004
@@ -173,13 +175,13 @@ def test_a_part_at_its_end_is_not_rocked_where_that_is_switched_off_or_nothing_s
 
 def test_a_part_that_rests_near_its_end_is_rocked_and_drawn_to_the_nominal_axis():
     """Before it is called seated. A third of a millimetre aside is drawn by less than 6 N at 4000 N/m, 1 mm by 6 N."""
-    played = Played()
+    played = Played(settle_s=0.5)
     played.go()
     played.deep[:], played.aside[:] = -0.0004, [0.0, 0.0005, 0.0009]
     before = played.go(0.11).feedforward - 1.0  # a tick after the depth was reached it begins to rest
     np.testing.assert_allclose(before[:, [0, 1, 3, 4]], 0.0, atol=1e-12)
     added = played.go(0.14).feedforward - 1.0
-    share = Rocking(SEAT, np.eye(3)).settling(np.array([0.24]))[0]
+    share = Rocking(replace(SEAT, settle_s=0.5), np.eye(3)).settling(np.array([0.24]))[0]
     assert 0.8 < share < 0.9
     np.testing.assert_allclose(added[:, 0], -share * np.minimum(4000.0 * played.aside, SEAT.settle_n), atol=1e-9)
     np.testing.assert_allclose(norm(added[:, 3:]), share * SEAT.settle_nm)
@@ -188,7 +190,7 @@ def test_a_part_that_rests_near_its_end_is_rocked_and_drawn_to_the_nominal_axis(
 
 def test_a_part_that_still_turns_is_not_seated_yet_but_not_for_ever():
     """At 2 degrees a second it turns by 10 mrad in 0.3 s. At a tenth of that it rests."""
-    played = Played()
+    played = Played(settle_s=0.5)
     played.go()
     played.deep[:], rate = 0.0, np.radians([2.0, 0.2, 0.0])
     seated = np.full(3, np.nan)
@@ -196,9 +198,7 @@ def test_a_part_that_still_turns_is_not_seated_yet_but_not_for_ever():
         played.turn[:, 0] += 0.01 * rate
         status = played.go().status
         seated = np.where(np.isnan(seated) & (status == Status.SUCCESS), played.time, seated)
-    np.testing.assert_allclose(
-        seated, REST_S + SEAT.settle_s + np.array([MOST_TURNING_S - REST_S, 0.0, 0.0]), atol=0.05
-    )
+    np.testing.assert_allclose(seated, 0.5 + np.array([MOST_TURNING_S, REST_S, REST_S]), atol=0.05)
 
 
 def test_a_part_that_went_in_without_a_search_is_not_pulled_upright_any_more():

@@ -151,6 +151,14 @@ def test_a_search_keeps_its_lead_where_nothing_stops_the_part():
     np.testing.assert_allclose((command.pose.position - played.seen().pose.position)[there, 2], -0.010, atol=1e-9)
 
 
+def test_a_part_is_settled_where_that_is_asked_for():
+    assert end_of(resting(0.0, 10.0))[0]["settle_s"] == 0.0
+    assert end_of(resting(0.0, 10.0), settle=0.5)[0]["settle_s"] == 0.5
+    said = describe(learned(registry().skill("seat"), [resting(0.0, 10.0)], LearnOptions(settings={"settle": 0.5})))
+    assert any(line.startswith("settle:") for line in said)
+    assert not any(line.startswith("settle:") for line in describe(learned_of(resting(0.0, 10.0))))
+
+
 def test_who_lets_go_at_a_bottom_has_pressed_on_it_before():
     assert end_of(resting(0.0, 10.0, 0.0))[0]["stop_m"] == 0.0
     assert end_of(resting(0.0, 1.0), resting(0.0, 10.0))[0]["stop_m"] == 0.0

@@ -18,7 +18,7 @@ What is added to the push is a wrench F at the centre of compliance, u the way, 
     rock       a torque that goes round: quickly, slowly, then   in the hole, where it rests short of the end: frees a
                on a spiral of the tip, see `rocking`             jam, and finds a second hole below
     settle     a torque that goes round, and a force to the      where it rests near the end: lets it stand flush where
-               nominal axis; both fade                           it is loose, before it is called seated
+               nominal axis; both fade                           it is loose, if asked for
 
 a is the way from the nominal axis to the tool, across u, and v_a its rate, beyond the most. A fixture that is off on
 two axes at once is off by sqrt(2) tilt in attitude, and by sqrt(2) (shift + tilt h) in place, h from where it is turned

@@ -53,7 +53,8 @@ class Seat:
         tip_pitch_m, tip_hz: where that did not help either, the tip goes round on a spiral of this pitch, so often;
             tip_nm_rad, tip_nm: with this stiffness, and this torque at most.
         settle_s, settle_nm, settle_n: at rest near the end it is rocked for so long, by a torque of up to settle_nm at
-            rock_hz that fades, and drawn to the nominal axis by up to settle_n, before it is seated; 0 s does not.
+            rock_hz that fades, and drawn to the nominal axis by up to settle_n, before it is seated, and it is seated
+            once it does not turn any more; 0 s leaves all that out.
     """
 
     way: Vector
@@ -98,7 +99,7 @@ class Seat:
     tip_hz: float = 1.25
     tip_nm_rad: float = 40.0
     tip_nm: float = 0.9
-    settle_s: float = 0.5
+    settle_s: float = 0.0
     settle_nm: float = 0.4
     settle_n: float = 6.0
 

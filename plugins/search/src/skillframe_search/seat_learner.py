@@ -73,6 +73,7 @@ class SeatSettings:
         search: whether it searches on a stall.
         tries: searches and returns before it gives up.
         round: how the part is turned about its way does not matter, as of a round peg.
+        settle: how long it is rocked where it rests near the end, so that a loose part stands flush [s].
     """
 
     skill: str = "lmc"
@@ -87,9 +88,11 @@ class SeatSettings:
     search: bool = True
     tries: int = 8
     round: bool = False
+    settle: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, most in (("shift", 0.05), ("tilt", 0.6), ("height", 0.05), ("friction", 2.0), ("tries", 100)):
+        limits = {"shift": 0.05, "tilt": 0.6, "height": 0.05, "friction": 2.0, "tries": 100, "settle": 10.0}
+        for name, most in limits.items():
             if not 0.0 <= getattr(self, name) <= most:
                 raise InputError(f"--set {name}", f"should be 0 to {most:g}, is {getattr(self, name):g}", "fix it")
 
@@ -267,7 +270,7 @@ def _seat(shown: Sequence[_Shown], point: Float, settings: SeatSettings) -> Seat
         attitude=_vector(rotation_vector(mean)), leant_rad=float(np.arcsin(min(leant, 1.0))),
         contact_m=depth, above_m=above, place=settings.place, shift_m=settings.shift, tilt_rad=settings.tilt,
         height_m=settings.height, friction=settings.friction, approach=settings.approach, search=settings.search,
-        stop_m=STOP_M if free else 0.0, tries=settings.tries,
+        stop_m=STOP_M if free else 0.0, tries=settings.tries, settle_s=settings.settle,
     )  # fmt: skip
 
 
