@@ -38,12 +38,13 @@ def slides(parts: PartsFit, along: Float) -> float:
     return there
 
 
-def unheld(parts: PartsFit) -> tuple[float, float]:
-    """The direction [rad] along which a part slides farthest both ways, and how far [m]."""
+def unheld(parts: PartsFit) -> tuple[float, float, float]:
+    """The direction [rad] along which a part slides farthest both ways, how far, and how far it slides any way [m]."""
     ways = np.stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)], axis=-1)
-    both = [min(slides(parts, way), slides(parts, -way)) for way in ways]
+    each = np.array([[slides(parts, way), slides(parts, -way)] for way in ways])
+    both = each.min(axis=1)
     best = int(np.argmax(both))
-    return float(DIRECTIONS[best]), both[best]
+    return float(DIRECTIONS[best]), float(both[best]), float(each.max())
 
 
 def reached(folder: Path, parts: PartsFit, direction: float, within: float) -> dict[float, list[bool]]:
@@ -72,8 +73,10 @@ def main() -> None:
         except InputError as error:
             print(f"{path.parent.name}: {error}", flush=True)
             continue
-        direction, way = unheld(parts)
+        direction, way, one = unheld(parts)
         if way < LEAST_M:
+            if one >= LEAST_M:
+                print(f"{path.parent.name}: slides {1e3 * one:.1f} mm one way", flush=True)
             continue
         said = f"{path.parent.name}: slides {1e3 * way:.1f} mm both ways at {np.degrees(direction):.0f} degrees"
         for campaign in sorted(path.parent.glob("*deg")):
