@@ -188,6 +188,14 @@ def test_a_part_that_rests_near_its_end_is_rocked_and_drawn_to_the_nominal_axis(
     np.testing.assert_allclose((played.go(0.4).feedforward - 1.0)[:, [0, 1, 3, 4]], 0.0, atol=1e-12)
 
 
+def test_a_part_that_rests_short_of_its_end_is_not_drawn_aside():
+    played = Played(settle_s=0.5)
+    played.go()
+    played.deep[:], played.aside[:] = -0.005, 0.001
+    played.go(0.11)
+    np.testing.assert_allclose((played.go(0.14).feedforward - 1.0)[:, [0, 1, 3, 4]], 0.0, atol=1e-12)
+
+
 def test_a_part_that_still_turns_is_not_seated_yet_but_not_for_ever():
     """At 2 degrees a second it turns by 10 mrad in 0.3 s. At a tenth of that it rests."""
     played = Played(settle_s=0.5)
