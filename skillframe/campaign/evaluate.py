@@ -117,7 +117,8 @@ def _shapes_scene(name: str) -> bool:
 def _declared_values(spec: CampaignSpec) -> Iterator[tuple[str, Value]]:
     """Ends, means and listed values of what varies."""
     for name, axis in spec.vary.items():
-        yield from ((name, value) for value in (axis.numbers[:1] if axis.kind == "normal" else axis.numbers))
+        numbers = axis.numbers[:1] if axis.kind == "normal" else tuple(dict.fromkeys(axis.numbers))
+        yield from ((name, value) for value in numbers)
 
 
 def _check_tails(spec: CampaignSpec, robot: RobotModel) -> None:

@@ -11,7 +11,6 @@
 #define BAND 2.5
 #define REACH 4.0  /* cells; how far from a listed cell's centre its triangles lie, at most */
 #define FAR 1e9f
-#define LOOSE 1.15 /* distances beyond the band are at most this much too large */
 #define ALMOST 0.999999 /* of a distance from a plane, beside rounding */
 #define RUN 16     /* triangles, or runs of them, with a box around */
 

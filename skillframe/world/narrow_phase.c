@@ -21,7 +21,10 @@
 #define AROUND 4.27      /* cells around a whole part, within its widest grid; a tenth of one less than there are */
 #define SURELY 0.5       /* cells; what interpolates to more is outside, whatever edge is near (it is off by a quarter) */
 
+#define ROUGH 0.3        /* cells; by how much less than interpolated a distance can be, and some more */
+#define EXACT 1e-5       /* m; the same where it is linear within a cell, or exact */
 #define AHEAD 3e-4       /* m; points nearer than this are asked until one of them may have moved so far */
+#define TOGETHER 16      /* points that memory is called for at a time */
 #define LISTS 4096       /* of a thread; by simulation, part and part */
 
 static const Part* parts[PARTS];
@@ -143,6 +146,22 @@ static INLINE int64_t cell_at(const View* v, const double* p, double* at) {
   return i * v->step[0] + j * v->step[1] + k;
 }
 
+/* Call for what will be read about some points, so that one waits for memory once and not point by point. */
+static INLINE void call_for(const View* view, const double* point, int values) {
+  double w[3];
+  for (int level = 0; level < 2; level++) {
+    int64_t node = cell_at(view + level, point, w);
+    if (node < 0) continue;
+    const Grid* g = view[level].grid;
+    __builtin_prefetch(g->gap + node);
+    if (!values) return;
+    const float* v = g->value + node;
+    int64_t sx = view[level].step[0], sy = view[level].step[1];
+    __builtin_prefetch(v), __builtin_prefetch(v + sy), __builtin_prefetch(v + sx), __builtin_prefetch(v + sx + sy);
+    return;
+  }
+}
+
 /* Depth of a point in a box, below zero, and the normal of the face that is nearest; above zero outside. */
 static double in_box(const double* half, const double* p, double* normal) {
   double value = -1e9;
@@ -171,30 +190,47 @@ static INLINE double distance_at(const Shape* in, int only_inside, const double*
   return in_box(in->half, p, normal);
 }
 
-/* Whether no point of a ball can be in a shape. */
-static int is_clear(const Shape* in, const double* centre, double radius) {
+/* How far around a place every point is surely outside a shape; below zero where the place itself may be inside. */
+static double clear_by(const Shape* in, const double* place) {
   double w[3], p[3];
   if (in->half) {
-    apply(&in->across, centre, p);
-    return in_box(in->half, p, w) > radius;
+    apply(&in->across, place, p);
+    return in_box(in->half, p, w);
   }
   const View* whole = in->view + (in->view[1].cells[0] > 0);
   double beside = 0;
   for (int x = 0; x < 3; x++) {
-    double at = dot(whole->turn + 3 * x, centre) + whole->shift[x];
+    double at = dot(whole->turn + 3 * x, place) + whole->shift[x];
     double away = larger(AROUND - at, at - whole->cells[x] + AROUND) * whole->grid->cell;
     if (away > 0) beside += away * away;
   }
-  if (beside > radius * radius) return 1;
+  beside = beside > 0 ? sqrt(beside) : -1;
   for (int level = 0; level < 2; level++) {
     const View* view = in->view + level;
-    int64_t node = cell_at(view, centre, w);
-    if (node >= 0) return CLEAR * view->grid->cell * ((double)view->grid->gap[node] - 1) > radius;
+    int64_t node = cell_at(view, place, w);
+    if (node >= 0) return larger(beside, CLEAR * view->grid->cell * ((double)view->grid->gap[node] - 1));
   }
-  return 0;
+  return beside;
 }
 
-/* Points of a part that may be within AHEAD of another, in order, as both stood then. */
+/* Whether no point of a ball can be in a shape. */
+static int is_clear(const Shape* in, const double* centre, double radius) { return clear_by(in, centre) > radius; }
+
+/* How far a place that may be near the surface can surely move before it is inside; below zero where it may be. What is
+   seen there is the distance: to the bit in a cell with a list, else where it is linear, or off by what SURELY says. */
+static double free_by(const Shape* in, const double* place) {
+  double w[3], p[3], normal[3], by = clear_by(in, place);
+  for (int level = 0; in->part && in->part->agrees && level < 2; level++) {
+    const View* view = in->view + level;
+    int64_t node = cell_at(view, place, w);
+    if (node < 0) continue;
+    double cell = view->grid->cell, seen = (apply(&in->across, place, p), in_cell(in->part, view->grid, node, w, p, normal));
+    return larger(by, seen > SURELY * cell ? seen / LOOSE - ROUGH * cell : seen - EXACT);
+  }
+  return by;
+}
+
+/* Points of a part that may be within AHEAD of another, in order, as both stood then, and how far each could move yet. */
 typedef struct {
   const void* data;
   const Part *of, *in;
@@ -202,6 +238,7 @@ typedef struct {
   double centre[3], radius; /* of a ball around all points */
   int64_t changes, count, room;
   int32_t* point;
+  float* free;
 } Near;
 
 static _Thread_local Near* lists;
@@ -219,18 +256,31 @@ static Near* list_of(const void* data, const Part* of, const Part* in) {
   return lists + (h & (LISTS - 1));
 }
 
-/* Whether no point has moved by AHEAD against the other part since a list was made. */
-static int is_good(const Near* near, const void* data, const Part* of, const Part* in, const Frame* across) {
-  if (near->data != data || near->of != of || near->in != in || near->changes != changes) return 0;
+/* How far any point may have moved against the other part since a list was made; AHEAD where there is none that is good. */
+static double moved_since(const Near* near, const void* data, const Part* of, const Part* in, const Frame* across) {
+  if (near->data != data || near->of != of || near->in != in || near->changes != changes) return AHEAD;
   Frame by;
   double turned = 0, moved[3];
   for (int i = 0; i < 9; i++) by.turn[i] = across->turn[i] - near->across.turn[i], turned += by.turn[i] * by.turn[i];
   for (int x = 0; x < 3; x++) by.shift[x] = across->shift[x] - near->across.shift[x];
   apply(&by, near->centre, moved);
-  return sqrt(turned) * near->radius + sqrt(dot(moved, moved)) < 0.999 * AHEAD;
+  return 1.001 * (sqrt(turned) * near->radius + sqrt(dot(moved, moved)));
 }
 
-/* Make a list. Without memory it is of no pair. */
+/* Room for one more point; 0 without memory, and then the list is of no pair. */
+static int has_room(Near* near) {
+  if (near->count < near->room) return 1;
+  int64_t room = near->room ? 2 * near->room : 256;
+  int32_t* point = realloc(near->point, (size_t)room * sizeof *point);
+  if (point) near->point = point;
+  float* free = realloc(near->free, (size_t)room * sizeof *free);
+  if (free) near->free = free;
+  if (point && free) near->room = room;
+  else near->of = NULL;
+  return point && free;
+}
+
+/* Make a list. */
 static void make_list(Near* near, const void* data, const Part* of, const Part* in, const Shape* shape) {
   near->data = data, near->of = of, near->in = in, near->across = shape->across, near->changes = changes;
   near->count = 0, near->radius = 0;
@@ -245,18 +295,11 @@ static void make_list(Near* near, const void* data, const Part* of, const Part* 
     if (is_clear(shape, of->around + 4 * a, of->around[4 * a + 3] + AHEAD)) continue;
     for (int64_t b = of->group[a]; b < of->group[a + 1]; b++) {
       if (is_clear(shape, of->ball + 4 * b, of->ball[4 * b + 3] + AHEAD)) continue;
+      for (int64_t i = of->first[b]; shape->part && i < of->first[b + 1]; i++) call_for(shape->view, of->point + 3 * i, 0);
       for (int64_t i = of->first[b]; i < of->first[b + 1]; i++) {
         if (is_clear(shape, of->point + 3 * i, AHEAD)) continue;
-        if (near->count == near->room) {
-          int64_t room = near->room ? 2 * near->room : 256;
-          int32_t* more = realloc(near->point, (size_t)room * sizeof *more);
-          if (!more) {
-            near->of = NULL;
-            return;
-          }
-          near->room = room, near->point = more;
-        }
-        near->point[near->count++] = (int32_t)i;
+        if (!has_room(near)) return;
+        near->free[near->count] = (float)(0.999 * free_by(shape, of->point + 3 * i)), near->point[near->count++] = (int32_t)i;
       }
     }
   }
@@ -280,10 +323,19 @@ static int look(const void* data, const Part* of, const Frame* pose_of, const Pa
   Frame back = inverse(pose_in), across = after(&back, pose_of);
   Shape in = seen(part, half, &across);
   Near* near = data ? list_of(data, of, part) : NULL;
-  if (near && !is_good(near, data, of, part, &across)) make_list(near, data, of, part, &in);
+  double moved = near ? moved_since(near, data, of, part, &across) : 0;
+  if (near && moved >= AHEAD) make_list(near, data, of, part, &in), moved = 0;
   if (near && near->of) {
-    for (int64_t n = 0; n < near->count && found < CANDIDATES; n++)
-      found = ask(&in, pose_in, of->point + 3 * near->point[n], sign, found);
+    for (int64_t n = 0; n < near->count;) {
+      const double* point[TOGETHER];
+      int asked = 0;
+      for (; n < near->count && asked < TOGETHER; n++)
+        if (near->free[n] <= moved) {
+          point[asked] = of->point + 3 * near->point[n];
+          call_for(in.view, point[asked++], 1);
+        }
+      for (int i = 0; i < asked && found < CANDIDATES; i++) found = ask(&in, pose_in, point[i], sign, found);
+    }
     return found;
   }
   for (int64_t a = 0; a < of->groups; a++) {
@@ -377,6 +429,28 @@ EXPORT int skillframe_add(const Part* part) {
 }
 
 EXPORT void skillframe_remove(int number) { parts[number - 1] = NULL, changes++; }
+
+/* Whether lists and values agree on what is inside, at every corner of a cell with a list: not where a mesh crosses itself. */
+EXPORT int skillframe_agrees(const Part* part) {
+  for (int level = 0; level < 2; level++) {
+    const Grid* g = part->grid + level;
+    int64_t rank = 0;
+    for (int64_t i = 0; i + 1 < g->size[0]; i++)
+      for (int64_t j = 0; j + 1 < g->size[1]; j++)
+        for (int64_t k = 0; k + 1 < g->size[2]; k++) {
+          int64_t node = node_of(g, i, j, k);
+          if (!(g->listed[node >> 6] >> (node & 63) & 1)) continue;
+          for (int c = 0; c < 8; c++) {
+            int64_t at[3] = {i + (c >> 2), j + (c >> 1 & 1), k + (c & 1)};
+            double p[3], normal[3], value = (double)g->value[node_of(g, at[0], at[1], at[2])];
+            for (int x = 0; x < 3; x++) p[x] = g->origin[x] + g->cell * (double)at[x];
+            if (fabs(value) > EXACT && (in_list(part, g, rank, p, normal) < 0) != (value < 0)) return 0;
+          }
+          rank++;
+        }
+  }
+  return 1;
+}
 
 /* Signed distances of points (count, 3) as contacts see them. */
 EXPORT void skillframe_look_up(const Part* part, int64_t count, const double* point, double* out) {

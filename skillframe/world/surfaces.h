@@ -8,6 +8,7 @@
 
 #define EXPORT __attribute__((visibility("default")))
 #define INLINE inline __attribute__((always_inline))
+#define LOOSE 1.15 /* distances beyond the band are at most this much too large */
 #define CLEAR 0.25 /* cells; a gap of 1 + n says that every point within n of these is outside */
 
 typedef struct {
@@ -32,6 +33,7 @@ typedef struct {
   Grid grid[2];             /* fine, where the parts can meet, and coarse, all of it; a size of zero: not there */
   double turn[9], shift[3]; /* part frame to body frame */
   double apart;             /* least distance of two contacts */
+  int64_t agrees;           /* see skillframe_agrees */
   int64_t points, blocks, groups;
   const double* point;      /* (points, 3), block by block */
   const double* ball;       /* (blocks, 4): centre and radius */

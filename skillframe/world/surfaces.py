@@ -41,7 +41,7 @@ class _Grid(ctypes.Structure):
 class _Part(ctypes.Structure):
     _fields_ = (
         ("mesh", _Mesh), ("grid", _Grid * 2), ("turn", ctypes.c_double * 9), ("shift", ctypes.c_double * 3),
-        ("apart", ctypes.c_double), ("points", ctypes.c_int64),
+        ("apart", ctypes.c_double), ("agrees", ctypes.c_int64), ("points", ctypes.c_int64),
         ("blocks", ctypes.c_int64), ("groups", ctypes.c_int64),
         *((name, ctypes.c_void_p) for name in ("point", "ball", "first", "around", "group")),
     )  # fmt: skip
@@ -220,6 +220,7 @@ def number_of(surface: Surface) -> int:
     """
     if surface not in _NUMBERS:
         part = _part(surface)
+        part.agrees = _require().skillframe_agrees(ctypes.byref(part))
         number = int(_require().skillframe_add(ctypes.byref(part)))
         if not number:
             raise SkillframeError("a thousand parts are in contact already, which is all that there is room for")

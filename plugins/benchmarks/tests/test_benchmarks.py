@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import stats
 from skillframe_benchmarks import counts, scores
 from skillframe_benchmarks.assembly import Plan
 from skillframe_benchmarks.assets import pairs
@@ -191,14 +192,15 @@ def test_two_pairs_of_meshes_become_a_table_a_page_and_are_not_run_again(tmp_pat
     assert "overlap" in refused["refused"] and not refused["cells"]  # a plug of 6 mm in a hole of 5
     only, other = ran["cells"]
     assert [only["level"], other["level"]] == ["1mm-2deg-0.2", "1mm-2deg-0.5"] and other["trials"] == 2
-    rows = CampaignResults(tmp_path / "automate/00001/1mm-2deg").rows
+    rows = CampaignResults(tmp_path / "automate/00001/trials").rows
     assert [row["world.friction"] for row in rows] == [0.2, 0.2, 0.5, 0.5]  # one campaign, so that they run abreast
+    assert [rows[i]["fixture.tilt_x"] for i in (0, 1)] == [rows[i]["fixture.tilt_x"] for i in (2, 3)]  # like draws
     assert 'tilt = "90deg"' in (tmp_path / "automate/00001/fixture.toml").read_text()  # seated says nothing of it
-    assert only["trials"] == 2 and only["checked"] is not None and ran["cost_s"]["1mm-2deg"] > 0.0
+    assert only["trials"] == 2 and only["checked"] is not None and ran["cost_s"]["trials"] > 0.0
     page = (tmp_path / "automate/automate.html").read_text()
     assert "00001" in page and "data:image/png" in page and "http://" not in page
     assert run(words) == 0 and "2 of 2 assemblies are there already" in capsys.readouterr().err
-    assert "seed = 4\n" in (tmp_path / "automate/00001/1mm-2deg/campaign.toml").read_text()
+    assert "seed = 4\n" in (tmp_path / "automate/00001/trials/campaign.toml").read_text()
     assert "(seed 1; of the draws 4)" in page
     assert run([*words, "--seed", "2"]) == 2 and run([*words, "--draws", "1"]) == 2
 
@@ -207,9 +209,25 @@ def test_the_levels_are_those_that_are_told_and_the_widest_is_the_published_nois
     from skillframe_benchmarks.assembly import LEVELS
 
     assert [level.name for level in LEVELS] == ["1mm-2deg-0.2", "1mm-2deg-0.5", "2mm-5deg-0.2", "2mm-5deg-0.5"]
-    last = LEVELS[-1].vary()
-    assert last["fixture.offset_x"] == {"uniform": [-0.002, 0.002]}  # socket_pos_obs_noise, socket_rot_obs_noise
-    assert last["fixture.tilt_z"]["uniform"][1] == pytest.approx(0.0872665, abs=1e-6)
+    last = LEVELS[-1].most()
+    assert last["fixture.offset_x"] == 0.002  # socket_pos_obs_noise, socket_rot_obs_noise
+    assert last["fixture.tilt_z"] == pytest.approx(0.0872665, abs=1e-6)
+
+
+def test_trials_of_all_levels_follow_each_other_with_like_draws_uniform_up_to_each_level():
+    from skillframe_benchmarks.assembly import LEVELS, drawn, levels_of
+
+    levels, trials = levels_of([LEVELS[3].name, LEVELS[0].name]), 400
+    assert levels == [LEVELS[0], LEVELS[3]]  # in the order of all, however they were named
+    vary = {name: np.array(axis["values"]).reshape(2, trials) for name, axis in drawn(levels, trials, 4).items()}
+    assert (vary["world.friction"] == [[0.2], [0.5]]).all()
+    for name, (near, far) in vary.items():
+        if name != "world.friction":
+            most = [level.most()[name] for level in levels]
+            assert near / most[0] == pytest.approx(far / most[1])
+            assert stats.kstest(far / most[1], stats.uniform(-1.0, 2.0).cdf).pvalue > 1e-3  # one seed in a thousand
+    assert drawn(levels, trials, 5)["fixture.tilt_z"] != drawn(levels, trials, 4)["fixture.tilt_z"]
+    assert abs(np.corrcoef(vary["fixture.offset_x"][1], vary["fixture.tilt_y"][1])[0, 1]) < 0.16  # 3 / sqrt(400)
 
 
 @pytest.mark.parametrize(("fails", "looks", "upright"), [(0, None, True), (1, 5e-4, True), (2, None, False)])
@@ -251,7 +269,7 @@ def test_a_method_that_learns_nothing_leaves_the_others_their_skills_and_says_wh
     monkeypatch.setattr(assembly, "_world", lambda pair, folder: folder / "fixture.toml")
     monkeypatch.setattr(assembly, "_shown", lambda fixture, folder, plan: [])
     ran = []
-    monkeypatch.setattr(assembly, "_campaign", lambda level, fixture, skills, out, plan: ran.append([*skills]) or {})
+    monkeypatch.setattr(assembly, "_campaign", lambda fixture, skills, out, plan: ran.append([*skills]) or {})
     pair = Pair(name="00007", plug=tmp_path / "p.obj", socket=tmp_path / "s.obj", way_out=None)
     plan, told = assembly.Plan(methods=("push", "lmc", "replay"), levels=("1mm-2deg-0.2",)), []
     assembly.run(assembly.AssemblyJob(pair=pair, folder=tmp_path / "00007", plan=plan), told.append)
@@ -267,7 +285,7 @@ def test_all_trials_of_a_method_that_learned_nothing_count_as_failed_at_every_le
     from skillframe_benchmarks.assembly import LEVELS, Plan
 
     whole = {
-        "done": {"trials": 20},
+        "done": {"trials": 20, "levels": [level.name for level in LEVELS]},
         "unlearned": {"lmc": "touches nothing"},
         "parts": {"way_out_m": 0.01, "depth_m": 0.02, "clearance_m": 1e-4},
     }

@@ -64,6 +64,30 @@ def test_the_spiral_is_about_the_mean_attitude_damped_and_no_stronger_than_allow
     assert norm(spiral(played(weak), SEAT.slow_after_s + 3.0)) == pytest.approx(0.9)
 
 
+def test_a_spiral_is_the_same_to_the_bit_whoever_searches_beside_it():
+    """Two tools that begin one after the other, pause and go on, against each by itself."""
+    rocking, alone = played(DEEP_HOLE), [played(DEEP_HOLE) for _ in range(2)]
+    for each in alone:
+        each.start(1)
+    spans = ((10, 40), (60, 90)), ((25, 70), (95, 99))
+    rng, begun = np.random.default_rng(0), np.zeros(2, dtype=np.intp)
+    for tick in range(100):
+        rests = np.array([any(low <= tick < high for low, high in span) for span in spans])
+        begun = np.where(rests, begun + 1, 0)
+        idle, turn = SEAT.slow_after_s + 0.0015 * begun, rng.normal(0.0, 0.02, (2, 3))
+        whole = seen((0.0, 0.0, 0.0), time=1e-3 * tick)
+        whole = whole._replace(pose=Pose(whole.pose.position, rotation_matrix(turn)))
+        yes, deep = np.ones(2, dtype=bool), np.full(2, -0.02)
+        both = rocking.torque(whole, idle, deep, rests, yes)
+        for i, each in enumerate(alone):
+            one = Observation(
+                whole.time[i : i + 1], whole.dt, Pose(whole.pose.position[i : i + 1], whole.pose.rotation[i : i + 1]),
+                whole.twist[i : i + 1], whole.wrench[i : i + 1],
+            )  # fmt: skip
+            mine = each.torque(one, idle[i : i + 1], deep[:1], rests[i : i + 1], yes[:1])
+            np.testing.assert_array_equal(mine[0], both[i])
+
+
 @pytest.mark.parametrize(("deep", "urged"), [(-0.058, True), (-0.02, False)])
 def test_there_is_no_spiral_where_the_lever_is_short_or_before_the_push_goes_on(deep, urged):
     """0.7 mm on a lever of 2 mm are 20 degrees, which is more than a part may lean."""

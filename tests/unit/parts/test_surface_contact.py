@@ -1,6 +1,7 @@
 """Parts as surfaces in MuJoCo: chosen where pieces do not hold, a block's weight and height, the same in a batch."""
 
 import ctypes
+from dataclasses import replace
 
 import mujoco
 import mujoco.batch
@@ -168,6 +169,20 @@ def test_near_points_of_a_part_that_was_taken_out_are_not_those_of_one_in_its_pl
     library.skillframe_remove(number)
     assert len(found[0]) and np.array_equal(*found)
     del wide, narrow, pin
+
+
+@needs_compiler
+def test_a_mesh_that_crosses_itself_does_not_agree_on_what_is_inside_and_others_do():
+    """Rays that cross twice are outside, where two boxes overlap, and the nearest triangle says inside."""
+    whole = geom_of(in_metres(hole(5.2, 12.0, 24))).surface
+    two = [arrays_of(in_metres(box(low, [v + 6.0 for v in low]))) for low in ((0.0, 0.0, 0.0), (3.0, 3.0, 3.0))]
+    corners, faces = (np.concatenate(each) for each in zip(*two, strict=True))
+    faces[len(two[0][1]) :] += len(two[0][0])
+    triangles = surfaces.triangles_of(corners, faces)
+    grid = surfaces.grid_of(triangles, np.full(3, -0.001), np.full(3, 0.010), 2e-4)
+    crossed = replace(whole, triangles=triangles, grids=(grid,))
+    agrees = [surfaces._require().skillframe_agrees(ctypes.byref(surfaces._part(each))) for each in (whole, crossed)]
+    assert agrees == [1, 0]
 
 
 @pytest.mark.slow

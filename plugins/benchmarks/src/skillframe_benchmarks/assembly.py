@@ -1,4 +1,4 @@
-"""One assembly of the benchmark: two meshes become a world, two demonstrations, a skill a method, a campaign a noise.
+"""One assembly of the benchmark: two meshes become a world, two demonstrations, a skill a method, and a campaign.
 
 Everything is kept in the assembly's folder. What is there is not made again, so that a run that was ended goes on.
 """
@@ -10,12 +10,13 @@ import math
 import shutil
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from skillframe import Campaign, CampaignResults, LearnedSkill, Recording, record
 from skillframe.api.inputs import demonstrations_of
@@ -46,39 +47,33 @@ FEW = 5
 """Attempts at a demonstration before another person tries, or less is asked: one, and four side by side (ours)."""
 ABREAST = 400
 """Trials that are simulated side by side: a tick takes some 0.8 ms, of one trial or of many (ours)."""
-DONE, REFUSED, UNLEARNED = "done.json", "refused.json", "unlearned.json"
+DONE, REFUSED, UNLEARNED, TRIALS = "done.json", "refused.json", "unlearned.json", "trials"
 
 
 class Level(NamedTuple):
     """How far the socket is from where the robot believes it.
 
     Attributes:
-        noise: what it is called without its friction; levels that differ in that alone run in one campaign, whose
-            folder this names.
+        name: shift, tilt and friction, as they are typed.
         shift: largest shift along x and y [m].
         tilt: largest turn about x, y and z [rad].
         friction: Coulomb coefficient.
     """
 
-    noise: str
+    name: str
     shift: float
     tilt: float
     friction: float
 
-    @property
-    def name(self) -> str:
-        """What it is called."""
-        return f"{self.noise}-{self.friction:g}"
-
-    def vary(self) -> dict[str, Any]:
-        """`[vary]` of its campaign without the friction: uniform."""
-        shifts = {f"fixture.offset_{axis}": {"uniform": [-self.shift, self.shift]} for axis in "xy"}
-        return shifts | {f"fixture.tilt_{axis}": {"uniform": [-self.tilt, self.tilt]} for axis in "xyz"}
+    def most(self) -> dict[str, float]:
+        """By how much the socket is off at most, by the name of the quantity [m, rad]."""
+        shifts = {f"fixture.offset_{axis}": self.shift for axis in "xy"}
+        return shifts | {f"fixture.tilt_{axis}": self.tilt for axis in "xyz"}
 
 
 FRICTION = "world.friction"
 LEVELS = tuple(
-    Level(f"{1e3 * shift:g}mm-{degrees:g}deg", shift, math.radians(degrees), friction)
+    Level(f"{1e3 * shift:g}mm-{degrees:g}deg-{friction:g}", shift, math.radians(degrees), friction)
     for shift, degrees in ((0.001, 2.0), (0.002, 5.0))
     for friction in (0.2, 0.5)
 )
@@ -156,12 +151,12 @@ def _run(job: AssemblyJob, cost: _Cost, tell: Callable[[str], None]) -> None:
     _keep(folder / UNLEARNED, unlearned)
     for name, why in unlearned.items():
         tell(f"{job.pair.name}: {name} learned nothing and counts as failed: {why}")
-    asked = [level for level in LEVELS if level.name in plan.levels] if skills else []
-    for noise, levels in groupby(asked, lambda level: level.noise):
-        with cost.of(noise):
-            found = _campaign([*levels], fixture, skills, folder / noise, plan)
-        for name, each in found.items():
-            tell(f"{job.pair.name}, {name}: " + ", ".join(f"{k} {v} of {plan.trials}" for k, v in each.items()))
+    if not skills:
+        return
+    with cost.of("trials"):
+        found = _campaign(fixture, skills, folder / TRIALS, plan)
+    for name, each in found.items():
+        tell(f"{job.pair.name}, {name}: " + ", ".join(f"{k} {v} of {plan.trials}" for k, v in each.items()))
 
 
 def _taught(job: AssemblyJob, shown: list[Demonstration]) -> tuple[dict[str, Path], dict[str, str]]:
@@ -240,27 +235,43 @@ def _learned(name: str, shown: list[Demonstration], folder: Path) -> Path:
     return path
 
 
-def _campaign(
-    levels: list[Level], fixture: Path, skills: dict[str, Path], out: Path, plan: Plan
-) -> dict[str, dict[str, int]]:
-    """Runs what is missing of the campaign of levels with one noise. Successes by level and method."""
+def _campaign(fixture: Path, skills: dict[str, Path], out: Path, plan: Plan) -> dict[str, dict[str, int]]:
+    """Runs what is missing of the campaign of all levels. Successes by level and method."""
+    levels = levels_of(plan.levels)
     if out.exists() and not _whole(out):
         shutil.rmtree(out)
     if not out.exists():
         seed = plan.seed if plan.draws is None else plan.draws
-        frictions = {"values": [level.friction for level in levels for _ in range(plan.trials)]}
         Campaign(
             world=str(fixture), robot=plan.robot, skills=[str(path) for path in skills.values()],
             trials=plan.trials * len(levels), seed=seed, coc="tip", duration_s=plan.duration_s,
-            vary=levels[0].vary() | {FRICTION: frictions}, scores=list(SCORES),
-            name=f"AutoMate {fixture.parent.name}, {levels[0].noise}",
+            vary=drawn(levels, plan.trials, seed), scores=list(SCORES), name=f"AutoMate {fixture.parent.name}",
         ).prepare(out)  # fmt: skip
     run_campaign(out, evaluate.evaluate, Options(traces=0, chunk=ABREAST))
-    seated = {level.friction: dict.fromkeys(skills, 0) for level in levels}
+    seated = {level.name: dict.fromkeys(skills, 0) for level in levels}
     names = {path.name: name for name, path in skills.items()}
     for row in CampaignResults(out).rows:
-        seated[row[FRICTION]][names[row["skill"]]] += bool(row["success"])
-    return {level.name: seated[level.friction] for level in levels}
+        seated[levels[row["trial"] // plan.trials].name][names[row["skill"]]] += bool(row["success"])
+    return seated
+
+
+def levels_of(names: Sequence[str]) -> list[Level]:
+    """Levels in the order in which their trials follow each other, whatever the order of their names."""
+    return [level for level in LEVELS if level.name in names]
+
+
+def drawn(levels: Sequence[Level], trials: int, seed: int) -> dict[str, Any]:
+    """`[vary]` of a campaign in which levels follow each other, `trials` each.
+
+    The socket is off in the same direction and by the same share of the most at every level, so that levels are
+    compared on like draws, and all of them are simulated side by side.
+    """
+    shares = np.random.default_rng(seed).uniform(-1.0, 1.0, (len(LEVELS[0].most()), trials))
+    vary = {
+        name: {"values": [float(level.most()[name] * each) for level in levels for each in share]}
+        for name, share in zip(LEVELS[0].most(), shares, strict=True)
+    }
+    return vary | {FRICTION: {"values": [level.friction for level in levels for _ in range(trials)]}}
 
 
 def _whole(folder: Path) -> bool:

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from skillframe_benchmarks.counts import Found
 
 
-LAYOUT = 2
-"""Of a benchmark's folder: a campaign a noise. The first had a campaign a level."""
+LAYOUT = 3
+"""Of a benchmark's folder: one campaign. The first had a campaign a level, the second a campaign a noise."""
 
 
 @click.group(name="benchmark")

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from skillframe import CampaignResults
-from skillframe_benchmarks.assembly import DONE, FRICTION, REFUSED, UNLEARNED, Level
+from skillframe_benchmarks.assembly import DONE, REFUSED, TRIALS, UNLEARNED, Level, levels_of
 from skillframe_benchmarks.scores import passes
 
 DRAWS, OFTEN, FEWEST = 4000, 0.8, 5
@@ -82,13 +82,10 @@ def read(folder: Path, levels: Iterable[Level]) -> Found | None:
         return None
     refused = _json(folder / REFUSED)
     parts = _json(folder / "parts.json")
-    cells: dict[tuple[str, str], Cell] = {}
-    for level in levels:
-        if (folder / level.noise / "summary.json").exists():
-            cells |= {(level.name, method): cell for method, cell in _cells(folder, level, parts).items()}
-    unlearned = _json(folder / UNLEARNED)
+    plan, unlearned = _json(folder / DONE), _json(folder / UNLEARNED)
+    cells = _cells(folder / TRIALS, plan, parts) if (folder / TRIALS / "summary.json").exists() else {}
     if unlearned:
-        none = _failed(_json(folder / DONE)["trials"], parts)
+        none = _failed(plan["trials"], parts)
         cells |= {(level.name, method): none for level in levels for method in unlearned}
     text = f"{refused['step']}: {refused['why']}" if refused else ""
     return Found(folder.name, text, unlearned, parts, _json(folder / "cost.json"), cells, folder / "parts.png")
@@ -105,12 +102,13 @@ def _json(path: Path) -> dict[str, Any]:
     return found
 
 
-def _cells(folder: Path, level: Level, parts: Mapping[str, Any]) -> dict[str, Cell]:
-    rows: dict[str, list[dict[str, Any]]] = {}
-    for row in CampaignResults(folder / level.noise).rows:
-        if row[FRICTION] == level.friction:
-            rows.setdefault(row["skill"].removesuffix(".skill.json"), []).append(row)
-    return {method: _cell(each, parts) for method, each in rows.items()}
+def _cells(campaign: Path, plan: Mapping[str, Any], parts: Mapping[str, Any]) -> dict[tuple[str, str], Cell]:
+    levels = levels_of(plan["levels"])
+    rows: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for row in CampaignResults(campaign).rows:
+        key = levels[row["trial"] // plan["trials"]].name, row["skill"].removesuffix(".skill.json")
+        rows.setdefault(key, []).append(row)
+    return {key: _cell(each, parts) for key, each in rows.items()}
 
 
 def _cell(rows: Sequence[Mapping[str, Any]], parts: Mapping[str, Any]) -> Cell:

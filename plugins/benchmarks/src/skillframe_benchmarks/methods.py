@@ -76,7 +76,29 @@ def push_search(demonstrations: Sequence[Demonstration]) -> LearnedSkill:
     return LearnedSkill(document=document, name="push_search")
 
 
+def push_spiral(demonstrations: Sequence[Demonstration]) -> LearnedSkill:
+    """The push that nobody taught, and a plain spiral where it stalls: no approach, and nothing added to the push."""
+    return LearnedSkill(document=plain_spiral(push_search(demonstrations).document), name="push_spiral")
+
+
+def plain_spiral(document: Mapping[str, Any]) -> dict[str, Any]:
+    """A seating's document with its push, and of the rest a plain spiral alone, as one would write it by hand.
+
+    12 N, 2500 N/m, pitch 0.4 mm, radius 3 mm, 12 mm/s, after 0.15 s without progress: our choice.
+    """
+    nothing = ("catch_ns_m", "lean_nm_rad", "upright_nm_rad", "rock_nm", "slow_nm", "keep_n_m", "follow_s", "centre_n")
+    seat = {**document["seat"], **dict.fromkeys(nothing, 0.0), "approach": False, "stall_s": 0.15, "lost_m": 1.0}
+    spiral = document["phases"][1]
+    path = {"speed": 0.012, "acceleration": 0.3, "pitch": 4e-4, "radius": 0.003, "passes": 1, "inner": 0.0}
+    search = {
+        **spiral, "push": {**spiral["push"], "force": 12.0}, "path": {**spiral["path"], **path}, "dither": {},
+        "stiffness": {"translation": 2500.0, "rotation": 60.0, "turn": None}, "stop": {"time_s": 10.0},
+    }  # fmt: skip
+    return {**document, "phases": [document["phases"][0], search], "seat": {**seat, "tilt_rad": 0.0}}
+
+
 METHODS: Mapping[str, Method] = {
-    "push": push, "push_search": push_search, "lmc": lmc, "lmc_search": lmc_search, "replay": replay,
+    "push": push, "push_spiral": push_spiral, "push_search": push_search, "lmc": lmc, "lmc_search": lmc_search,
+    "replay": replay,
 }  # fmt: skip
 """By the names that results give them."""

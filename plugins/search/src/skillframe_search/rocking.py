@@ -43,7 +43,7 @@ class Rocking:
 
     def start(self, count: int) -> None:
         """Of so many trials."""
-        self._mean = np.zeros((count, 3))
+        self._mean, self._spiralled = np.zeros((count, 3)), np.zeros(count, dtype=bool)
 
     def patience(self, deep: Float, urged: NDArray[np.bool_]) -> Float:
         """How long (N,) each may rest in the hole before it has stalled [s], at depths (N,) against the end [m]."""
@@ -64,6 +64,7 @@ class Rocking:
             resting: (N,) who is in the hole and short of the end.
             urged: (N,) whose push goes on after rocking.
         """
+        before, self._spiralled = self._spiralled, np.zeros(len(resting), dtype=bool)
         if not np.count_nonzero(resting):
             return np.zeros((len(resting), 3))
         seat = self._seat
@@ -74,7 +75,8 @@ class Rocking:
         pitch = self._pitch(deep)
         searches = resting & urged & slow & self._is_deep(pitch)
         if np.count_nonzero(searches):
-            torque[searches] = self._spiral(observation, idle - seat.slow_after_s, pitch, searches)[searches]
+            gone, self._spiralled = np.where(searches, idle - seat.slow_after_s, 0.0), searches
+            torque[searches] = self._spiral(observation, gone, pitch, searches & ~before)[searches]
         return torque
 
     def settling(self, idle: Float) -> Float:
@@ -89,13 +91,12 @@ class Rocking:
         """(N, 3) torque that settles parts at (N,) times [s], each its (N,) share of the most [Nm]."""
         return self._round(self._seat.settle_nm * share, 2.0 * np.pi * self._seat.rock_hz * time)
 
-    def _spiral(self, observation: Observation, gone: Float, pitch: Float, searches: NDArray[np.bool_]) -> Float:
+    def _spiral(self, observation: Observation, gone: Float, pitch: Float, begins: NDArray[np.bool_]) -> Float:
         seat = self._seat
         turn = self._across(rotation_vector(observation.pose.rotation @ self._upright.T))
-        fresh = ~searches | (gone <= observation.dt)
-        self._mean = np.where(fresh[:, None], turn, self._mean)
+        self._mean = np.where(begins[:, None], turn, self._mean)
         self._mean += (turn - self._mean) * (observation.dt / MEAN_S)
-        turns = np.where(searches, seat.tip_hz * gone, 0.0)
+        turns = seat.tip_hz * gone
         wanted = self._mean + self._round(np.minimum(pitch * turns, seat.most_tilt_rad), 2.0 * np.pi * turns)
         torque = seat.tip_nm_rad * (wanted - turn) - TIP_NMS_RAD * self._across(observation.twist[:, 3:])
         result: Float = torque * np.minimum(1.0, seat.tip_nm / np.maximum(norm(torque), 1e-9))[:, None]
