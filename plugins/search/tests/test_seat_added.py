@@ -209,11 +209,17 @@ def test_a_part_that_still_turns_is_not_seated_yet_but_not_for_ever():
     np.testing.assert_allclose(seated, 0.5 + np.array([MOST_TURNING_S, REST_S, REST_S]), atol=0.05)
 
 
-def test_a_part_that_went_in_without_a_search_is_not_pulled_upright_any_more():
-    played = Played()
+@pytest.mark.parametrize("settle", [0.0, 0.5])
+def test_a_part_that_goes_straight_in_is_pulled_upright_until_it_rests_short_of_its_end_or_is_to_settle(settle):
+    played = Played(settle_s=settle)
     played.go()
     played.turn[:, 0] = 0.02
-    played.deep[:] = -0.0115
-    assert played.go().feedforward[0, 3] - 1.0 == pytest.approx(-0.02 * SEAT.upright_nm_rad)
+    for deep, pulled in ((-0.0115, True), (-0.009, not settle), (-0.0002, not settle)):
+        played.deep[:] = deep
+        assert played.go().feedforward[0, 3] - 1.0 == pytest.approx(-0.02 * SEAT.upright_nm_rad * pulled, abs=1e-12)
     played.deep[:] = -0.009
-    assert played.go().feedforward[0, 3] - 1.0 == pytest.approx(0.0, abs=1e-12)
+    played.push.ends = {0: Status.SUCCESS}
+    played.go(0.02)
+    assert played.skill.current[0] == PUSHING  # it goes on, and rocks
+    pulls = played.go().feedforward[:2, 3] - 1.0
+    np.testing.assert_allclose(pulls, (0.0, -0.02 * SEAT.upright_nm_rad * (not settle)), atol=1e-12)

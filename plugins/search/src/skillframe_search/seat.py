@@ -11,7 +11,8 @@ Primitives and a search as their exception strategy are the papers' structure. H
 What is added to the push is a wrench F at the centre of compliance, u the way, rho the turn from the nominal attitude:
 
     catch      - c max(0, v.u - v_max) u                     so that a part that lets go does not fall in
-    lean       - k_0 rho - k_1 max(0, |rho| - most) rho/|rho|    so that it does not lie down; k_0 on the rim only
+    lean       - k_0 rho - k_1 max(0, |rho| - most) rho/|rho|    so that it does not lie down; k_0 until it is searched
+                                                                 for, or rests in the hole
     keep       - k max(0, |a| - most) a/|a| - d v_a              so that a slanting push does not pass the fixture by
     free       - (1 - u u^T) K (x_d - x)                         in the hole, which guides the part: a push that slants
                                                                  or is stiff on an axis across jams it
@@ -287,8 +288,9 @@ class Seating(Composition):
         added[:, :3] = -seat.catch_ns_m * fast[:, None] * self._way + self._kept(observation)
         turn = rotation_vector(observation.pose.rotation @ self._upright.T)
         angle = np.maximum(norm(turn), 1e-9)
+        free = self._in_hole() | (self._entered() & bool(seat.settle_s))
         pull = (
-            np.where(self._searched | self._entered(), 0.0, seat.upright_nm_rad)
+            np.where(free, 0.0, seat.upright_nm_rad)
             + seat.lean_nm_rad * np.maximum(angle - seat.most_tilt_rad, 0.0) / angle
         )
         added[:, 3:] = -pull[:, None] * turn

@@ -46,7 +46,8 @@ class Seat:
         stop_m: the push fades over so much before the end, where nothing else stops the part; 0: the part is stopped.
         catch_m_s, catch_ns_m: faster along the way than this is braked, with this damping.
         keep_n_m: pulls back what is farther from the nominal axis than the fixture may be off, and `aside_m`.
-        upright_nm_rad: pulls upright until the part is in the hole; lean_nm_rad: always, beyond sqrt(2) `tilt_rad`.
+        upright_nm_rad: pulls upright until the part has been searched for, or rests in the hole short of its end;
+            lean_nm_rad: always, beyond sqrt(2) `tilt_rad`.
         follow_s: in the hole the attitude wanted follows the measured one within this; 0 does not.
         rock_nm, rock_hz: torque that turns across the way in a hole, once the tool rests in it for rock_after_s;
             slow_nm, slow_hz: the same once it rests for slow_after_s. Quickly it frees a jam, slowly it moves the tip.
