@@ -52,8 +52,8 @@ def _parts(seat: Seat, nowhere: bool) -> list[str]:
         f"keep: pulls back with {seat.keep_n_m:g} N/m what is farther from the nominal axis than the fixture may be "
         "off; adds that a push that slants does not pass the fixture by",
         f"lean: pulls upright with {seat.upright_nm_rad:g} Nm/rad until it searches or rests in the hole, and with "
-        f"{seat.lean_nm_rad:g} beyond {degrees(seat.most_tilt_rad):.1f} degrees; adds that the part does not lie down on "
-        "the rim, and stands flush where it goes straight in",
+        f"{seat.lean_nm_rad:g} beyond {degrees(seat.most_tilt_rad):.1f} degrees; adds that the part does not lie down "
+        "on the rim, and stands flush where it goes straight in",
         "free: in the hole nothing of the push goes across the way; adds that a push that slants, or gives way on one "
         "axis alone, does not jam the part",
         f"follow: in the hole the attitude wanted follows the measured one within {seat.follow_s:g} s, by that tilt at "
