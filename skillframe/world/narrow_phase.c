@@ -218,7 +218,7 @@ static int is_clear(const Shape* in, const double* centre, double radius) { retu
 
 /* How far a place that may be near the surface can surely move before it is inside; below zero where it may be. What is
    seen there is the distance: to the bit in a cell with a list, else where it is linear, or off by what SURELY says. */
-static double free_by(const Shape* in, const double* place) {
+static double moves_by(const Shape* in, const double* place) {
   double w[3], p[3], normal[3], by = clear_by(in, place);
   for (int level = 0; in->part && in->part->agrees && level < 2; level++) {
     const View* view = in->view + level;
@@ -238,7 +238,7 @@ typedef struct {
   double centre[3], radius; /* of a ball around all points */
   int64_t changes, count, room;
   int32_t* point;
-  float* free;
+  float* moves;
 } Near;
 
 static _Thread_local Near* lists;
@@ -273,11 +273,11 @@ static int has_room(Near* near) {
   int64_t room = near->room ? 2 * near->room : 256;
   int32_t* point = realloc(near->point, (size_t)room * sizeof *point);
   if (point) near->point = point;
-  float* free = realloc(near->free, (size_t)room * sizeof *free);
-  if (free) near->free = free;
-  if (point && free) near->room = room;
+  float* moves = realloc(near->moves, (size_t)room * sizeof *moves);
+  if (moves) near->moves = moves;
+  if (point && moves) near->room = room;
   else near->of = NULL;
-  return point && free;
+  return point && moves;
 }
 
 /* Make a list. */
@@ -299,7 +299,7 @@ static void make_list(Near* near, const void* data, const Part* of, const Part* 
       for (int64_t i = of->first[b]; i < of->first[b + 1]; i++) {
         if (is_clear(shape, of->point + 3 * i, AHEAD)) continue;
         if (!has_room(near)) return;
-        near->free[near->count] = (float)(0.999 * free_by(shape, of->point + 3 * i)), near->point[near->count++] = (int32_t)i;
+        near->moves[near->count] = (float)(0.999 * moves_by(shape, of->point + 3 * i)), near->point[near->count++] = (int32_t)i;
       }
     }
   }
@@ -330,7 +330,7 @@ static int look(const void* data, const Part* of, const Frame* pose_of, const Pa
       const double* point[TOGETHER];
       int asked = 0;
       for (; n < near->count && asked < TOGETHER; n++)
-        if (near->free[n] <= moved) {
+        if (near->moves[n] <= moved) {
           point[asked] = of->point + 3 * near->point[n];
           call_for(in.view, point[asked++], 1);
         }

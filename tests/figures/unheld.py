@@ -11,12 +11,14 @@ part that is held everywhere else, and stands where it was shown along that dire
 from __future__ import annotations
 
 import argparse
-from collections import defaultdict
+import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from skillframe_benchmarks.assembly import DONE, TRIALS, by_level
 
-from skillframe import CampaignResults
 from skillframe.errors import InputError
 from skillframe.frames import Float, rotation_matrix
 from skillframe.parts.declared import read_fixture
@@ -47,15 +49,15 @@ def unheld(parts: PartsFit) -> tuple[float, float, float]:
     return float(DIRECTIONS[best]), float(both[best]), float(each.max())
 
 
-def reached(folder: Path, parts: PartsFit, direction: float, within: float) -> dict[float, list[bool]]:
-    """For each friction, whether each draw's place lies so near [m] to the shown one along a direction [rad]."""
-    along = np.array([np.cos(direction), np.sin(direction), 0.0])
-    end, found = np.array([0.0, 0.0, -parts.depth]), defaultdict(list)
-    for row in CampaignResults(folder).rows:
+def reached(rows: Sequence[Mapping[str, Any]], parts: PartsFit, direction: float, within: float) -> list[bool]:
+    """Whether the place of each row's draw lies so near [m] to the shown one along a direction [rad]."""
+    along, end = np.array([np.cos(direction), np.sin(direction), 0.0]), np.array([0.0, 0.0, -parts.depth])
+    found = []
+    for row in rows:
         turn = rotation_matrix(np.array([row[f"fixture.tilt_{axis}"] for axis in "xyz"]))
         place = np.array([row["fixture.offset_x"], row["fixture.offset_y"], 0.0]) + turn @ end
-        found[row["world.friction"]].append(abs(float((place - end) @ along)) < within)
-    return dict(found)
+        found.append(abs(float((place - end) @ along)) < within)
+    return found
 
 
 def main() -> None:
@@ -79,11 +81,11 @@ def main() -> None:
                 print(f"{path.parent.name}: slides {1e3 * one:.1f} mm one way", flush=True)
             continue
         said = f"{path.parent.name}: slides {1e3 * way:.1f} mm both ways at {np.degrees(direction):.0f} degrees"
-        for campaign in sorted(path.parent.glob("*deg")):
-            left = reached(campaign, parts, direction, file.task.seated.sideways)
-            said += f"; {campaign.name}: " + ", ".join(
-                f"{sum(near)} of {len(near)} can be seated at friction {friction:g}" for friction, near in left.items()
-            )
+        plan = json.loads((path.parent / DONE).read_text(encoding="utf-8"))
+        for level, rows in by_level(path.parent / TRIALS, plan["levels"], plan["trials"]).items():
+            draws = {row["trial"]: row for row in rows}  # the same for every method
+            near = reached([*draws.values()], parts, direction, file.task.seated.sideways)
+            said += f"; {level}: {sum(near)} of {len(near)} can be seated"
         print(said, flush=True)
 
 

@@ -230,6 +230,36 @@ def test_trials_of_all_levels_follow_each_other_with_like_draws_uniform_up_to_ea
     assert abs(np.corrcoef(vary["fixture.offset_x"][1], vary["fixture.tilt_y"][1])[0, 1]) < 0.16  # 3 / sqrt(400)
 
 
+def test_rows_of_a_campaign_are_those_of_the_level_whose_draws_they_had(monkeypatch):
+    from skillframe_benchmarks import assembly
+
+    rows = [{"trial": trial, "skill": skill} for skill in ("push", "lmc") for trial in range(6)]
+    monkeypatch.setattr(assembly, "CampaignResults", lambda folder: SimpleNamespace(rows=rows))
+    names = ["2mm-5deg-0.5", "1mm-2deg-0.2", "2mm-5deg-0.2"]
+    found = assembly.by_level(None, names, 2)
+    assert [*found] == ["1mm-2deg-0.2", "2mm-5deg-0.2", "2mm-5deg-0.5"]
+    assert [[row["trial"] for row in each] for each in found.values()] == [[0, 1] * 2, [2, 3] * 2, [4, 5] * 2]
+
+
+def test_a_plain_spiral_keeps_the_push_and_has_the_figures_that_are_told_and_nothing_else():
+    from skillframe_benchmarks.methods import plain_spiral
+    from skillframe_search.example import seating
+    from skillframe_search.phase import read_phase
+    from skillframe_search.seat_document import check, part_of, read_seat
+
+    whole = seating()
+    made = plain_spiral(whole)
+    check(made)
+    assert made["phases"][0] == whole["phases"][0]
+    phase, seat, before = read_phase(part_of(made, 1)), read_seat(made), read_seat(whole)
+    assert (phase.push.force, phase.stiffness.translation) == (12.0, 2500.0)
+    assert (phase.path.pitch, phase.path.radius, phase.path.speed) == (4e-4, 0.003, 0.012)
+    assert phase.dither.tilt_nm == phase.dither.turn_nm == 0.0 and phase.path.passes == 1
+    assert not seat.approach and seat.search and seat.stall_s == 0.15
+    for name in ("catch_ns_m", "lean_nm_rad", "upright_nm_rad", "rock_nm", "slow_nm", "keep_n_m", "follow_s"):
+        assert getattr(seat, name) == 0.0 < getattr(before, name)
+
+
 @pytest.mark.parametrize(("fails", "looks", "upright"), [(0, None, True), (1, 5e-4, True), (2, None, False)])
 def test_a_demonstration_is_shown_again_until_it_ends_upright_by_pushing_and_else_by_looking(
     monkeypatch, fails, looks, upright

@@ -248,16 +248,27 @@ def _campaign(fixture: Path, skills: dict[str, Path], out: Path, plan: Plan) -> 
             vary=drawn(levels, plan.trials, seed), scores=list(SCORES), name=f"AutoMate {fixture.parent.name}",
         ).prepare(out)  # fmt: skip
     run_campaign(out, evaluate.evaluate, Options(traces=0, chunk=ABREAST))
-    seated = {level.name: dict.fromkeys(skills, 0) for level in levels}
-    names = {path.name: name for name, path in skills.items()}
-    for row in CampaignResults(out).rows:
-        seated[levels[row["trial"] // plan.trials].name][names[row["skill"]]] += bool(row["success"])
-    return seated
+    rows = by_level(out, plan.levels, plan.trials)
+    return {
+        level: {
+            name: sum(row["success"] and row["skill"] == path.name for row in each) for name, path in skills.items()
+        }
+        for level, each in rows.items()
+    }
 
 
 def levels_of(names: Sequence[str]) -> list[Level]:
     """Levels in the order in which their trials follow each other, whatever the order of their names."""
     return [level for level in LEVELS if level.name in names]
+
+
+def by_level(campaign: Path, names: Sequence[str], trials: int) -> dict[str, list[dict[str, Any]]]:
+    """Rows of an assembly's campaign, by the name of their level."""
+    levels = levels_of(names)
+    found: dict[str, list[dict[str, Any]]] = {level.name: [] for level in levels}
+    for row in CampaignResults(campaign).rows:
+        found[levels[row["trial"] // trials].name].append(row)
+    return found
 
 
 def drawn(levels: Sequence[Level], trials: int, seed: int) -> dict[str, Any]:

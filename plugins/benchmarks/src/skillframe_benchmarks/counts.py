@@ -14,8 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from skillframe import CampaignResults
-from skillframe_benchmarks.assembly import DONE, REFUSED, TRIALS, UNLEARNED, Level, levels_of
+from skillframe_benchmarks.assembly import DONE, REFUSED, TRIALS, UNLEARNED, Level, by_level
 from skillframe_benchmarks.scores import passes
 
 DRAWS, OFTEN, FEWEST = 4000, 0.8, 5
@@ -103,12 +102,11 @@ def _json(path: Path) -> dict[str, Any]:
 
 
 def _cells(campaign: Path, plan: Mapping[str, Any], parts: Mapping[str, Any]) -> dict[tuple[str, str], Cell]:
-    levels = levels_of(plan["levels"])
-    rows: dict[tuple[str, str], list[dict[str, Any]]] = {}
-    for row in CampaignResults(campaign).rows:
-        key = levels[row["trial"] // plan["trials"]].name, row["skill"].removesuffix(".skill.json")
-        rows.setdefault(key, []).append(row)
-    return {key: _cell(each, parts) for key, each in rows.items()}
+    found: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for level, rows in by_level(campaign, plan["levels"], plan["trials"]).items():
+        for row in rows:
+            found.setdefault((level, row["skill"].removesuffix(".skill.json")), []).append(row)
+    return {key: _cell(each, parts) for key, each in found.items()}
 
 
 def _cell(rows: Sequence[Mapping[str, Any]], parts: Mapping[str, Any]) -> Cell:

@@ -53,7 +53,7 @@ def _parts(seat: Seat, nowhere: bool) -> list[str]:
         "off; adds that a push that slants does not pass the fixture by",
         f"lean: pulls upright with {seat.upright_nm_rad:g} Nm/rad until it searches or rests in the hole, and with "
         f"{seat.lean_nm_rad:g} beyond {degrees(seat.most_tilt_rad):.1f} degrees; adds that the part does not lie down "
-        "on the rim, and stands flush where it goes straight in",
+        "on the rim, and leans less where it goes straight in",
         "free: in the hole nothing of the push goes across the way; adds that a push that slants, or gives way on one "
         "axis alone, does not jam the part",
         f"follow: in the hole the attitude wanted follows the measured one within {seat.follow_s:g} s, by that tilt at "
