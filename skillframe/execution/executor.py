@@ -190,6 +190,7 @@ class Loop:
             rows = self.active[done[self.active]]
             self.outcomes.status[rows] = Status.SUCCESS
             self._end(rows, time, "done", False, Ended.GOAL)
+            self._end_needless(rows[self.outcomes.goal[rows]], time)
 
     def _end_broken(self, broken: Sequence[Broken], time: float) -> None:
         """End the trials that broke something, each for the first thing that is named."""
@@ -202,6 +203,15 @@ class Loop:
         for touch in self.collisions.touches(self.plant, rows):
             self.outcomes.touched[touch.row] = touch.first, touch.second
             self._end_broken([Broken(touch.row, Ended.COLLISION, touch.cause)], time)
+
+    def _end_needless(self, reached: NDArray[np.int64], time: float) -> None:
+        """End later attempts at what has just been reached."""
+        if self.setup.attempts_at is None or not len(reached):
+            return
+        at = np.array(self.setup.attempts_at)
+        later = (at[self.active, None] == at[reached]) & (self.active[:, None] > reached)
+        text = "an earlier attempt at the same has succeeded"
+        self._end(self.active[later.any(axis=1)], time, text, False, Ended.INTERRUPTED)
 
     def _end_told(self, i: int, time: float, status: int, reason: object) -> None:
         """End trial i as its skill says."""

@@ -29,6 +29,8 @@ class Setup:
         make_drive: makes a plug-in's drive, `make_drive(setup, draws, rngs)`; None takes one of skillframe's own.
         skill_speed: of the skill in contact, where its type knows it [m/s].
         stop_when: ends a trial as done, looked at every 10 ms; None leaves the end to the skill.
+        attempts_at: for each trial, the number of what it is an attempt at. Once one reaches the goal, as `stop_when`
+            finds it, later ones at the same are ended as interrupted; None: every trial is wanted.
     """
 
     robot: RobotModel
@@ -39,6 +41,7 @@ class Setup:
     make_drive: Callable[..., Any] | None = None
     skill_speed: float | None = None
     stop_when: Callable[[State], NDArray[np.bool_]] | None = None
+    attempts_at: tuple[int, ...] | None = None
 
     @property
     def pace(self) -> float:

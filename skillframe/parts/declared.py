@@ -76,11 +76,13 @@ class ContactKeys:
         friction: Coulomb coefficient [0 to 5].
         as_meshed: the meshes are the parts: facets and closed holes are not held against the curves once drawn.
         overlap: mean thickness of what both parts claim in the assembled pose that is let pass [m, 0mm to 0.1mm].
+        by: what the parts collide with; "auto": convex pieces where these are exact, else surfaces.
     """
 
     friction: float = 0.2
     as_meshed: bool = False
     overlap: float = OVERLAP
+    by: Literal["auto", "pieces", "surface"] = "auto"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -24,7 +24,7 @@ TOUCH = OVERLAP
 NEAR = 8e-4
 """Material this near to the held part, sideways, belongs to the mouth [m]."""
 _STEP, _MOST_STEPS, _TURN_STEP = 5e-4, 160, np.radians(2.0)
-_GAPS, _FAR = 24, (5e-4, 5e-3)  # looked for near by first, which is faster
+_GAPS, _FAR = 24, (5e-4, 1e-3, 2e-3, 5e-3)  # looked for near by first, which is faster
 _RATIO = 50.0
 _BESIDE = 0.1  # of the part's size, how far its tip may lie outside it
 Axis = tuple[float, float, float]

@@ -27,26 +27,27 @@ _CODE = (pieces, sections, convexity)
 _LIBRARIES = ("manifold3d", "numpy", "scipy")
 
 
-def pieces_of(solid: Any, allowed: float) -> ConvexPieces:
+def pieces_of(solid: Any, allowed: float, most: int = pieces.MOST_PIECES) -> ConvexPieces:
     """`pieces.pieces_of`, from the cache if it was done before.
 
     Args:
         solid: a `manifold3d.Manifold` [m].
-        allowed: error [m].
+        allowed: error of what is thinned [m]; 0: nothing is thinned, and only what is exact is of use.
+        most: pieces that are of use.
     """
-    file = cache_dir("pieces") / f"{_key(solid, allowed)}.json"
+    file = cache_dir("pieces") / f"{_key(solid, allowed, most)}.json"
     found = _read(file) if file.exists() else None
     if found is None:
-        found = pieces.pieces_of(solid, allowed)
+        found = pieces.pieces_of(solid, allowed, most)
         write_whole(file, json.dumps(_plain(found)).encode())
     return found
 
 
-def _key(solid: Any, allowed: float) -> str:
+def _key(solid: Any, allowed: float, most: int) -> str:
     whole = hashlib.sha256()
     for array in arrays_of(solid):
         whole.update(repr(array.shape).encode() + array.tobytes())
-    whole.update(repr((float(allowed), pieces.MOST_PIECES, [version(name) for name in _LIBRARIES])).encode())
+    whole.update(repr((float(allowed), most, [version(name) for name in _LIBRARIES])).encode())
     for module in _CODE:
         whole.update(Path(str(module.__file__)).read_bytes())
     return whole.hexdigest()[:32]

@@ -28,7 +28,7 @@ from skillframe.parts.declared import DENSITY, FixtureFile, mesh_files, read_fix
 from skillframe.parts.field import error_of, memory_of, surface_of
 from skillframe.parts.fit import PartsFit, corners, fit, lowest, tilted
 from skillframe.parts.kept import pieces_of
-from skillframe.parts.pieces import MOST_PIECES, ConvexPieces
+from skillframe.parts.pieces import EXACT_M, MOST_PIECES, ConvexPieces
 from skillframe.parts.solid import MeshPart, arrays_of, read_part
 from skillframe.world.surfaces import Surface, available
 
@@ -144,7 +144,7 @@ def _load(path: Path, hashes: Mapping[str, str]) -> LoadedParts:
     check_walls(found, plug, socket)
     held, standing = (
         side._replace(error=side.error + error)
-        for side, error in zip(_prepared(plug, socket, found), errors, strict=True)
+        for side, error in zip(_prepared(plug, socket, found, file.contact.by), errors, strict=True)
     )
     return LoadedParts(
         name_of(path), file, found, held, standing, mass, center, inertia, _starts(found, file),
@@ -152,39 +152,76 @@ def _load(path: Path, hashes: Mapping[str, str]) -> LoadedParts:
     )  # fmt: skip
 
 
-def _prepared(plug: MeshPart, socket: MeshPart, found: PartsFit) -> tuple[PreparedPart, PreparedPart]:
-    """Both parts as convex pieces where these are exact enough, else both as surfaces.
+def _prepared(plug: MeshPart, socket: MeshPart, found: PartsFit, by: str) -> tuple[PreparedPart, PreparedPart]:
+    """Both parts as convex pieces where these are exact, else both as surfaces, else as pieces that are exact enough.
+
+    Args:
+        plug: the held part.
+        socket: the standing one.
+        found: how they go together.
+        by: "pieces" or "surface" asks for that, "auto" for neither.
 
     Raises:
-        InputError: neither is, or there is no compiler for surfaces.
+        InputError: none is, or there is no compiler for surfaces.
     """
-    pairs = ((plug, found.plug), (socket, found.socket))
+    if by == "pieces":
+        return _all_in_pieces(plug, socket, found, 'contact.by is "pieces"')
+    if not available():
+        if by == "surface":
+            what = 'is "surface", and there is no C compiler to build the contact generator with'
+            raise InputError("contact.by", what, "install cc, gcc or clang, or pip install ziglang, or leave it out")
+        return _all_in_pieces(plug, socket, found, "without a C compiler there is no other contact")
+    exact = _exact_pieces(plug, socket, found) if by == "auto" else None
+    if exact is not None:
+        return exact
+    try:
+        return _as_surface(plug, found.plug, found), _as_surface(socket, found.socket, found)
+    except InputError as error:
+        if by == "surface":
+            raise
+        return _all_in_pieces(plug, socket, found, f"as a surface {error.problem}")
+
+
+def _exact_pieces(plug: MeshPart, socket: MeshPart, found: PartsFit) -> tuple[PreparedPart, PreparedPart] | None:
+    """Both parts in pieces, nothing thinned, or None where they are too many or not exact."""
     made = {}
-    for part, solid in sorted(pairs, key=lambda pair: -pair[1].num_tri()):  # the one that is likelier to be refused
-        side = _in_pieces(solid, found)
-        assert side.pieces is not None
-        refused = unfit_pieces(side.pieces, found, part)
-        if refused is not None and not available():
-            what = f"{refused.problem}, and without a C compiler there is no other contact"
-            raise InputError(part.name, what, refused.fix)
-        if refused is not None:
-            break
+    for part, solid in _harder_first(plug, socket, found):
+        side = _in_pieces(solid, found, 0.0, MOST_PIECES)
+        if side.pieces is None or not side.pieces.hulls or side.error > min(EXACT_M, SHARE * found.clearance):
+            return None
         made[part.name] = side
-    else:
-        return made[plug.name], made[socket.name]
-    surfaces = [_as_surface(part, solid, found) for part, solid in pairs]
-    return surfaces[0], surfaces[1]
+    return made[plug.name], made[socket.name]
 
 
-def _in_pieces(solid: Any, found: PartsFit) -> PreparedPart:
+def _all_in_pieces(plug: MeshPart, socket: MeshPart, found: PartsFit, why: str) -> tuple[PreparedPart, PreparedPart]:
+    """Both parts in pieces that are exact enough.
+
+    Raises:
+        InputError: there are none; says why nothing else is left.
+    """
+    made = {}
+    for part, solid in _harder_first(plug, socket, found):
+        side = _in_pieces(solid, found, SHARE * found.clearance, MOST_PIECES)
+        assert side.pieces is not None
+        if refused := unfit_pieces(side.pieces, found, part):
+            raise InputError(part.name, f"{refused.problem}, and {why}", refused.fix)
+        made[part.name] = side
+    return made[plug.name], made[socket.name]
+
+
+def _harder_first(plug: MeshPart, socket: MeshPart, found: PartsFit) -> list[tuple[MeshPart, Any]]:
+    """Both parts and their solids in the fixture frame, the one first that is likelier to be refused."""
+    return sorted(((plug, found.plug), (socket, found.socket)), key=lambda pair: -pair[1].num_tri())
+
+
+def _in_pieces(solid: Any, found: PartsFit, allowed: float, most: int) -> PreparedPart:
     """The pieces of a whole part, or, where they are too many, of what the other part can reach of it."""
-    allowed = SHARE * found.clearance
-    pieces, rest = pieces_of(solid, allowed), None
-    if not 0 < len(pieces.hulls) <= MOST_PIECES:
+    pieces, rest = pieces_of(solid, allowed, most), None
+    if not 0 < len(pieces.hulls) <= most:
         box = _reach(found)
         near = solid ^ box
         if not near.is_empty() and near.volume() < 0.999 * solid.volume():
-            pieces, rest = pieces_of(near, allowed), solid - box
+            pieces, rest = pieces_of(near, allowed, most), solid - box
     return PreparedPart(solid, pieces.error, pieces, rest)
 
 

@@ -26,7 +26,9 @@ from skillframe.robot.convexity import SMALLEST, Hull, hull_of
 
 MOST_PIECES = 150
 """Of one part; ours: the loop takes about 3 us more a step for each (measured on rings of boxes)."""
-_MOST_SLABS, _MOST_CUT = 120, 600  # slabs along an axis, and pieces before those of neighbouring slabs are joined
+EXACT_M = 1e-5
+"""Pieces that are off by no more count as exact: surfaces are off by 3 to 18 um on AutoMate's parts (ours)."""
+_MOST_SLABS, _CUT = 120, 4  # slabs along an axis; pieces before neighbouring slabs are joined, for each at most
 _SHARES = (0.5, 1.0)
 _AXES = {"z": (0, 1, 2), "x": (1, 2, 0), "y": (2, 0, 1)}
 _MORE = 1e-8  # m; mean thickness of what the hull of several pieces may hold beyond them
@@ -51,40 +53,42 @@ class ConvexPieces(NamedTuple):
     thinned: bool
 
 
-def pieces_of(solid: Any, allowed: float) -> ConvexPieces:
+def pieces_of(solid: Any, allowed: float, most: int = MOST_PIECES) -> ConvexPieces:
     """The fewest pieces that were found for a part within an error, or the best there are: the caller judges.
 
     Args:
         solid: a `manifold3d.Manifold` [m].
-        allowed: error [m].
+        allowed: error of what is thinned [m]; 0: nothing is thinned, and only what is exact is of use (`EXACT_M`).
+        most: pieces that are of use.
     """
-    found = _along_all(solid)
-    if found is not None and len(found[0]) <= MOST_PIECES:
-        return ConvexPieces(found[0], error_of(found[0], solid), found[1], False)
-    for share in _SHARES:
-        thinner = _along_all(solid.simplify(share * allowed))
+    found = _along_all(solid, most)
+    if found is not None and len(found[0]) <= most:
+        error = error_of(found[0], solid, np.inf if allowed else EXACT_M)
+        return ConvexPieces(found[0], error, found[1], False)
+    for share in _SHARES if allowed else ():
+        thinner = _along_all(solid.simplify(share * allowed), most)
         if thinner is not None and (found is None or len(thinner[0]) < len(found[0])):
             found = thinner
-        if found is not None and len(found[0]) <= MOST_PIECES:
+        if found is not None and len(found[0]) <= most:
             break
     if found is None:
-        return ConvexPieces([], np.inf, "", True)
-    few = len(found[0]) <= MOST_PIECES
-    return ConvexPieces(found[0], error_of(found[0], solid) if few else np.inf, found[1], True)
+        return ConvexPieces([], np.inf, "", bool(allowed))
+    few = len(found[0]) <= most
+    return ConvexPieces(found[0], error_of(found[0], solid) if few else np.inf, found[1], bool(allowed))
 
 
-def _along_all(solid: Any) -> tuple[list[Hull], str] | None:
+def _along_all(solid: Any, most: int) -> tuple[list[Hull], str] | None:
     """The hulls of the axis that takes the fewest, and the axis. None where each takes far too many."""
     bodies = solid.decompose()
     whole = [(hull_of(arrays_of(body)[0]), body) for body in bodies]
     convex = [h for h, body in whole if h is not None and h.volume - body.volume() < _MORE * body.surface_area()]
     if len(convex) == len(bodies):
         return convex, ""
-    tried = [(found, axis) for axis in _AXES if (found := _along(solid, axis)) is not None]
+    tried = [(found, axis) for axis in _AXES if (found := _along(solid, axis, most)) is not None]
     return min(tried, key=lambda one: len(one[0]), default=None)
 
 
-def _along(solid: Any, axis: str) -> list[Hull] | None:
+def _along(solid: Any, axis: str, most: int) -> list[Hull] | None:
     vertices, faces = arrays_of(solid)
     order = _AXES[axis]
     turned = vertices[:, [order[0], order[1], order[2]]]
@@ -96,7 +100,7 @@ def _along(solid: Any, axis: str) -> list[Hull] | None:
     for low, high in pairwise(levels):
         stacks.append(_hulls(section(turned, faces, float(low), float(high))))
         cut += len(stacks[-1])
-        if cut > _MOST_CUT:
+        if cut > _CUT * most:
             return None
     back = np.argsort(order)
     return [_turned(hull, back) for hull in _joined(stacks)]
@@ -157,18 +161,23 @@ def _surface(hull: Hull) -> float:
     return 0.5 * float(norm(cross(b - a, c - a)).sum())
 
 
-def error_of(hulls: list[Hull], solid: Any) -> float:
-    """How far the union of hulls is from a solid [m], the larger of what is too much and what is missing."""
+def error_of(hulls: list[Hull], solid: Any, useful: float = np.inf) -> float:
+    """How far the union of hulls is from a solid [m], the larger of what is too much and what is missing.
+
+    An error of more than `useful` [m] is not measured where the mean thickness 2 V / A of a difference tells of it:
+    that is returned, which is less.
+    """
     whole = united([solid_of(hull.vertices, hull.faces) for hull in hulls])
-    surfaces = [_Triangles(vertices[faces]) for vertices, faces in map(arrays_of, (solid, whole))]
-    found = 0.0
-    for difference in (whole - solid, solid - whole):
-        for body in difference.decompose():
-            if 2.0 * body.volume() < _MORE * body.surface_area():  # rounding
-                continue
-            points = _looked_at(*arrays_of(body))
-            found = max([found, *(float(surface.distances(points).max()) for surface in surfaces)])
-    return found
+    bodies = [body for difference in (whole - solid, solid - whole) for body in difference.decompose()]
+    more = [body for body in bodies if 2.0 * body.volume() >= _MORE * body.surface_area()]  # less is rounding
+    if not more:
+        return 0.0
+    thickest = max(2.0 * float(body.volume()) / float(body.surface_area()) for body in more)
+    if thickest > useful:
+        return thickest
+    points = np.concatenate([_looked_at(*arrays_of(body)) for body in more])
+    surfaces = (_Triangles(vertices[faces]) for vertices, faces in map(arrays_of, (solid, whole)))
+    return max(float(surface.distances(points).max()) for surface in surfaces)
 
 
 def _looked_at(vertices: Float, faces: Faces) -> Float:

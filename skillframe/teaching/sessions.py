@@ -114,6 +114,7 @@ def record(
     progress: Callable[[str], None] | None = None,
     watch: Watch | None = None,
     attempts: int = MOST_ATTEMPTS,
+    at_once: int = 1,
     sensed: bool = True,
 ) -> Recording:
     """Demonstrate a scene `count` times. The starts of the scene's task are taken in turn.
@@ -131,6 +132,8 @@ def record(
         progress: told in words what happens.
         watch: told now and then how many seconds are simulated, and of how many at most.
         attempts: at a slot, at most.
+        at_once: of these, how many are simulated side by side at first. It changes no result, only how long it takes:
+            several where the first is likely to fail.
         sensed: False keeps, in place of the sensor's wrench, what the arm's own law exerts, reversed: all that an arm
             without a wrench sensor knows. What accelerates the tool, and what rubs in the joints, is taken for contact.
 
@@ -152,7 +155,7 @@ def record(
             trace, scene, settings, sensors, places=places_in_base(robot, scene), seed=seed, slot=slot, attempt=number
         )  # fmt: skip
 
-    return collect(robot, scene, count, attempt, keep, progress, attempts)
+    return collect(robot, scene, count, attempt, keep, progress, attempts, at_once)
 
 
 def longest_s(scene: Scene) -> float:
@@ -168,6 +171,7 @@ def collect(
     keep: Callable[[Trace, int, int], Demonstration],
     progress: Callable[[str], None] | None,
     attempts: int = MOST_ATTEMPTS,
+    at_once: int = 1,
 ) -> Recording:
     """Let a teacher attempt what is still missing until every slot has its demonstration.
 
@@ -182,6 +186,7 @@ def collect(
         keep: makes the demonstration of a slot from its trace and the number of the attempt.
         progress: told in words what happens.
         attempts: at a slot, at most.
+        at_once: of these, how many are run side by side at first.
 
     Raises:
         SkillframeError: a slot still fails after all attempts; says with what.
@@ -192,7 +197,7 @@ def collect(
         progress(beginning(robot, scene, count))
     number = 0
     while number < attempts:
-        ahead = range(number, min(number + max(SIDE_BY_SIDE * number, 1), attempts))
+        ahead = range(number, min(number + max(SIDE_BY_SIDE * number, at_once), attempts))
         tries = deque((slot, each) for each in ahead for slot in range(count) if slot not in done)
         while some := _still_due(tries, done):
             result = attempt(some)
@@ -246,7 +251,7 @@ def _attempt(
         robot=robot.guided(), scene=scene, center_of_compliance=np.array(scene.tool.frames[scene.tool.hand]),
         sensors=sensors or SensorSettings(), filter_wrench=False,
         stop_when=_held(last, last.done or scene.goal, robot.spec.control.tick_hz),
-        make_drive=drive_maker(robot),
+        attempts_at=tuple(slot for slot, _ in tries), make_drive=drive_maker(robot),
     )  # fmt: skip
     rngs = [np.random.default_rng([seed, slot, number]) for slot, number in tries]
     told = progress_callback(watch, duration_s)

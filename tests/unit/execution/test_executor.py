@@ -148,6 +148,21 @@ def test_stop_when_ends_a_trial_as_done_and_the_others_go_on():
     assert result.duration_s[0] < 0.3
 
 
+def test_later_attempts_at_what_is_reached_end_and_earlier_ones_and_others_go_on():
+    def far_right(state):
+        return state.tip.position[:, 0] > 0.0105
+
+    result = run(
+        Hold(np.diag([1000.0] * 3 + [20.0] * 3), offset=(0.02, 0, 0)),
+        setup(world="free", stop_when=far_right, attempts_at=(7, 7, 7, 3)),
+        {"start.offset_x": [-0.05, 0.0, -0.05, -0.05]}, count=4, duration_s=0.4,
+    )  # fmt: skip
+    over = "time limit: 0.4 s of simulated time are over"
+    assert list(result.reason) == [over, "done", "an earlier attempt at the same has succeeded", over]
+    assert result.duration_s[2] == result.duration_s[1] < 0.3
+    assert list(result.ended_by) == ["time", "goal", "interrupted", "time"] and not result.interrupted
+
+
 def test_progress_is_told_every_ten_milliseconds_of_simulated_time():
     told = []
     run(push_down(), setup(), duration_s=0.05, progress=told.append)

@@ -202,7 +202,7 @@ def test_parts_without_play_are_refused(tmp_path):
 
 @pytest.mark.slow
 def test_a_part_that_pieces_do_not_hold_is_refused_without_a_compiler_with_how_many_it_takes(tmp_path, monkeypatch):
-    for module in ("checks", "load", "pieces"):
+    for module in ("checks", "load"):
         monkeypatch.setattr(f"skillframe.parts.{module}.MOST_PIECES", 5)
     monkeypatch.setattr("skillframe.parts.load.available", lambda: False)
     monkeypatch.setattr("skillframe.parts.load._LOADED", {})  # the same files were taken by other tests

@@ -30,12 +30,11 @@ def test_pieces_from_the_cache_are_the_same_to_the_bit_and_are_not_cut_again(mon
     same(kept.pieces_of(PART, ALLOWED), true)
 
 
-def test_another_part_another_error_and_another_limit_are_cut_anew(cache, monkeypatch):
+def test_another_part_another_error_and_another_limit_are_cut_anew(cache):
     kept.pieces_of(PART, ALLOWED)
     kept.pieces_of(PART, 2.0 * ALLOWED)
     kept.pieces_of(PART.translate([1e-4, 0.0, 0.0]), ALLOWED)
-    monkeypatch.setattr(pieces, "MOST_PIECES", 3)
-    assert np.isinf(kept.pieces_of(PART, ALLOWED).error)  # that there are too many is kept as well
+    assert np.isinf(kept.pieces_of(PART, ALLOWED, 3).error)  # that there are too many is kept as well
     assert len(list(cache.iterdir())) == 4
 
 

@@ -62,12 +62,20 @@ def test_an_error_is_what_sticks_out_and_what_is_missing():
         assert error_of([hull_of(vertices)], solid) == pytest.approx(1e-3 * error, rel=1e-9)
 
 
+def test_an_error_beyond_use_is_told_by_the_mean_thickness_of_what_sticks_out():
+    """A cube of 10.3 mm and one of 10 mm in its corner: 2 V / A of what is between them."""
+    vertices, _ = arrays_of(in_metres(box((0, 0, 0), (10.3, 10.3, 10.3))))
+    solid = in_metres(box((0, 0, 0), (10, 10, 10)))
+    mean = 2e-3 * (10.3**3 - 10.0**3) / (6.0 * 10.3**2)
+    assert error_of([hull_of(vertices)], solid, 1e-5) == pytest.approx(mean, rel=1e-9)
+    assert error_of([hull_of(vertices)], solid, 1e-3) == pytest.approx(3e-4 * np.sqrt(3.0), rel=1e-9)
+
+
 @pytest.mark.slow
-def test_a_round_hole_of_too_many_sides_is_thinned_within_what_is_allowed_and_its_error_measured(monkeypatch):
+def test_a_round_hole_of_too_many_sides_is_thinned_within_what_is_allowed_and_its_error_measured():
     """40 sides take 41 pieces. With half of the sides the middle of one is r (1 - cos(pi / 20)) inside the corners."""
-    monkeypatch.setattr("skillframe.parts.pieces.MOST_PIECES", 25)
     allowed = 8e-5
-    found = pieces_of(in_metres(hole(3.0, 4.0, 40, half=5.0, bottom=2.0)), allowed)
+    found = pieces_of(in_metres(hole(3.0, 4.0, 40, half=5.0, bottom=2.0)), allowed, 25)
     assert found.thinned and len(found.hulls) <= 25
     assert 0.9 * 3e-3 * (1.0 - np.cos(np.pi / 24)) < found.error <= allowed
 

@@ -34,8 +34,8 @@ def few(monkeypatch):
 
 def pieces_are_few(monkeypatch):
     monkeypatch.setattr("skillframe.parts.load._LOADED", {})  # other parts of the same files are not these
-    for module in ("checks", "load", "pieces"):
-        monkeypatch.setattr(f"skillframe.parts.{module}.MOST_PIECES", 1)
+    for name in ("checks.MOST_PIECES", "load.MOST_PIECES"):
+        monkeypatch.setattr(f"skillframe.parts.{name}", 5)
 
 
 def geom_of(solid):
@@ -213,6 +213,49 @@ def test_a_pair_that_pieces_do_not_hold_gets_surfaces_and_says_so(tmp_path, monk
     assert loaded.backend == stated(loaded)["backend"] == values(loaded)["backend"] == "surface"
     assert stated(loaded)["pieces"] == 0 and 0.0 < stated(loaded)["contact_error"] < 0.25 * loaded.fit.clearance
     assert any("contact by our own generator" in line and "contact error" in line for line in lines(loaded))
+
+
+@pytest.mark.slow
+@needs_compiler
+def test_a_fixture_file_can_ask_for_one_kind_of_contact(tmp_path, monkeypatch):
+    def asked(by):
+        return write(tmp_path / by, *round_pair(), FILE.replace("[contact]\n", f'[contact]\nby = "{by}"\n'))
+
+    assert load(asked("surface")).backend == "surface" and load(asked("auto")).backend == "pieces"
+    monkeypatch.setattr("skillframe.parts.load._LOADED", {})
+    monkeypatch.setattr("skillframe.parts.load.available", lambda: False)
+    with pytest.raises(InputError, match=r'contact\.by: is "surface", and there is no C compiler .*; install'):
+        load(asked("surface"))
+    pieces_are_few(monkeypatch)
+    with pytest.raises(InputError, match=r'socket\.stl: .* convex pieces .*, and contact\.by is "pieces"'):
+        load(asked("pieces"))
+
+
+@pytest.mark.slow
+@needs_compiler
+def test_thinned_pieces_give_way_to_surfaces_where_there_is_a_compiler(tmp_path, monkeypatch):
+    """A hole of 200 sides is thinned until 150 pieces hold it, which are off by more than a surface."""
+    path = write(tmp_path, *round_pair(sides=200))
+    assert load(path).backend == "surface"
+    monkeypatch.setattr("skillframe.parts.load._LOADED", {})
+    monkeypatch.setattr("skillframe.parts.load.available", lambda: False)
+    assert load(path).backend == "pieces" and load(path).plug.pieces is not None
+
+
+@pytest.mark.slow
+@needs_compiler
+def test_a_part_whose_surface_is_not_exact_enough_is_held_by_pieces(tmp_path, monkeypatch):
+    def inexact(*_):
+        raise InputError("socket.stl", "is not exact", "draw it again")
+
+    monkeypatch.setattr("skillframe.parts.load._LOADED", {})
+    monkeypatch.setattr("skillframe.parts.load._as_surface", inexact)
+    path = write(tmp_path, *round_pair(sides=200))
+    assert load(path).backend == "pieces"
+    monkeypatch.setattr("skillframe.parts.load._LOADED", {})
+    pieces_are_few(monkeypatch)
+    with pytest.raises(InputError, match=r"socket\.stl: .* convex pieces .*, and as a surface is not exact"):
+        load(path)
 
 
 @pytest.mark.slow

@@ -261,6 +261,16 @@ def test_failed_demonstrations_are_counted_with_their_reasons_and_given_up_after
     assert told[-1] == "0 of 1 demonstrations recorded, 20 rejected"
 
 
+def test_how_many_attempts_are_made_side_by_side_changes_no_demonstration():
+    """In 3.6 s some attempts get there. The attempts of the two that are kept, and the bits, are those made in turn."""
+    turns, together = (demonstrate("valley", count=2, duration_s=3.6, at_once=n) for n in (1, 20))
+    attempts = [one.meta["simulated"]["attempt"] for one in turns]
+    assert attempts == [one.meta["simulated"]["attempt"] for one in together] and min(attempts) > 0
+    assert turns.rejected == together.rejected
+    for one, same in zip(turns, together, strict=True):
+        np.testing.assert_array_equal(one.wrench, same.wrench)
+
+
 def test_a_start_asked_for_is_added_to_the_task_s_own():
     near = once("valley", 1).demonstrations[0]
     far = demonstrate("valley", count=1, draws={"start.offset_x": 0.005}).demonstrations[0]

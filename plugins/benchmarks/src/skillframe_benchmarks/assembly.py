@@ -44,7 +44,7 @@ UPRIGHT, IN_PLACE = {"world.tilt": "2deg"}, {"world.sideways": "0.5mm"}
 LOOKS_M = 5e-4
 """How exactly a person sees where the mouth is, who could not show it by pushing alone [m] (ours)."""
 FEW = 5
-"""Attempts at a demonstration before another person tries, or less is asked: one, and four side by side (ours)."""
+"""Attempts at a demonstration, side by side, before another person tries, or less is asked (ours)."""
 ABREAST = 400
 """Trials that are simulated side by side: a tick takes some 0.8 ms, of one trial or of many (ours)."""
 DONE, REFUSED, UNLEARNED, TRIALS = "done.json", "refused.json", "unlearned.json", "trials"
@@ -220,7 +220,14 @@ def _recorded(fixture: Path, plan: Plan) -> Recording:
         scene, draws = scene_of(str(fixture), ends, depth=1)
         try:
             return sessions.record(
-                robot_of(plan.robot), scene, teacher, count=2, seed=plan.seed, draws=draws, attempts=attempts
+                robot_of(plan.robot),
+                scene,
+                teacher,
+                count=2,
+                seed=plan.seed,
+                draws=draws,
+                attempts=attempts,
+                at_once=FEW,
             )
         except SkillframeError:
             continue

@@ -35,6 +35,7 @@ units = "m"
 [contact]
 friction = 0.5             # as published
 as_meshed = true           # what is published are the meshes
+by = "surface"             # one kind of contact for all, and the faster one for most
 {overlap}[task.start]
 above_mouth = 0.002
 [task.seated]
