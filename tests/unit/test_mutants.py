@@ -92,7 +92,7 @@ def test_the_table_is_written_below_the_mark_and_the_rest_stays(tmp_path):
     page.write_text(f"before\n\n{MARK}\n\nan earlier table", encoding="utf-8")
     written(page, table(LISTED, FOUND))
     text = page.read_text(encoding="utf-8")
-    assert text.startswith(f"before\n\n{MARK}\n") and "earlier" not in text and "**nothing**" in text
+    assert text.startswith(f"before\n\n{MARK}\n") and "an earlier table" not in text and "**nothing**" in text
     page.write_text("nothing", encoding="utf-8")
     with pytest.raises(WrongList, match="holds no line"):
         written(page, "")
