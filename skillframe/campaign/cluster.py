@@ -36,12 +36,17 @@ from skillframe.errors import InputError
 
 THREADS = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 CONNECT_S = 30.0
-LOOK_S, TELL_S = 0.01, 1.0
+SOON_S, LOOK_S, TELL_S = 0.01, 0.1, 1.0
 GONE_S = 5.0
 """Wall time after which a job whose worker is gone is given up, should Dask not say so itself."""
 TRIES = 3
 """Workers on which a job meets trouble of the environment before the campaign stops."""
 _MEMORY_LOGGER = "distributed.nanny.memory"
+_SETTINGS = {
+    "distributed.scheduler.allowed-failures": 0,
+    "distributed.worker.profile.enabled": False,  # a hundred looks a second at what a worker runs, which nobody reads
+    "distributed.admin.tick.interval": "1s",  # as often it is looked how late an event loop is
+}
 
 
 class _MemoryDeaths(logging.Handler):
@@ -103,7 +108,7 @@ class ClusterPool(Generic[WorkT]):
         try:
             self._make_room()
             self._memory = self._listen()
-            self._stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 0}))
+            self._stack.enter_context(dask.config.set(_SETTINGS))
             self._client = self._connect(scheduler) if scheduler else self._start(workers, memory_bytes)
         except BaseException:
             self._stack.close()
@@ -230,7 +235,7 @@ class ClusterPool(Generic[WorkT]):
                 return ended
             self._crew.look()
             self._assign()
-            self._ended.wait(LOOK_S)
+            self._ended.wait(LOOK_S if self._flying else SOON_S)
             if time.monotonic() >= due:
                 self._tell(sum(_share(task.watch) * task.job.size for task in self._flying.values()))
                 due = time.monotonic() + TELL_S

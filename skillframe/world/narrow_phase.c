@@ -25,6 +25,7 @@
 #define EXACT 1e-5       /* m; the same where it is linear within a cell, or exact */
 #define AHEAD 3e-4       /* m; points nearer than this are asked until one of them may have moved so far */
 #define TOGETHER 16      /* points that memory is called for at a time */
+#define BLOCK 32         /* points of a list that are passed over at once where none may have come near */
 #define LISTS 4096       /* of a thread; by simulation, part and part */
 
 static const Part* parts[PARTS];
@@ -230,7 +231,8 @@ static double moves_by(const Shape* in, const double* place) {
   return by;
 }
 
-/* Points of a part that may be within AHEAD of another, in order, as both stood then, and how far each could move yet. */
+/* Points of a part that may be within AHEAD of another, in order, as both stood then, how far each could move yet, and the
+   least of that in each block of them. */
 typedef struct {
   const void* data;
   const Part *of, *in;
@@ -238,7 +240,7 @@ typedef struct {
   double centre[3], radius; /* of a ball around all points */
   int64_t changes, count, room;
   int32_t* point;
-  float* moves;
+  float *moves, *least;
 } Near;
 
 static _Thread_local Near* lists;
@@ -275,9 +277,11 @@ static int has_room(Near* near) {
   if (point) near->point = point;
   float* moves = realloc(near->moves, (size_t)room * sizeof *moves);
   if (moves) near->moves = moves;
-  if (point && moves) near->room = room;
+  float* least = realloc(near->least, (size_t)(room / BLOCK) * sizeof *least);
+  if (least) near->least = least;
+  if (point && moves && least) near->room = room;
   else near->of = NULL;
-  return point && moves;
+  return point && moves && least;
 }
 
 /* Make a list. */
@@ -299,7 +303,9 @@ static void make_list(Near* near, const void* data, const Part* of, const Part* 
       for (int64_t i = of->first[b]; i < of->first[b + 1]; i++) {
         if (is_clear(shape, of->point + 3 * i, AHEAD)) continue;
         if (!has_room(near)) return;
-        near->moves[near->count] = (float)(0.999 * moves_by(shape, of->point + 3 * i)), near->point[near->count++] = (int32_t)i;
+        float by = (float)(0.999 * moves_by(shape, of->point + 3 * i)), *least = near->least + near->count / BLOCK;
+        if (near->count % BLOCK == 0 || by < *least) *least = by;
+        near->moves[near->count] = by, near->point[near->count++] = (int32_t)i;
       }
     }
   }
@@ -329,11 +335,17 @@ static int look(const void* data, const Part* of, const Frame* pose_of, const Pa
     for (int64_t n = 0; n < near->count;) {
       const double* point[TOGETHER];
       int asked = 0;
-      for (; n < near->count && asked < TOGETHER; n++)
+      while (n < near->count && asked < TOGETHER) {
+        if (n % BLOCK == 0 && near->least[n / BLOCK] > moved) {
+          n += BLOCK;
+          continue;
+        }
         if (near->moves[n] <= moved) {
           point[asked] = of->point + 3 * near->point[n];
           call_for(in.view, point[asked++], 1);
         }
+        n++;
+      }
       for (int i = 0; i < asked && found < CANDIDATES; i++) found = ask(&in, pose_in, point[i], sign, found);
     }
     return found;
