@@ -38,6 +38,7 @@ from skillframe.world.scene import Scene, State, Task
 from skillframe.world.sensors import SensorSettings
 
 MOST_ATTEMPTS = 20
+FIX = "lower the noise or choose another start"
 SIDE_BY_SIDE = 4
 """How many attempts follow each that failed, at once: four take little longer than one (ours)."""
 MOST_AT_ONCE = 100
@@ -155,7 +156,9 @@ def record(
             trace, scene, settings, sensors, places=places_in_base(robot, scene), seed=seed, slot=slot, attempt=number
         )  # fmt: skip
 
-    return collect(robot, scene, count, attempt, keep, progress, attempts, at_once)
+    sees = settings.kind == "kinesthetic" and settings.looks is None and scene.task.direction and not scene.task.then
+    fix = f"let the person look (--looks 0.5mm; in Python looks=5e-4), {FIX}" if sees else FIX
+    return collect(robot, scene, count, attempt, keep, progress, attempts, at_once, fix)
 
 
 def longest_s(scene: Scene) -> float:
@@ -172,6 +175,7 @@ def collect(
     progress: Callable[[str], None] | None,
     attempts: int = MOST_ATTEMPTS,
     at_once: int = 1,
+    fix: str = FIX,
 ) -> Recording:
     """Let a teacher attempt what is still missing until every slot has its demonstration.
 
@@ -187,6 +191,7 @@ def collect(
         progress: told in words what happens.
         attempts: at a slot, at most.
         at_once: of these, how many are run side by side at first.
+        fix: what to do where all fail.
 
     Raises:
         SkillframeError: a slot still fails after all attempts; says with what.
@@ -219,8 +224,7 @@ def collect(
             return Recording(demonstrations=[done[slot] for slot in range(count)], rejected=rejected)
     raise SkillframeError(
         f"world {scene.name}: the teacher failed {attempts} times for one demonstration "
-        f"(last: {rejected[-1]}); lower the noise or choose another start"
-        + (f"; {note}" if (note := guess_note(robot.spec)) else "")
+        f"(last: {rejected[-1]}); {fix}" + (f"; {note}" if (note := guess_note(robot.spec)) else "")
     )
 
 

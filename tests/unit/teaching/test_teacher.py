@@ -256,7 +256,7 @@ def test_a_demonstration_gives_the_wrench_at_the_tool_point():
 
 def test_failed_demonstrations_are_counted_with_their_reasons_and_given_up_after_a_while():
     told = []
-    with pytest.raises(SkillframeError, match="failed 20 times"):
+    with pytest.raises(SkillframeError, match=r"failed 20 times .*; let the person look \(--looks .*, lower"):
         demonstrate("valley", count=1, duration_s=0.1, progress=told.append)
     assert told[-1] == "0 of 1 demonstrations recorded, 20 rejected"
 
