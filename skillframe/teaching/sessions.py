@@ -39,6 +39,7 @@ from skillframe.world.sensors import SensorSettings
 
 MOST_ATTEMPTS = 20
 FIX = "lower the noise or choose another start"
+"""What to do where all attempts at a demonstration failed."""
 SIDE_BY_SIDE = 4
 """How many attempts follow each that failed, at once: four take little longer than one (ours)."""
 MOST_AT_ONCE = 100
@@ -156,8 +157,9 @@ def record(
             trace, scene, settings, sensors, places=places_in_base(robot, scene), seed=seed, slot=slot, attempt=number
         )  # fmt: skip
 
-    sees = settings.kind == "kinesthetic" and settings.looks is None and scene.task.direction and not scene.task.then
-    fix = f"let the person look (--looks 0.5mm; in Python looks=5e-4), {FIX}" if sees else FIX
+    plain = scene.task.direction is not None and not scene.task.then
+    could_look = plain and settings.kind == "kinesthetic" and settings.looks is None
+    fix = f"{FIX}, or let the person look (--looks 0.5mm; in Python looks=5e-4)" if could_look else FIX
     return collect(robot, scene, count, attempt, keep, progress, attempts, at_once, fix)
 
 

@@ -220,15 +220,9 @@ def _recorded(fixture: Path, plan: Plan) -> Recording:
         scene, draws = scene_of(str(fixture), ends, depth=1)
         try:
             return sessions.record(
-                robot_of(plan.robot),
-                scene,
-                teacher,
-                count=2,
-                seed=plan.seed,
-                draws=draws,
-                attempts=attempts,
+                robot_of(plan.robot), scene, teacher, count=2, seed=plan.seed, draws=draws, attempts=attempts,
                 at_once=FEW,
-            )
+            )  # fmt: skip
         except SkillframeError:
             continue
     return record(fixture, plan.robot, teacher=looking, count=2, seed=plan.seed)
