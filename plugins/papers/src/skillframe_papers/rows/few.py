@@ -21,7 +21,7 @@ from skillframe.frames import Float
 from skillframe_papers.bars import ahead, counted, judged, together
 from skillframe_papers.rows.search import EARLY_S, SHIFT, off_centre, searched
 
-PEOPLE, GOALS = 5, 20
+PEOPLE, GOALS = 5, 16
 ONE, FEW, MANY = 1, 3, 10
 GOAL_SEED = 66_000
 KEPT = 0.9

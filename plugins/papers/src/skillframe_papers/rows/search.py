@@ -21,7 +21,7 @@ from skillframe.world.scene import Scene
 from skillframe_papers.bars import ahead, counted, judged, reached, together
 from skillframe_papers.rows.blocks import Trials, ran
 
-GOALS, QUICK_GOALS = 60, 3
+GOALS, QUICK_GOALS = 40, 3
 FIRST_GOALS = 30
 """Of the goals, those that methods get whose share says enough of it with so many."""
 GIVEN, QUICK_GIVEN = 5, 3  # demonstrations
