@@ -7,7 +7,19 @@ from math import atan, degrees, radians
 import numpy as np
 import pytest
 from skillframe_papers import bars, committed, document, refresh, store
-from skillframe_papers.rows import crane, few, followed, lmc, nulls, one_arm, phases, plain_cuts, skills, two_arms
+from skillframe_papers.rows import (
+    crane,
+    few,
+    followed,
+    lmc,
+    nulls,
+    one_arm,
+    phases,
+    plain_cuts,
+    search,
+    skills,
+    two_arms,
+)
 from skillframe_papers.rows.insertion import Row, link_weights, raised, sticking
 from skillframe_papers.rows.phases import Taught
 from skillframe_papers.rows.sweep import HEIGHTS_M, NAMES, Sweep
@@ -369,3 +381,13 @@ def test_each_of_the_five_believes_in_a_place_of_his_own_6_mm_away():
     np.testing.assert_allclose(np.linalg.norm(places, axis=1), 0.006)
     apart = np.linalg.norm(places[:, None] - places[None], axis=-1)[np.triu_indices(few.PEOPLE, 1)]
     assert apart.min() > 0.005  # more than the 4 mm by which a person is unsure of each axis
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [("13", search.GOALS), ("14", few.PEOPLE * few.GOALS), ("23", search.GOALS), ("41", search.GOALS)],
+)
+def test_the_committed_table_has_as_many_goals_as_the_rows_ask_for(name, count):
+    """A row whose goals change is computed again, or the table says what nobody can make."""
+    rows = {each["row"]: each["ours"] for each in json.loads((committed.FOLDER / "reproduce.json").read_text("utf-8"))}
+    assert f" of {count} (" in rows[name]
