@@ -56,4 +56,4 @@ def axis_angle_deg(a: Any, b: Float) -> float:
 
 def row(*cells: Any) -> None:
     """One line of a table on the terminal."""
-    print("  ".join(f"{cell:>14}" if not isinstance(cell, str) else f"{cell:<34}" for cell in cells))
+    print("  ".join(f"{cell!s:>14}" if not isinstance(cell, str) else f"{cell:<34}" for cell in cells))

@@ -12,6 +12,9 @@ counts; with 20 ms unaccounted for an overlap of 2 % came out as 1.3 %. Least sq
 `identification`; (2), the draining edge in (1) and the choice of a lag are ours. An overlap believed too large makes a
 loop hunt, one too small only makes it slow (G. Tao and P. Kokotovic, Adaptive Control of Systems with Actuator and
 Sensor Nonlinearities, Wiley 1996), so what is to be compensated is a standard deviation less than what was found.
+
+Scatter does not show that the oil is softer than believed, which shifts all rows alike. So what both fits find is also
+found for a bulk modulus a standard deviation lower, and how far that is off is kept beside their deviations (ours).
 """
 
 from __future__ import annotations
@@ -44,6 +47,7 @@ class ValveSettings:
         share: prior standard deviation of alpha; overlap: of beta; supply: of p_S [Pa].
         alike: rows that say the same, because filters remember longer than a period.
         largest: what b is kept below; reach: and p_S within, +- of the nominal one.
+        oil: standard deviation of the bulk modulus that is believed, share of it.
     """
 
     period: float = 0.01
@@ -59,6 +63,7 @@ class ValveSettings:
     alike: float = 3.0
     largest: float = 0.2
     reach: float = 0.5
+    oil: float = 0.2
 
     def __post_init__(self) -> None:
         for name in (f.name for f in fields(self)):
@@ -70,11 +75,14 @@ class _Flow(NamedTuple):
     """Of N x k valves, for a spool that extends and for one that retracts (2, N, k).
 
     Attributes:
-        opening: u_e if it does; supply: p_S; clear: is it a row to go by?
+        opening: u_e if it does; supply: p_S; softer, higher: how much larger these are with softer oil.
+        clear: is it a row to go by?
     """
 
     opening: Float
     supply: Float
+    softer: Float
+    higher: Float
     clear: NDArray[np.bool_]
 
 
@@ -91,6 +99,7 @@ class ValveIdentification:
         overlap, overlap_deviation: (N, k) found, share of the travel. lag: (N, k) [s].
         ratio: (N, k) flow that was found over the rated one.
         supply, supply_deviation: (N, k) found [Pa], within `reach`; supply_found: (N, k) wherever it is.
+        overlap_oil, supply_oil: (N, k) standard deviations from what is not known of the oil, beside these.
         supply_moved: (N, k) how far the last fit went from the one before [Pa].
     """
 
@@ -107,14 +116,16 @@ class ValveIdentification:
         self._filter.start()
         self._tick, self._told = 0, np.zeros(self._shape)
         self._line: Float = np.zeros((s.lags, *self._shape))
-        self._sums: Float = np.zeros((6, s.lags, *self._shape))
-        self._pressed: Float = np.zeros((3, *self._shape))
+        self._sums: Float = np.zeros((8, s.lags, *self._shape))
+        self._pressed: Float = np.zeros((4, *self._shape))
         self._before: tuple[Float, Float] | None = None
         self.overlap, self.supply = (np.tile(x, (self._shape[0], 1)) for x in (c.deadband, c.supply_pressure))
         self.supply_found: Float = self.supply
         self.supply_moved: Float = np.zeros(self._shape)
         self.overlap_deviation: Float = np.full(self._shape, s.overlap)
         self.supply_deviation: Float = np.full(self._shape, s.supply)
+        self.overlap_oil: Float = np.zeros(self._shape)
+        self.supply_oil: Float = np.zeros(self._shape)
         self.lag: Float = np.zeros(self._shape)
         self.ratio: Float = np.ones(self._shape)
 
@@ -141,30 +152,37 @@ class ValveIdentification:
         c, least, x, v = self._cylinders, self.settings.drop, terms.piston, terms.piston_rate
         rate_a, rate_b = ((p - q) / (self._row * self._dt * c.bulk_modulus) for p, q in zip(now, before, strict=True))
         squeezed = np.stack([(c.arm_a + x) * rate_a, (c.arm_b + c.stroke - x) * rate_b])
-        flow_a, flow_b = c.area_a * (v + squeezed[0]), c.area_b * (v - squeezed[1])
-        into, out = np.stack([flow_a, -flow_b]), np.stack([flow_b, -flow_a])
         filled, drained = np.stack(now), np.stack(now[::-1]) - c.return_pressure
         drop = np.maximum(drained, least)
-        ratio = into / np.maximum(out, 1e-9)
+
+        def found(compressed: Float) -> tuple[Float, Float]:
+            flow_a, flow_b = c.area_a * (v + compressed[0]), c.area_b * (v - compressed[1])
+            into, out = np.stack([flow_a, -flow_b]), np.stack([flow_b, -flow_a])
+            ratio = into / np.maximum(out, 1e-9)
+            return out / (c.edge * np.sqrt(drop)), filled + ratio * ratio * drop
+
         clear = (drained > least) & (np.abs(squeezed).max(axis=0) < self.settings.squeezed * np.abs(v))
-        return _Flow(out / (c.edge * np.sqrt(drop)), filled + ratio * ratio * drop, clear)
+        (opening, supply), (wider, higher) = found(squeezed), found(squeezed / (1.0 - self.settings.oil))
+        return _Flow(opening, supply, wider - opening, higher - supply, clear)
 
     def _take_in(self, flow: _Flow) -> None:
         least, told = self.settings.least, self._line
         way = (told <= 0.0).astype(np.int64)
-        seen, clear = np.take_along_axis(flow.opening, way, axis=0), np.take_along_axis(flow.clear, way, axis=0)
+        seen, softer = (np.take_along_axis(v, way, axis=0) for v in (flow.opening, flow.softer))
+        clear = np.take_along_axis(flow.clear, way, axis=0)
         size = np.abs(told)
         counts = (size > least) & (seen > least) & clear
-        u, y = np.where(counts, size, 0.0), np.where(counts, seen, 0.0)
-        self._sums += (counts, u, y, u * u, u * y, y * y)
+        u, y, dy = np.where(counts, size, 0.0), np.where(counts, seen, 0.0), np.where(counts, softer, 0.0)
+        self._sums += (counts, u, y, u * u, u * y, y * y, dy, u * dy)
         sure = (flow.opening > 2.0 * least) & flow.clear
         off = np.where(sure, flow.supply - self._cylinders.supply_pressure, 0.0).sum(axis=0)
-        self._pressed += (sure.any(axis=0), off, off * off)
+        higher = np.where(sure, flow.higher, 0.0).sum(axis=0)
+        self._pressed += (sure.any(axis=0), off, off * off, higher)
 
     def solve(self) -> None:
         """Fit (1) and (2) to the rows so far."""
         self._solve_overlap()
-        s, nominal, (n, off, square) = self.settings, self._cylinders.supply_pressure, self._pressed
+        s, nominal, (n, off, square, higher) = self.settings, self._cylinders.supply_pressure, self._pressed
         rows = np.maximum(n, 1.0)
         spread = np.maximum(square / rows - (off / rows) ** 2, 1e8)
         weight = n / (s.alike * spread)
@@ -173,12 +191,14 @@ class ValveIdentification:
         before, self.supply = self.supply, nominal * np.clip(1.0 + mean / nominal, 1.0 - s.reach, 1.0 + s.reach)
         self.supply_moved = np.abs(self.supply - before)
         self.supply_deviation = 1.0 / np.sqrt(weight + 1.0 / s.supply**2)
+        self.supply_oil = np.abs(weight * higher / rows / (weight + 1.0 / s.supply**2))
 
     def _solve_overlap(self) -> None:
         s, nominal = self.settings, self._cylinders.deadband
         left = self._left()
         best = np.argmin(left, axis=0)[None]
-        n, su, sy, suu, suy, left = (np.take_along_axis(v, best, axis=0)[0] for v in (*self._sums[:5], left))
+        chosen = (np.take_along_axis(v, best, axis=0)[0] for v in (*self._sums[:5], *self._sums[6:], left))
+        n, su, sy, suu, suy, dsy, dsuy, left = chosen
         weight = np.where(n > s.alike, 1.0 / (s.alike * left), 0.0)
         share, overlap = 1.0 / s.share**2, 1.0 / s.overlap**2
         h11, h12, h22 = weight * suu + share, -weight * su, weight * n + overlap
@@ -187,11 +207,13 @@ class ValveIdentification:
         alpha, beta = (h22 * g1 - h12 * g2) / determinant, (h11 * g2 - h12 * g1) / determinant
         self.overlap, self.overlap_deviation = beta / alpha, np.sqrt(h11 / determinant)
         self.ratio = alpha - beta
+        more, wider = weight * (h22 * dsuy + h12 * dsy) / determinant, -weight * (h11 * dsy + h12 * dsuy) / determinant
+        self.overlap_oil = np.abs(wider * alpha - beta * more) / alpha**2
         self.lag = best[0] * self._slice * self._dt
 
     def _left(self) -> Float:
         """(lags, N, k) mean square that a straight line leaves of the openings."""
-        n, su, sy, suu, suy, syy = self._sums
+        n, su, sy, suu, suy, syy = self._sums[:6]
         rows = np.maximum(n, 1.0)
         spread, along = np.maximum(suu - su * su / rows, 1e-12), suy - su * sy / rows
         left: Float = np.maximum((syy - sy * sy / rows - along * along / spread) / rows, 1e-8)

@@ -4,7 +4,10 @@ r"""Balance of oil: what a chamber has taken in, by its piston and its pressure,
     Q_a = c u_e sqrt(p_S - p_a)  or  c u_e sqrt(p_a - p_R),    u_e from the command across the overlap              (2)
 
 p_S and the overlap are those that the swing has found. Between command and reading lie bus, spool and filters, so (2)
-is summed for every lag in `LAGS`, and V_a must lie between the least and the largest of these, give or take
+is summed for every lag in `LAGS`. A cylinder that pulls as hard as it can has almost no drop left across its valve, and
+there (2) says little: the supply is known to `SPREAD` standard deviations, and below `laminar_pressure` p_l an edge may
+be laminar, down to dp / (dp^2 + p_l^2)^(1/4) for the root. So (2) is an interval, from the laminar edge under the lower
+supply to the root under the higher one, and V_a must lie between the least and the largest of all these, give or take
 `FLOOR` A + `SHARE` (int |Q| + (V/B) |dp|). A half covers a rated flow that is meant over the whole valve (a factor of
 1.41) or a bulk modulus with some air in it; the floor covers what a valve moves within a lag that is none of these, and
 is wider in the swing, where supply and overlap are only being found.
@@ -66,9 +69,9 @@ class Knowledge(NamedTuple):
 
 def knowledge(law: CompiledLaw, valves: ValveIdentification) -> Knowledge:
     """What the law goes by, and how sure the swing was of it."""
-    spread = SPREAD * valves.overlap_deviation
+    spread = SPREAD * np.hypot(valves.overlap_deviation, valves.overlap_oil)
     least, most = np.maximum(valves.overlap - spread, 0.0), np.minimum(valves.overlap + spread, 0.5)
-    unsure = np.maximum(valves.supply_deviation, valves.supply_moved)
+    unsure = np.maximum(np.hypot(valves.supply_deviation, valves.supply_oil), valves.supply_moved)
     return Knowledge(law.supply, law.deadband, unsure, least, most, valves.ratio)
 
 
@@ -87,9 +90,9 @@ class FlowWatch:
         self._area: Float = np.stack([cylinders.area_a, cylinders.area_b])[:, None]
         self._length = WINDOW + max(LAGS) + 1
         self._blur = SURE * np.sqrt(2.0) * noise
-        self._told: Float = np.zeros((count, self._length, 8, k))
-        """Sums of (2) in all looks so far, into both chambers: volumes, their sizes, volumes for the least and for the
-        largest overlap. The latest look is the first row."""
+        self._told: Float = np.zeros((count, self._length, 10, k))
+        """Sums of (2) in all looks so far, into both chambers: sizes of the volumes, their two ends, and both ends for
+        the likely overlaps. The latest look is the first row."""
         self._seen: Float = np.zeros((count, self._length, 3, k))
         """Pistons and both pressures, likewise."""
         self._given = [np.zeros((count, k)) for _ in range(12)]
@@ -130,7 +133,7 @@ class FlowWatch:
         return found if placed or self._running < self._length else found + self._judge_spools()
 
     def _told_at(self, lag: int) -> Float:
-        """(8, N, k) volumes that a balance would have, if the readings lagged so, in the order of `_told`."""
+        """(10, N, k) volumes that a balance would have, if the readings lagged so, in the order of `_told`."""
         told: Float = self._told[:, lag] - self._told[:, lag + WINDOW]
         return told.swapaxes(0, 1)
 
@@ -139,7 +142,8 @@ class FlowWatch:
         taken, squeezed = self._taken.swapaxes(0, 1), self._squeezed.swapaxes(0, 1)
         spare = self._area * self._given[_FLOOR] + SHARE * np.abs(squeezed)
         every = np.stack([self._told_at(lag) for lag in LAGS])
-        low, high, most = every[:, :2].min(axis=0), every[:, :2].max(axis=0), every[:, 2:4].max(axis=0)
+        ends, most = every[:, 2:6].reshape(-1, *taken.shape), every[:, :2].max(axis=0)
+        low, high = ends.min(axis=0), ends.max(axis=0)
         vague = self._vague > 0  # a supply that may be so much lower, or was taken for higher, may feed nothing
         meant = np.clip(taken, np.where(vague, np.minimum(low, 0.0), low), np.where(vague, np.maximum(high, 0.0), high))
         beyond = np.abs(taken - meant) > spare + SHARE * most
@@ -152,7 +156,7 @@ class FlowWatch:
         """Spools that are not where they were told."""
         taken, squeezed = self._taken.swapaxes(0, 1), self._squeezed.swapaxes(0, 1)
         spare = self._area * self._given[_SPOOL_FLOOR] + SHARE * np.abs(squeezed)
-        every = np.concatenate([self._told_at(lag)[4:].reshape(2, *taken.shape) for lag in EVERY_LAG])
+        every = np.concatenate([self._told_at(lag)[6:].reshape(2, *taken.shape) for lag in EVERY_LAG])
         low, high = every.min(axis=0), every.max(axis=0)
         meant = np.clip(taken, low, high)
         off = taken - meant
@@ -208,30 +212,48 @@ def balance_function(c: Cylinders, period: float) -> ca.Function:
     k, length = len(c.area_a), WINDOW + max(LAGS) + 1
     given = [ca.SX.sym(f"given{i}", k) for i in range(12)]
     valve, p_a, p_b, piston, *known, floor, spool_floor = given
-    sums, readings = (ca.SX.sym(name, k, length * rows) for name, rows in (("sums", 8), ("readings", 3)))
+    sums, readings = (ca.SX.sym(name, k, length * rows) for name, rows in (("sums", 10), ("readings", 3)))
     passed = ca.horzcat(*_flows(c, period, valve, (p_a, p_b), Knowledge(*known)))
-    told, seen = ca.horzcat(passed + sums[:, :8], sums[:, :-8]), ca.horzcat(piston, p_a, p_b, readings[:, :-3])
+    told, seen = ca.horzcat(passed + sums[:, :10], sums[:, :-10]), ca.horzcat(piston, p_a, p_b, readings[:, :-3])
     gone = seen[:, :3] - seen[:, 3 * WINDOW : 3 * WINDOW + 3]
-    lagged, begun = 8 * LAGS[0], 8 * (LAGS[0] + WINDOW)
-    usual = told[:, lagged : lagged + 8] - told[:, begun : begun + 8]
+    lagged, begun = 10 * LAGS[0], 10 * (LAGS[0] + WINDOW)
+    usual = told[:, lagged : lagged + 10] - told[:, begun : begun + 10]
     areas = ca.horzcat(c.area_a, c.area_b)
     soft = ca.horzcat(c.area_a / c.bulk_modulus, c.area_b / c.bulk_modulus)
     squeezed = soft * ca.horzcat(c.arm_a + piston, (c.arm_b + c.stroke) - piston) * gone[:, 1:]
     taken = areas * ca.horzcat(gone[:, 0], -gone[:, 0]) + squeezed
     spare, loose = (areas * ca.horzcat(way, way) + SHARE * ca.fabs(squeezed) for way in (floor, spool_floor))
-    closed = ca.fabs(taken - usual[:, :2]) <= spare + SHARE * usual[:, 2:4]
-    off = ca.fabs(taken - usual[:, 4:6]) > loose
+    closed = ca.fabs(taken - usual[:, 4:6]) <= spare + SHARE * usual[:, :2]
+    off = ca.fabs(taken - usual[:, 6:8]) > loose
     explained = ca.vertcat(ca.sum1(ca.sum2(closed)) >= 2 * k, ca.sum1(off[:, 0] * off[:, 1]) < 1)
     return ca.Function("balance", [*given, sums, readings], [told, seen, taken, squeezed, explained])
 
 
 def _flows(c: Cylinders, period: float, valve: ca.SX, pressures: tuple[ca.SX, ca.SX], known: Knowledge) -> list[ca.SX]:
-    """(2) over a period into both chambers: volumes, their sizes, and volumes for the least and largest overlap."""
-    supply = ca.if_else(known.unsure > UNSURE, maximum(known.supply, c.supply_pressure), known.supply)
+    """(2) over a period into both chambers: sizes, lower and upper ends, and both ends for the likely overlaps."""
+    sure = known.unsure <= UNSURE
+    supply = ca.if_else(sure, known.supply, maximum(known.supply, c.supply_pressure))
+    spread = ca.if_else(sure, SPREAD * known.unsure, 0.0)
+    ends = {
+        laminar: [
+            _edge(c, pressure, fills, supply - spread if laminar else supply + spread, laminar)
+            for pressure, fills in zip(pressures, (valve > 0.0, valve <= 0.0), strict=True)
+        ]
+        for laminar in (True, False)
+    }
     volumes = []
-    for overlap, ratio in ((known.overlap, 1.0), (known.least, known.ratio), (known.most, known.ratio)):
+    for overlap, ratio, laminar in (
+        (known.overlap, 1.0, True), (known.overlap, 1.0, False),
+        (known.most, known.ratio, True), (known.least, known.ratio, False),
+    ):  # fmt: skip
         opening = minimum(maximum(ca.fabs(valve) - overlap, 0.0) / (1.0 - overlap), 1.0) * ratio
-        for pressure, fills in zip(pressures, (valve > 0.0, ca.logic_not(valve > 0.0)), strict=True):
-            drop = ca.if_else(fills, pressure - supply, pressure - c.return_pressure)
-            volumes.append(-period * c.edge * opening * copysign(ca.sqrt(ca.fabs(drop)), drop))
-    return [*volumes[:2], *map(ca.fabs, volumes[:2]), *volumes[2:]]
+        volumes += [period * c.edge * opening * each for each in ends[laminar]]
+    return [*map(ca.fabs, volumes[2:4]), *volumes]
+
+
+def _edge(c: Cylinders, pressure: ca.SX, fills: ca.SX, supply: ca.SX, laminar: bool) -> ca.SX:
+    """Root of the drop into a chamber from the supply, or out of it [sqrt(Pa)], or what a laminar edge has for it."""
+    drop = ca.if_else(fills, supply - pressure, c.return_pressure - pressure)
+    if laminar:
+        return drop / ca.sqrt(ca.sqrt(drop * drop + c.laminar_pressure**2))
+    return copysign(ca.sqrt(ca.fabs(drop)), drop)
