@@ -48,7 +48,7 @@ anything from nothing to (2) under the nominal supply. A fit to the first half s
 ALIKE = 0.25
 """Below this share of the other one, a way is none."""
 SPREAD, SPOOL_FLOOR, SPOOL_SHARE, EVERY_LAG = 2.0, 1e-4, 0.1, (0, *LAGS)
-"""Of a spool that is not where it was told: standard deviations of the overlap, way [m], share of the flow, lags."""
+"""Standard deviations of supply and overlap; of a spool that is elsewhere: way [m], share of the flow, lags."""
 
 
 class Knowledge(NamedTuple):

@@ -76,6 +76,11 @@ def test_what_softer_oil_would_change_is_what_a_fit_with_softer_oil_finds():
     np.testing.assert_allclose(known.supply_oil[:, 1], np.abs(other.supply - known.supply)[:, 1], rtol=0.01)
 
 
+def test_two_deviations_of_the_oil_cover_one_of_0_7_of_the_modulus_that_is_believed():
+    """It is compressed 1 / 0.7 times as much; campaigns draw 0.7 to 1.3."""
+    assert 1.0 + 2.0 * (1.0 / (1.0 - ValveSettings().oil) - 1.0) >= 1.0 / 0.7
+
+
 def test_what_is_compensated_lies_a_deviation_below_what_was_found_and_never_below_zero():
     known = found(true=0.0 * OVERLAP)
     assert np.all(known.compensated >= 0.0)
